@@ -247,7 +247,7 @@ class Renderer:
         frame.provenance.update(self.provenance)
         if not over_backdrop:  # such a scene is not all that is seen
             asked = RenderChoices(method, interfaces, scattering, caustics, shadows)
-            frame = dataclasses.replace(frame, scene=scene, choices=asked)
+            frame = frame.rendered_from(scene, asked)
         _warn(frame)
         return frame
 

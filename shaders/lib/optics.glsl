@@ -27,7 +27,11 @@ vec3 opacity(vec3 optical_depth) {
 // T = exp(-tau); 0 from tau = 104 on in float32. Near 1 drivers' exp is off by a rounding, 1 - opacity is not.
 vec3 transmittance(vec3 optical_depth) {
     vec3 x = min(optical_depth, vec3(MAX_OPTICAL_DEPTH));
-    return mix(exp(-x), vec3(1.0) - x * mean_transmittance(x), lessThan(x, vec3(SERIES_LIMIT)));
+    // Taylor series, without the divisions of mean_transmittance: up to the switch x^9 / 9! is below float32 rounding.
+    vec3 series = 1.0 / 5040.0 - x / 40320.0;
+    series = 1.0 / 120.0 - x * (1.0 / 720.0 - x * series);
+    series = 0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * series));
+    return mix(exp(-x), vec3(1.0) - x * (vec3(1.0) - x * series), lessThan(x, vec3(SERIES_LIMIT)));
 }
 
 // log(1 - x). Drivers' log has an absolute error, useless near 1; there it is 2 artanh(-x / (2 - x)) as a series whose

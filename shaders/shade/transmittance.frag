@@ -1,5 +1,8 @@
 // From the accumulated path to what the frame holds: thickness, optical depth, transmittance, radiance, and the mask.
 // Row 0 of the output is the top row.
+// SPECTRAL: 0: sums are of paths in one medium; 1: of optical depths, with paths beside; 2, 3: of paths in so many media, apart.
+// COMPACT: one output has radiance and thickness, whose sign bit marks what is not valid. All else follows from these, but for
+// optical depths in several media.
 
 #include <View>
 #include <Shade>
@@ -8,6 +11,10 @@
 #include "lib/ray.glsl"
 #include "thickness/balance.glsl"
 #if !SURFACES && !MAP
+// What the environment is like, where that is known beforehand, and 0 where not.
+#if SEEN_KIND
+#define seen_kind (SEEN_KIND - 1)
+#endif
 #include "shade/background.glsl"
 #endif
 
@@ -18,21 +25,32 @@ uniform sampler2D ordered_layers;
 #endif
 #if ACCUMULATED
 uniform sampler2D accumulated;
-#if SPECTRAL
+#if SPECTRAL == 1
 uniform sampler2D accumulated_path;
 #endif
 #endif
 #if FALLBACK
 uniform sampler2D fallback;
-#if SPECTRAL
+#if SPECTRAL == 1
 uniform sampler2D fallback_path;
 #endif
 #endif
 #if UNLIT
 uniform sampler2D unlit;  // paths in media that scatter light which nothing follows
-#if SPECTRAL
+#if SPECTRAL == 1
 uniform sampler2D unlit_path;
 #endif
+#endif
+#if SPECTRAL > 1
+uniform sampler2D accumulated_second;
+uniform mat3 media_extinction;  // a column for each medium, in 1/m
+#if SPECTRAL == 3
+uniform sampler2D accumulated_third;
+#endif
+#endif
+#if SEEN_KIND
+// Of a ray, to the right and down from the camera's axis at distance 1, per pixel and at the corner of the picture.
+uniform vec4 view_span;
 #endif
 
 #if MAP
@@ -43,6 +61,11 @@ uniform sampler2D opaque_axial_depth;
 #endif
 layout(location = 0) out vec4 out_sums;
 layout(location = 1) out float out_end;
+#elif COMPACT
+layout(location = 0) out vec4 out_radiance;
+#if SPECTRAL
+layout(location = 1) out vec4 out_optical_depth;
+#endif
 #else
 layout(location = 0) out vec4 out_radiance;
 layout(location = 1) out vec4 out_transmittance;
@@ -60,14 +83,30 @@ struct Path {
 };
 
 // advance: metres along the ray per metre along the camera's forward axis.
-#if SPECTRAL
+#if ACCUMULATED || FALLBACK || UNLIT
+#if SPECTRAL > 1
+#define PATH_OF(sums, lengths) path_of(texelFetch(sums, texel, 0).rg, texel, advance)
+Path path_of(vec2 first, ivec2 texel, float advance) {
+    vec2 second = texelFetch(accumulated_second, texel, 0).rg;
+#if SPECTRAL == 3
+    vec2 third = texelFetch(accumulated_third, texel, 0).rg;
+#else
+    const vec2 third = vec2(0.0);
+#endif
+    vec3 lengths = vec3(first.r, second.r, third.r) * advance;
+    return Path(lengths.r + lengths.g + lengths.b, media_extinction * lengths, first.g + second.g + third.g);
+}
+#elif SPECTRAL == 1
+#define PATH_OF(sums, lengths) path_of(texelFetch(sums, texel, 0), texelFetch(lengths, texel, 0).r, advance)
 Path path_of(vec4 sum, float lengths, float advance) {
     return Path(lengths * advance, sum.rgb * advance, sum.a);
 }
 #else
+#define PATH_OF(sums, lengths) path_of(texelFetch(sums, texel, 0).rg, advance)
 Path path_of(vec2 sum, float advance) {
     return Path(sum.r * advance, sum.r * advance * extinction.rgb, sum.g);
 }
+#endif
 #endif
 
 void main() {
@@ -80,14 +119,15 @@ void main() {
     ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
 #endif
     vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
+#if SEEN_KIND
+    vec2 across = gl_FragCoord.xy * view_span.xy + view_span.zw;
+    float advance = sqrt(1.0 + dot(across, across));
+#else
     float advance = length(ray);
+#endif
 
 #if ACCUMULATED
-#if SPECTRAL
-    Path path = path_of(texelFetch(accumulated, texel, 0), texelFetch(accumulated_path, texel, 0).r, advance);
-#else
-    Path path = path_of(texelFetch(accumulated, texel, 0).rg, advance);
-#endif
+    Path path = PATH_OF(accumulated, accumulated_path);
 #else
     Path path = Path(0.0, vec3(0.0), 0.0);
 #endif
@@ -109,11 +149,7 @@ void main() {
     bool covered = path.thickness > coverage_floor || !valid;
     if (!valid) {
 #if FALLBACK
-#if SPECTRAL
-        path = path_of(texelFetch(fallback, texel, 0), texelFetch(fallback_path, texel, 0).r, advance);
-#else
-        path = path_of(texelFetch(fallback, texel, 0).rg, advance);
-#endif
+        path = PATH_OF(fallback, fallback_path);
 #else
         path = Path(0.0, vec3(0.0), 0.0);
 #endif
@@ -141,20 +177,23 @@ void main() {
 #else
     out_radiance = vec4(background(pixel, ray, texel) * through + emitted, 1.0);
 #endif
+#if COMPACT
+    out_radiance.a = uintBitsToFloat(floatBitsToUint(path.thickness) | (valid ? 0u : 0x80000000u));
+#if SPECTRAL
+    out_optical_depth = vec4(path.optical_depth, 1.0);
+#endif
+#else
     out_transmittance = vec4(through, 1.0);
 #if !AVERAGE
     out_optical_depth = vec4(path.optical_depth, 1.0);
     out_thickness = path.thickness;
 #if UNLIT
-#if SPECTRAL
-    float in_the_dark = texelFetch(unlit_path, texel, 0).r * advance;
-#else
-    float in_the_dark = texelFetch(unlit, texel, 0).r * advance;
-#endif
+    float in_the_dark = PATH_OF(unlit, unlit_path).thickness;
     // Thickness and transmittance are as right as ever, and stay; radiance is not.
     valid = valid && in_the_dark <= coverage_floor;
 #endif
     out_flags = ((covered ? FLAG_COVERED : 0.0) + (valid ? FLAG_VALID : 0.0)) / 255.0;
+#endif
 #endif
 #endif
 }

@@ -101,7 +101,9 @@ class _OnGpu:
 
     solve_seconds: float | None = None
 
-    def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan) -> None:
+    def __init__(
+        self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan, *, compact: bool = False
+    ) -> None:
         self._studio = studio
         scene = shown(scene, plan.given_back)
         # Only the light of the last scene is kept: each drawing of light that diffuses has its own.
@@ -111,7 +113,7 @@ class _OnGpu:
             began = time.perf_counter()
             self._own.solve(scene, plan.given_back.diffusion)
             self.solve_seconds = time.perf_counter() - began
-        self._job = FrameJob(studio.gl, scene, plan, targets, resources)
+        self._job = FrameJob(studio.gl, scene, plan, targets, resources, compact=compact)
 
     def read(self) -> Frame:
         """Read the frame of the last drawing."""
@@ -168,7 +170,7 @@ class Planned(_OnGpu):
     """Planned drawing: a plan of the public API, pass by pass as the renderer runs it."""
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan) -> None:
-        super().__init__(studio, scene, targets, plan)
+        super().__init__(studio, scene, targets, plan, compact=True)
         self._geometry = [spec for spec in plan.passes if spec.geometry_passes]
         self._shading = [spec for spec in plan.passes if not spec.geometry_passes]
 

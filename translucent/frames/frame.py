@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ import numpy.typing as npt
 from translucent.errors import InputError
 from translucent.formulas.color import exposure_scale, linear_to_srgb
 from translucent.formulas.tone import tone_curve
+from translucent.frames.deferred import Deferred
 from translucent.frames.display import Bundle, frame_bundle, png
 from translucent.frames.writing import write_frame, write_pictures
 from translucent.planning.choices import RenderChoices
@@ -33,6 +35,9 @@ MATTE_ARRAYS = ("alpha", "passed", "normals")
 #: Additional array of frames of random paths.
 NOISE_ARRAYS = ("standard_error",)
 
+#: Where a frame keeps the arrays that nobody has asked for yet.
+_DEFERRED = "_deferred"
+
 #: Largest exposure in stops, beyond which radiance would overflow float64 or be black.
 MAX_EXPOSURE = 100.0
 
@@ -40,6 +45,8 @@ MAX_EXPOSURE = 100.0
 @dataclass(frozen=True, eq=False)
 class Frame:
     """A rendered picture with its physical quantities. Row 0 is the top row; arrays are contiguous and the caller's.
+
+    Those that follow from what was read back are made when they are first asked for.
 
     Attributes
     ----------
@@ -96,6 +103,27 @@ class Frame:
     standard_error: npt.NDArray[Any] | None = None
     scene: Scene | None = None
     choices: RenderChoices = field(default_factory=RenderChoices)
+
+    def __post_init__(self) -> None:
+        # Without their attribute, `__getattr__` is asked for them.
+        deferred = {name: value for name, value in vars(self).items() if isinstance(value, Deferred)}
+        for name in deferred:
+            del self.__dict__[name]
+        self.__dict__[_DEFERRED] = deferred
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> npt.NDArray[Any]:
+            """An array that is made when it is first asked for."""
+            if (deferred := self.__dict__.get(_DEFERRED, {}).get(name)) is None:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            return self.__dict__.setdefault(name, deferred.made())
+
+    def rendered_from(self, scene: Scene, choices: RenderChoices) -> Frame:
+        """The frame, as one of that scene, rendered with these choices."""
+        frame = copy.copy(self)
+        frame.__dict__.update(scene=scene, choices=choices)
+        return frame
 
     def __repr__(self) -> str:
         covered, invalid = int(self.coverage.sum()), int((~self.valid).sum())

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.planning.assembly import FALLBACK_SHEET
@@ -14,6 +15,9 @@ from translucent.planning.render_plan import RenderPlan
 from translucent.planning.shadow_maps import dims_interfaces
 from translucent.planning.slots import Slot, medium_slots
 from translucent.scene.scene import Scene
+
+#: Largest number of media whose paths are added up in textures of their own.
+MOST_APART = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +99,28 @@ class FrameFeatures:
     def last_pass(self) -> str:
         """Name of the pass after which a sample's radiance is complete and can be summed."""
         return self.plan.passes[-1].name
+
+    @property
+    def can_be_compact(self) -> bool:
+        """Whether radiance, thickness, its validity and optical depth are all that the passes over pixels find."""
+        return self.last_pass == PassName.TRANSMITTANCE and not self.has_unlit
+
+    @cached_property
+    def media_apart(self) -> npt.NDArray[np.intp] | None:
+        """(objects,): number of each object's medium, of a few that absorb differently and have an accumulator each.
+
+        None where there are more, or other passes than signed depth add up.
+        """
+        others = (PassName.THIN_LAYER, PassName.BACK_FACE_DEPTH, PassName.UNLIT)
+        if not self.plan.spectral or self.plan.ordered or self.has_fallback or self.plan.has(*others):
+            return None
+        bodies = np.array([body.medium.extinction for body in self.scene.bodies if body.medium is not None])
+        found, numbers = np.unique(bodies, axis=0, return_inverse=True)
+        if not 2 <= len(found) <= MOST_APART:
+            return None
+        media = np.zeros(len(self.scene.objects), dtype=np.intp)
+        media[self.scene.filled] = numbers.reshape(-1)
+        return media
 
     @property
     def one_interface(self) -> bool:

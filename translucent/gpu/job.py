@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property
 
 import moderngl
@@ -35,6 +35,7 @@ from translucent.gpu.uniforms import (
     surface_table,
     surface_uniforms,
 )
+from translucent.planning.passes import PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.scene import Scene
@@ -52,10 +53,18 @@ class FrameJob(SceneView):
         The scene before its camera, where axial depths are to count from elsewhere than from where media begin.
     with_depth : bool
         Projections give depth.
+    compact : bool
+        All that is asked of the targets is what `gpu.reading` reads: they need not hold what follows from the rest.
 
     Attributes
     ----------
     features : FrameFeatures
+    compact : bool
+        `Targets.compact` takes the place of `Targets.result`, which not all plans allow.
+    media_apart : (objects,) int, optional
+        As `FrameFeatures.media_apart`, where each of these media has an accumulator; only of what is compact.
+    view : SampleView
+        Sample points that the scene is placed for.
     averaging : bool
         The samples of the frame are being summed up.
     sample, samples : int
@@ -103,6 +112,7 @@ class FrameJob(SceneView):
         placed: PlacedScene | None = None,
         *,
         with_depth: bool = False,
+        compact: bool = False,
     ) -> None:
         self.started = time.perf_counter()
         self.plan = plan
@@ -113,6 +123,8 @@ class FrameJob(SceneView):
         self.averaged = False
         self.report: Callable[[float], None] = lambda share: None
         self.features = FrameFeatures(scene, plan)
+        self.compact = compact and self.features.can_be_compact
+        self.media_apart = self.features.media_apart if self.compact else None
         placed = placed or PlacedScene.of(scene)
         counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))
         contents = _contents(self.features, placed, Balance.of(placed, plan.method, counts), targets.size)
@@ -152,7 +164,8 @@ class FrameJob(SceneView):
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
         scene = self.scene
         depths = depth_range(scene.boxes, scene.camera, scene.diagonal) if with_depth else None
-        self.uniforms.place(SampleView(scene.camera, self.targets.size, shift, depths, self.corner))
+        self.view = SampleView(scene.camera, self.targets.size, shift, depths, self.corner)
+        self.uniforms.place(self.view)
         self.covered = part_of(self._extents[scene.filled], shift, self.targets.size)
         self._cleared.clear()
 
@@ -176,7 +189,14 @@ class FrameJob(SceneView):
     def picture(self) -> moderngl.Framebuffer:
         """Framebuffer whose first attachment is the frame's radiance."""
         apart = self.features.has_surfaces or self.features.path_traced
-        return self.targets.surfaced() if apart else self.targets.result()
+        if apart:
+            return self.targets.surfaced()
+        return self.compact_result if self.compact else self.targets.result()
+
+    @property
+    def compact_result(self) -> moderngl.Framebuffer:
+        """Target of what is compact; with optical depth where that is not the same multiple of thickness everywhere."""
+        return self.targets.compact(with_depth=self.plan.spectral)
 
     def sums_after(self, name: str) -> bool:
         """True if the pass of this name adds a sample to the averages, in place of showing it."""
@@ -184,18 +204,38 @@ class FrameJob(SceneView):
 
     def accumulator(self, name: str = "accumulated") -> moderngl.Framebuffer:
         """Target in which thickness passes add up, cleared when a frame first asks for it."""
-        framebuffer = self.targets.path_and_count(self.plan.spectral, name)
+        return self._cleared_once(name, self.targets.path_and_count(self.plan.spectral, name))
+
+    @property
+    def accumulators_apart(self) -> tuple[moderngl.Framebuffer, ...]:
+        """Targets of `media_apart`, cleared as the accumulator is."""
+        assert self.media_apart is not None
+        names = [f"medium-{number}" for number in range(int(self.media_apart.max()) + 1)]
+        return tuple(self._cleared_once(name, self.targets.path_and_count(False, name)) for name in names)
+
+    def _cleared_once(self, name: str, framebuffer: moderngl.Framebuffer) -> moderngl.Framebuffer:
         if name not in self._cleared:
             framebuffer.clear()
             self._cleared.add(name)
         return framebuffer
 
     def begin_adding(self, target: str) -> None:
-        """Set the state in which every face adds to an accumulator.
+        """Set the state in which every face adds to an accumulator."""
+        self._add_to(self.accumulator(target))
 
-        No depth test and no culling: all faces count, and order cannot matter to a sum.
-        """
-        self.accumulator(target).use()
+    def adding(self, spec: PassSpec) -> Iterator[tuple[int, ...]]:
+        """Objects of a pass in turns, by the accumulator to which their faces then add."""
+        if self.media_apart is None:
+            self.begin_adding(spec.target)
+            yield spec.objects
+            return
+        for number, framebuffer in enumerate(self.accumulators_apart):
+            self._add_to(framebuffer)
+            yield tuple(i for i in spec.objects if self.media_apart[i] == number)
+
+    def _add_to(self, framebuffer: moderngl.Framebuffer) -> None:
+        # No depth test and no culling: all faces count, and order cannot matter to a sum.
+        framebuffer.use()
         self.gl.enable_only(moderngl.BLEND)
         self.gl.blend_equation = moderngl.FUNC_ADD
         self.gl.blend_func = moderngl.ONE, moderngl.ONE

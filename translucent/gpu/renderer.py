@@ -11,14 +11,12 @@ from contextlib import contextmanager
 
 import moderngl
 import numpy as np
-import numpy.typing as npt
 
 from translucent.errors import RenderError
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
-from translucent.gpu.adaptive import AdaptiveSampling, is_adaptive, read_averages, traced_samples
+from translucent.gpu.adaptive import AdaptiveSampling, is_adaptive, traced_samples
 from translucent.gpu.backdrop import TextureBackdrop
-from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.context import GpuContext, adopt_context, open_context, require_own_process
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
@@ -26,20 +24,17 @@ from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.caustics import CausticsPass
 from translucent.gpu.passes.path_trace import PathTracePass, PathTracer
 from translucent.gpu.passes.present import PresentPass
+from translucent.gpu.reading import read_arrays, read_paths
 from translucent.gpu.resources import Resources
 from translucent.gpu.shadow_atlas import ShadowAtlas
 from translucent.gpu.storage import SHADER_STORAGE
-from translucent.gpu.targets import Targets, read_floats
+from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering.choice import shown
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.scene import Scene
-
-#: Largest share of a pixel's light that may come along rays that went astray.
-MOST_LOST = 0.005
-
 
 #: Passes that make no more than light, which the averages have when the rest is found at the pixel centers.
 _LIGHT = (PassName.CAUSTICS, PassName.SURFACES, PassName.TRACED, PassName.PATH_TRACE)
@@ -124,7 +119,7 @@ class GpuRenderer:
         now and then. `adaptive`: rays are traced from interfaces as often as it changes the picture.
         """
         with self._alone(), self.context.current():
-            job = self.prepare(scene, size, plan, backdrop)
+            job = self.prepare(scene, size, plan, backdrop, compact=True)
             job.report = report or job.report
             try:
                 self._timer.begin_frame()
@@ -160,15 +155,17 @@ class GpuRenderer:
         plan: RenderPlan,
         backdrop: Backdrop | TextureBackdrop | None = None,
         targets: Targets | None = None,
+        *,
+        compact: bool = False,
     ) -> FrameJob:
         """Prepare the job that `run` needs for a frame, placed for the pixel centers. The caller releases it.
 
-        Without `targets` of its own it is drawn into those of the last frame.
+        Without `targets` of its own it is drawn into those of the last frame. A `compact` one is for `read` alone.
         """
         self._require_open()
         scene = shown(scene, plan.given_back).with_ambient_emitted
         if targets is not None:
-            return FrameJob(self.context.gl, scene, plan, targets, self._resources, backdrop)
+            return FrameJob(self.context.gl, scene, plan, targets, self._resources, backdrop, compact=compact)
         if self._targets is None or self._targets.size != size:
             old, self._targets = self._targets, None
             targets = Targets(self.context.gl, size)
@@ -176,7 +173,7 @@ class GpuRenderer:
                 targets.nothing().use()  # a released framebuffer must not be the bound one
                 old.release()
             self._targets = targets
-        return FrameJob(self.context.gl, scene, plan, self._targets, self._resources, backdrop)
+        return FrameJob(self.context.gl, scene, plan, self._targets, self._resources, backdrop, compact=compact)
 
     def run(self, job: FrameJob, *, geometry_only: bool = False, leave_out: tuple[PassName, ...] = ()) -> None:
         """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""
@@ -199,7 +196,7 @@ class GpuRenderer:
 
     def noise(self, job: FrameJob) -> float:
         """Root mean square of the standard error of a job's random paths so far, divided by their mean radiance."""
-        radiance, error, _ = _read_paths(job)
+        radiance, error, _ = read_paths(job)
         with np.errstate(under="ignore"):
             mean, noise = radiance.mean(dtype=np.float64), np.square(error, dtype=np.float64).mean()
         return float(np.sqrt(noise) / max(mean, np.finfo(np.float32).tiny))
@@ -218,49 +215,13 @@ class GpuRenderer:
 
     def read(self, job: FrameJob, samples: int = 1) -> Frame:
         """Read the frame from the job's targets, with radiance and transmittance averaged if sampled."""
-        result = job.targets.result()
-        trusted = None
-        if samples > 1:
-            radiance, transmittance, trusted = read_averages(job, samples)
-        else:
-            transmittance = read_floats(result, 1, 3)
-            radiance = read_floats(job.picture, 0, 3)
-        radiance, standard_error, lost = _read_paths(job) if job.features.path_traced else (radiance, None, None)
-        flags = np.empty(job.targets.size[::-1], dtype=np.uint8)
-        result.read_into(flags, components=1, attachment=4, alignment=1)
-        optical_depth, thickness = read_floats(result, 2, 3), read_floats(result, 3, 1)
+        arrays = read_arrays(job, samples)
         seconds = self._timer.seconds()
         seconds["total"] = time.perf_counter() - job.started
-        sound = np.ones(flags.shape, dtype=bool)
-        if job.features.traced:
-            # Rays that end inside a body, or in more of them than they can remember, have no right color.
-            share = read_floats(job.targets.surfaced(), 1, 4)[..., 3] if trusted is None else trusted
-            sound = share >= np.float32(1.0 - MOST_LOST)
-        if lost is not None:
-            sound = lost <= MOST_LOST
         provenance = dict(self.provenance)
         if job.bent_apart:
             provenance["traced_samples"] = f"{traced_samples(job):.1f} of {samples}"
-        layers = truncated = None
-        if job.plan.ordered:
-            counts = read_floats(job.targets.ordered(), 2, 4)[::-1]
-            layers = np.rint(counts[..., 0]).astype(np.int32)
-            truncated = np.rint(counts[..., 0] - counts[..., 1]).astype(np.int32)
-        return Frame(
-            radiance=radiance,
-            transmittance=transmittance,
-            optical_depth=optical_depth,
-            thickness=thickness,
-            coverage=(flags & 1).astype(bool),
-            valid=(flags & 2).astype(bool) & sound,
-            plan=job.plan,
-            seconds=seconds,
-            provenance=provenance,
-            standard_error=standard_error,
-            layers=layers,
-            truncated=truncated,
-            normals=_read_normals(job) if job.features.has_surfaces else None,
-        )
+        return Frame(plan=job.plan, seconds=seconds, provenance=provenance, **arrays)
 
     def close(self) -> None:
         """Free all OpenGL objects, and the context if it is ours. Closing twice is fine."""
@@ -334,23 +295,3 @@ def _release(gl: moderngl.Context, pid: int) -> None:
     """Release a context, but not in a process forked from its owner."""
     if pid == os.getpid():
         gl.release()
-
-
-def _read_normals(job: FrameJob) -> npt.NDArray[np.float32]:
-    """(h, w, 3): normals of the interfaces that the interfaces pass has found, 0 where there is none."""
-    width, height = job.targets.size
-    normals = np.zeros((height, width, 3), dtype=np.float32)
-    if job.covered:
-        found = read_floats(job.targets.entered(), 0, 4)[::-1]
-        np.copyto(normals, found[..., :3], where=found[..., 3:] < float(CONSTANTS["NOTHING"]))
-    return normals
-
-
-def _read_paths(job: FrameJob) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-    """Radiance (h, w, 3) of random paths, its standard error, and the share (h, w) of them that were lost."""
-    count = job.paths_traced
-    known = job.targets.paths()
-    mean, squares = read_floats(known, 0, 4), read_floats(known, 1, 3)
-    with np.errstate(under="ignore"):
-        error = np.sqrt(squares / np.float32(count * (count - 1.0)))
-        return np.ascontiguousarray(mean[..., :3]), error, mean[..., 3] / np.float32(count)

@@ -100,6 +100,10 @@ class Targets:
         """Arrays of a frame: radiance, transmittance, optical depth (RGBA32F), thickness (R32F) and flags (R8)."""
         return self._get("result", (4, 4, 4, 1, -1))
 
+    def compact(self, *, with_depth: bool) -> moderngl.Framebuffer:
+        """RGBA32F radiance and thickness, with the sign bit where it cannot be trusted; and RGBA32F optical depth."""
+        return self._get(f"compact-{with_depth}", (4, 4) if with_depth else (4,))
+
     def average(self) -> moderngl.Framebuffer:
         """RGBA32F radiance and transmittance, summed over the samples of a pixel, with a depth buffer."""
         return self._get("average", (4, 4), with_depth=True)

@@ -64,6 +64,24 @@ def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
     )
 
 
+def view_span(view: SampleView) -> tuple[float, float, float, float]:
+    """Of rays, to the right and down from the camera's axis at distance 1: per pixel, and at the top left corner of the
+    view; 0 for parallel rays.
+    """
+    camera, (width, height) = view.camera, view.size
+    if camera.fov_y is None:
+        return 0.0, 0.0, 0.0, 0.0
+    half_width, half_height = camera.half_extent(view.size)
+    aside, above = camera.center(view.size)
+    right, down = 2.0 * half_width / width, 2.0 * half_height / height
+    return (
+        right,
+        down,
+        view.shift[0] * right + (aside - 1.0) * half_width,
+        (view.shift[1] * down - (above + 1.0) * half_height),
+    )
+
+
 def center_aside(camera: Camera, size: tuple[int, int]) -> Array:
     """(3,): from the camera's axis to the center of the view, at distance 1, or in metres for an orthographic one."""
     aside = np.array(camera.center(size)) * camera.half_extent(size)

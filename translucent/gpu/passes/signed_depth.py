@@ -18,8 +18,8 @@ class SignedDepthPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies."""
-        job.begin_adding(spec.target)
         job.bind_opaque(0)
+        spectral = job.plan.spectral and job.media_apart is None
         opaque, plain = job.features.has_opaque, {"WITH_NORMAL": False, "WITH_POSITION": False}
         if job.path_only:
             variants = self._paths
@@ -30,12 +30,14 @@ class SignedDepthPass:
             chosen = kinds[(2 if job.projected_depth else 1) if opaque else 0]
         else:
             variants = self._variants
-            kinds = [{"OPAQUE": kind, "SPECTRAL": job.plan.spectral} for kind in (False, True)]
+            kinds = [{"OPAQUE": kind, "SPECTRAL": spectral} for kind in (False, True)]
             chosen = kinds[opaque]
         if job.for_map:
             # Nothing has to be compiled when an opaque object gets into the way of a light, or out of it.
             for kind in kinds:
                 variants.program(**plain, **kind)
-        if job.projected_depth:
-            job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
-        job.draw(variants.program(**plain, **chosen), spec.objects)
+        program = variants.program(**plain, **chosen)
+        for objects in job.adding(spec):
+            if job.projected_depth:
+                job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
+            job.draw(program, objects)

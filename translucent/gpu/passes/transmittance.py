@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-import moderngl
+from typing import Any
 
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from translucent.gpu.body_uniforms import bounded_extinction
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
+from translucent.gpu.uniforms import view_span
 from translucent.planning.passes import PassSpec
+from translucent.scene.scene import Scene
 
 _SAMPLERS = (
     "accumulated",
@@ -22,7 +30,12 @@ _SAMPLERS = (
     "seen_map",
     "unlit",
     "unlit_path",
+    "accumulated_second",
+    "accumulated_third",
 )
+
+#: Samplers of the media that have an accumulator each.
+_APART = ("accumulated", "accumulated_second", "accumulated_third")
 
 
 class TransmittancePass:
@@ -42,7 +55,7 @@ class TransmittancePass:
         if seen_map:
             job.resources.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
         sums = job.sums_after(spec.name)
-        into = job.targets.average() if sums else job.targets.result()
+        into = job.targets.average() if sums else job.compact_result if job.compact else job.targets.result()
         into.use()
         if sums:
             gl.enable_only(moderngl.BLEND)
@@ -54,13 +67,18 @@ class TransmittancePass:
         switches = {
             "MAP": False,
             "AVERAGE": sums,
+            "COMPACT": job.compact and not sums,
             "SURFACES": features.has_surfaces,
             "SEEN_MAP": seen_map,
+            # Where others look at the targets, they may change the environment, too.
+            "SEEN_KIND": 1 + int(CONSTANTS[f"ENVIRONMENT_{seen.kind.upper()}"]) if job.compact else 0,
             "OPAQUE": features.has_opaque,
         }
         program = self._variants.program(**switches, **paths)
         # Where there is no medium no path is read, and all of it is 0.
-        empty = self._variants.program(**switches, **dict.fromkeys(paths, False))
+        without = {name: False for name in paths if name != "SPECTRAL" or not job.compact}
+        empty = self._variants.program(**switches, **(paths | without))
+        self._set_loose(job, (program, empty))
         self._variants.draw_covered(job, program, into, top_first=True)
         self._variants.draw_rest(job, empty, into, top_first=True)
 
@@ -73,7 +91,8 @@ class TransmittancePass:
         """
         paths = self._bind_paths(job) | {"UNLIT": False, "EMISSION": False}
         opaque = job.features.has_opaque
-        switches = {"MAP": True, "AVERAGE": False, "SURFACES": False, "SEEN_MAP": False, "OPAQUE": opaque}
+        unused = dict.fromkeys(("AVERAGE", "COMPACT", "SURFACES", "SEEN_MAP", "SEEN_KIND"), 0)
+        switches = {"MAP": True, "OPAQUE": opaque, **unused}
         x, y, *extent = job.covered.scissor
         into.use()
         job.gl.enable_only(moderngl.NOTHING)
@@ -89,11 +108,21 @@ class TransmittancePass:
         into.scissor = None
         into.viewport = (0, 0, *into.size)
 
-    def _bind_paths(self, job: FrameJob) -> dict[str, bool]:
+    def _set_loose(self, job: FrameJob, programs: tuple[moderngl.Program, ...]) -> None:
+        """Set the uniforms that some variants have outside of blocks."""
+        values: dict[str, Any] = {"view_span": view_span(job.view)}
+        if job.media_apart is not None:
+            values["media_extinction"] = _extinctions(job.scene, job.media_apart)
+        for program in programs:
+            for name, value in values.items():
+                if name in program:
+                    set_uniform(program, name, value)
+
+    def _bind_paths(self, job: FrameJob) -> dict[str, bool | int]:
         """Bind what passes before have found, and the switches that say what that is."""
-        plan, features = job.plan, job.features
+        plan, features, apart = job.plan, job.features, job.media_apart
         inputs = {
-            "accumulated": job.accumulator() if features.accumulates else None,
+            "accumulated": job.accumulator() if features.accumulates and apart is None else None,
             "fallback": job.accumulator("fallback") if features.has_fallback else None,
             "unlit": job.accumulator("unlit") if features.has_unlit else None,
             "ordered_depth": job.targets.ordered() if plan.ordered else None,
@@ -103,11 +132,22 @@ class TransmittancePass:
             if framebuffer is not None:
                 for unit, texture in enumerate(framebuffer.color_attachments, _SAMPLERS.index(first)):
                     texture.use(unit)
+        if apart is not None:
+            for name, framebuffer in zip(_APART, job.accumulators_apart, strict=False):
+                framebuffer.color_attachments[0].use(_SAMPLERS.index(name))
         return {
-            "SPECTRAL": plan.spectral,
+            "SPECTRAL": plan.spectral if apart is None else int(apart.max()) + 1,
             "FALLBACK": features.has_fallback,
             "UNLIT": features.has_unlit,
             "EMISSION": features.emits and not plan.ordered,
             "ORDERED": plan.ordered,
             "ACCUMULATED": features.accumulates,
         }
+
+
+def _extinctions(scene: Scene, media: npt.NDArray[np.intp]) -> tuple[float, ...]:
+    """Columns of a matrix (3, 3): extinction in 1/m of the medium with each number."""
+    columns = np.zeros((3, 3))
+    for number, body in zip(media[scene.filled], scene.bodies, strict=True):
+        columns[number] = bounded_extinction(body.medium, scene.diagonal)
+    return tuple(columns.ravel().tolist())
