@@ -210,17 +210,17 @@ class DiffusingBody:
         dimming = dimming_bodies(scene, body)
         grid = self._lit.grid
         entering = self._entrance.seen @ environment_parts(scene.environment, self._lit.sky.directions)
-        inside = np.zeros((grid.count, 3))
+        inside, beams = np.zeros((grid.count, 3)), []
         for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
-                entering = entering + from_light(
-                    grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops
+                beams.append(
+                    from_light(grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops)
                 )
         if photons is not None:
             entering = entering + flux_of(photons, grid)
-        found = self._system.solved(entering, self._entrance.itself, inside)
+        found = self._system.solved(entering, self._entrance.itself, inside, beams)
         return _field(self._lit, self._medium, self._roughness, found)
 
 
