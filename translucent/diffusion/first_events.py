@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy import sparse
@@ -161,12 +162,9 @@ class Events:
             deep = deep + sparse.csr_array((share, (np.arange(count), cell)), deep.shape)
         return sparse.csr_array((grid.area * (deep + sparse.diags_array(self.above) @ read)).T)
 
-    def power(self, flux: Array, grid: BodyGrid, read: sparse.csr_array) -> Array:
-        """(cells,): power in the cells for a flux (k,); `read` has the rows of the samples."""
-        total = read.T @ (self.above * flux)
-        for cell, share in self.below:
-            total += np.bincount(cell, share * flux, grid.count)
-        return np.asarray(grid.area * total)
+    def power_below(self, flux: Array, cells: int) -> Array:
+        """(cells,): power in the cells of events below the depth of reading, for a flux (k,)."""
+        return np.sum([np.bincount(cell, share * flux, cells) for cell, share in self.below], axis=0)
 
 
 class FirstEvents:
@@ -227,14 +225,21 @@ class FirstEvents:
             near += share * layer.rise(layer.depth - depth) / self._d
         deep = []
         # Interpolation by chance: each place stands for the cell around it.
-        spread = grid.cells.step * (box_points(len(grid.points))[ways.samples] - 0.5)
-        for quantile in tails(len(grid.points))[:, ways.samples] if below.max(initial=0.0) > _NOTHING else ():
+        spread, quantiles = _places(len(grid.points))
+        start = grid.points[ways.samples] + grid.cells.step * spread[ways.samples]
+        for quantile in quantiles[:, ways.samples] if below.max(initial=0.0) > _NOTHING else ():
             length = slant - np.log1p(-quantile) / extinction
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
-            at = grid.points[ways.samples] + ways.length(length)[:, None] * ways.directions + spread
+            at = start + ways.length(length)[:, None] * ways.directions
             cell, inside = grid.cell_at(at)
             deep.append((cell, self._albedo / DEEP_EVENTS * below * inside * counted(extinction * length)))
         return Events(near - excess, into_cells, deep)
+
+
+@lru_cache(maxsize=16)
+def _places(samples: int) -> tuple[Array, Array]:
+    """Shifts (samples, 3) in cells, and quantiles, of the events of each sample."""
+    return box_points(samples) - 0.5, tails(samples)
 
 
 def tails(samples: int) -> Array:

@@ -179,15 +179,17 @@ class _Channel:
 
     def beamed(self, channel: int, beams: Sequence[Beam], ways: Sequence[Ways]) -> _Beamed:
         """First events of beams, of which each goes its ways."""
-        flux, mirrored, near = (np.zeros(len(self._grid.points)) for _ in range(3))
-        power = np.zeros(self._grid.count)
+        grid = self._grid
+        flux, mirrored, near, above = np.zeros((4, len(grid.points)))
+        below = np.zeros(grid.count)
         for beam, way in zip(beams, ways, strict=True):
             entering, events = beam.entering[:, channel], self._first.of(way)
             flux[beam.samples] += entering
             mirrored[beam.samples] += beam.mirrored[:, channel]
             near[beam.samples] += events.near * entering
-            power += events.power(entering, self._grid, self._read[beam.samples])
-        return _Beamed(flux, mirrored, near, power)
+            above[beam.samples] += events.above * entering
+            below += events.power_below(entering, grid.count)
+        return _Beamed(flux, mirrored, near, grid.area * (self._read.T @ above + below))
 
     def solved(
         self, entering: Array, from_itself: sparse.csr_array, power: Array, emission: float, straight: _Beamed
