@@ -443,7 +443,7 @@ def sunlit_ball(extinction: float, albedo: float, photons: int, zones: int, rng:
 
 
 def test_light_of_a_sun_goes_on_as_it_falls(rng: np.random.Generator) -> None:
-    """Flux out of a ball, in zones from the back to the sun, is that of photons; not if it enters as uniform light does."""
+    """Flux out of a ball, in zones from the back to the sun, is that of photons; not of one that enters as uniform."""
     medium, grid = tl.Medium(absorption=0.5, scattering=4.5), ball_grid(20)
     exact = sunlit_ball(5.0, 0.9, 12000, 6, rng)
     ball, sun = tl.Object(BALL, medium), tl.DirectionalLight((0, 0, -1), (1, 1, 1))
@@ -458,6 +458,31 @@ def test_light_of_a_sun_goes_on_as_it_falls(rng: np.random.Generator) -> None:
     print(off)
     # Photons err by 1 %. Diffusion errs most in the twilight, where the light that comes in at a slant leaves soon.
     assert off[0] < 0.13 < 0.2 < off[1]
+
+
+def test_bodies_on_the_way_absorb_light_of_the_environment() -> None:
+    """What Beer says of the mean way through a lid over all of the sky; and nothing of what they scatter alone."""
+    ball = tl.Object(BALL, tl.Medium(scattering=5.0, ior=1.5))
+    geometry = lit_body(ball, None, Diffusion(10).cell_size(ball))
+    free, lidded, white = (
+        DiffusingBody(geometry, ball.medium, 0.0)
+        .field(tl.Scene([ball, *lids], CAMERA, (), tl.Environment.gradient((0, 0, 0), (1, 1, 1))), 0)
+        .entering
+        for lids in (
+            (),
+            (tl.Object(Box((-90, 1.5, -90), (90, 2.0, 90)).tessellate(), tl.Medium(absorption=(0.0, 1.0, 4.0))),),
+            (tl.Object(Box((-90, 1.5, -90), (90, 2.0, 90)).tessellate(), tl.Medium(scattering=9.0)),),
+        )
+    )
+    np.testing.assert_array_equal(white, free)
+    np.testing.assert_array_equal(lidded[..., 0], free[..., 0])
+    top = np.unravel_index(free[..., 0].argmax(), free.shape[:3])
+    cosine, weight = np.polynomial.legendre.leggauss(64)
+    cosine = 0.5 * (cosine + 1)
+    sky = weight * cosine * (1 - optics.fresnel_dielectric(cosine, 1.5)) * (0.5 + 0.5 * cosine)
+    for channel, absorption in ((1, 1.0), (2, 4.0)):
+        share = float((sky * optics.transmittance(0.5 * absorption / cosine)).sum() / sky.sum())
+        assert lidded[(*top, channel)] / free[(*top, channel)] == pytest.approx(share, rel=0.05)
 
 
 def test_opaque_objects_shadow_a_directional_light() -> None:

@@ -157,7 +157,7 @@ def test_a_thick_slab_that_scatters_ahead_gives_back_less() -> None:
     assert medium(1, 100).diffuse_reflectance == pytest.approx(np.full(3, through_air), rel=1e-6)
     exact = half_space_reflectance(1000 / 1001, 1.0, 0.9)
     assert medium(1, 1000, 0.9).diffuse_reflectance == pytest.approx(np.full(3, exact), rel=1e-6)
-    assert 0.95 * through_air < exact < through_air
+    assert 0.94 * through_air < exact < through_air
     assert medium(1, 1, 0.9).diffuse_reflectance[0] < 0.6 * half_space_reflectance(0.1 / 1.1, 1.0)
 
 

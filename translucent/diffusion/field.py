@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -12,8 +13,9 @@ from scipy.ndimage import map_coordinates, uniform_filter
 
 from translucent.arrays import Array
 from translucent.diffusion.densities import Densities, densities
-from translucent.diffusion.dimming import dimming_bodies
+from translucent.diffusion.dimming import dimming_bodies, sky_paths
 from translucent.diffusion.entering import (
+    BEFORE,
     Casters,
     Sky,
     environment_parts,
@@ -31,6 +33,7 @@ from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_fluxes
 from translucent.formulas.diffusion import emergent_radiance, haze_shares
 from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Object, Scene
@@ -156,11 +159,26 @@ class LitBody:
     casters: Casters
     sky: Sky
     _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
+    _sky_paths: dict[tuple[Mesh, bytes], sparse.csr_array] = field(default_factory=dict)
 
     @cached_property
     def densities(self) -> Densities:
         """Densities of the body."""
         return densities(self.casters.body, self.grid)
+
+    def sky_paths(self, others: Sequence[Object]) -> list[sparse.csr_array]:
+        """Metres in each of other bodies on the way to the sky, see `sky_paths`; those of the last ones are kept."""
+        places = [(body.mesh, body.matrix.tobytes()) for body in others]
+        start = self.grid.points + BEFORE * self.grid.cells.step * self.grid.face_normals
+        found = {
+            place: self._sky_paths[place]
+            if place in self._sky_paths
+            else sky_paths(body, start, self.sky.directions, self.sky.seen)
+            for place, body in zip(places, others, strict=True)
+        }
+        self._sky_paths.clear()
+        self._sky_paths.update(found)
+        return [found[place] for place in places]
 
     def entrance(self, ior: float, roughness: float) -> Entrance:
         """Light that enters through this interface; that of the last one is kept."""
@@ -209,7 +227,7 @@ class DiffusingBody:
         """
         dimming = dimming_bodies(scene, body)
         grid = self._lit.grid
-        entering = self._entrance.seen @ environment_parts(scene.environment, self._lit.sky.directions)
+        entering = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
         inside, beams = np.zeros((grid.count, 3)), []
         for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
@@ -222,6 +240,27 @@ class DiffusingBody:
             entering = entering + flux_of(photons, grid)
         found = self._system.solved(entering, self._entrance.itself, inside, beams)
         return _field(self._lit, self._medium, self._roughness, found)
+
+    def _from_sky(self, parts: Array, others: list[Object]) -> Array:
+        """(s, 3): flux that enters of radiance over solid angles (k, 3), less what other bodies on its way absorb.
+
+        What they scatter goes on elsewhere, and as much comes from there: in uniform light it is not missing.
+        """
+        seen = self._entrance.seen
+        entering = np.asarray(seen @ parts, np.float64)
+        absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
+        if not absorbing or not parts.any():
+            return entering
+        paths = self._lit.sky_paths(absorbing)
+        for channel in range(3):
+            depth = sparse.csr_array(seen.shape)
+            for body, metres in zip(absorbing, paths, strict=True):
+                assert body.medium is not None
+                depth = depth + metres * float(np.asarray(body.medium.absorption)[channel])
+            lost = depth.tocoo()
+            values = seen[lost.row, lost.col] * optics.opacity(lost.data) * parts[lost.col, channel]
+            entering[:, channel] -= np.bincount(lost.row, values, len(entering))
+        return entering
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:

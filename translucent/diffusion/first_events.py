@@ -164,7 +164,10 @@ class Events:
 
     def power_below(self, flux: Array, cells: int) -> Array:
         """(cells,): power in the cells of events below the depth of reading, for a flux (k,)."""
-        return np.sum([np.bincount(cell, share * flux, cells) for cell, share in self.below], axis=0)
+        total = np.zeros(cells)
+        for cell, share in self.below:
+            total += np.bincount(cell, share * flux, cells)
+        return total
 
 
 class FirstEvents:

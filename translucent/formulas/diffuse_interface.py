@@ -139,7 +139,7 @@ def half_space_reflectances(cosine: npt.ArrayLike, albedo: float, ior: float = 1
         See `half_space_reflectance`.
     """
     at, _, shares = _half_space(albedo, ior, anisotropy)
-    return np.asarray(np.interp(cosine, at, shares))
+    return np.asarray(np.interp(np.asarray(cosine, np.float64), at, shares))
 
 
 @lru_cache(maxsize=1024)

@@ -147,8 +147,8 @@ class Preset:
         """(2, 3, 3): what slabs of 1, 5 and 20 mm on a white and a black card (`CARDS`) send back of white light.
 
         From all sides to all sides, polished, without the mirror image, the card below in optical contact: as paint on
-        a contrast chart. Exact where scattering is isotropic; else by the reduced coefficients, which a thick slab shows:
-        to 0.04 where much is scattered ahead (`diffuse_reflectance` is exact).
+        a contrast chart. Exact where scattering is isotropic; else by the reduced coefficients; of thick
+        slabs that is right to 0.04 (`diffuse_reflectance` is exact).
         """
         reduced = self.absorption + self.reduced_scattering
         return _on_cards(*(tuple(v.tolist()) for v in (self.reduced_albedo, reduced)), self.medium.ior)
