@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 from scipy.ndimage import map_coordinates, uniform_filter
+from scipy.spatial import cKDTree
 
 from translucent.arrays import Array
 from translucent.diffusion.densities import Densities, densities
@@ -44,6 +45,9 @@ SPREAD = 3
 #: Share by which light that has entered just now can darken the rest, at most: where the two do not fit together, as
 #: beside the edge of a shadow.
 FRESH = 0.8
+
+#: Samples of a surface for each at which ways through other bodies are found.
+SAMPLES_FOR_PATH = 4
 
 #: Share of a cell that is inside from which all of it is.
 _WHOLE = 1.0 - 1e-9
@@ -169,16 +173,20 @@ class LitBody:
     def sky_paths(self, others: Sequence[Object]) -> list[sparse.csr_array]:
         """Metres in each of other bodies on the way to the sky, see `sky_paths`; those of the last ones are kept."""
         places = [(body.mesh, body.matrix.tobytes()) for body in others]
-        start = self.grid.points + BEFORE * self.grid.cells.step * self.grid.face_normals
         found = {
-            place: self._sky_paths[place]
-            if place in self._sky_paths
-            else sky_paths(body, start, self.sky.directions, self.sky.seen)
+            place: self._sky_paths[place] if place in self._sky_paths else self._paths(body)
             for place, body in zip(places, others, strict=True)
         }
         self._sky_paths.clear()
         self._sky_paths.update(found)
         return [found[place] for place in places]
+
+    def _paths(self, body: Object) -> sparse.csr_array:
+        """Metres in another body: those of a part of the samples, of which each stands for what is nearest to it."""
+        points, part = self.grid.points, slice(None, None, SAMPLES_FOR_PATH)
+        start = points[part] + BEFORE * self.grid.cells.step * self.grid.face_normals[part]
+        metres = sky_paths(body, start, self.sky.directions, self.sky.cosine[part] > 0.0)
+        return sparse.csr_array(metres[cKDTree(points[part]).query(points)[1]])
 
     def entrance(self, ior: float, roughness: float) -> Entrance:
         """Light that enters through this interface; that of the last one is kept."""
