@@ -47,13 +47,13 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tl.Medium]:
         ("bear_skim", 4, "nrmse", 0.065),
         ("sphere_milk_white", 4, "nrmse", 0.03),
         ("candle", 4, "block", 0.15),
-        ("wax_bear_lamp", 4, "block", 0.29),
+        ("wax_bear_lamp", 4, "block", 0.27),
     ],
 )
 def test_pictures_are_near_full_light_transport(
     renderer: tl.Renderer, transport: ModuleType, name: str, samples: int, measure: str, most: float
 ) -> None:
-    """Measured with 16 samples: .083, .061, .044, .054, .023; and of blocks of pixels .118, .270, of lamps that are
+    """Measured with 16 samples: .082, .062, .049, .059, .023; and of blocks of pixels .118, .255, of lamps that are
     balls in the truth and points here. Four samples leave more aliasing, of which the ring alone has much: .104.
     """
     scene, size = transport.make(name)

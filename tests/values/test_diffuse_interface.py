@@ -16,6 +16,7 @@ from translucent.formulas.diffuse_interface import (
     diffusion_coefficient,
     emergent_fluxes,
     half_space_reflectance,
+    half_space_reflectances,
 )
 from translucent.formulas.diffusion import emergent_radiance
 
@@ -160,6 +161,22 @@ def test_matched_half_spaces_reflect_as_chandrasekhar_found(albedo: float) -> No
     moment = float((0.5 * weights * mu * chandrasekhar_h(albedo, mu)).sum())
     # The closed form has a sharp peak at small mu: its quadrature is what errs here.
     assert half_space_reflectance(albedo) == pytest.approx(1 - 2 * math.sqrt(1 - albedo) * moment, abs=1e-7)
+
+
+@pytest.mark.parametrize("albedo", [0.3, 0.9, 0.999])
+def test_light_at_a_slant_comes_back_as_chandrasekhar_found(albedo: float) -> None:
+    """1 - H(mu) sqrt(1 - w) of light at the cosine mu; and of uniform light, behind an interface, what it is in all."""
+    mu = np.linspace(0.05, 1.0, 20)
+    exact = 1 - chandrasekhar_h(albedo, mu) * math.sqrt(1 - albedo)
+    # Between nodes the shares are interpolated.
+    assert half_space_reflectances(mu, albedo) == pytest.approx(exact, abs=2e-4)
+    for anisotropy in (0.0, 0.8):
+        nodes, weights = np.polynomial.legendre.leggauss(512)
+        outside = 0.5 * (nodes + 1)
+        flux = weights * outside * (1 - optics.fresnel_dielectric(outside, 1.5))
+        shares = half_space_reflectances(optics.refracted_cosine(outside, 1.5), albedo, 1.5, anisotropy)
+        whole = half_space_reflectance(albedo, 1.5, anisotropy)
+        assert float((flux * shares).sum() / flux.sum()) == pytest.approx(whole, abs=2e-4)
 
 
 def followed(albedo: float, ior: float, photons: int, rng: np.random.Generator) -> tuple[float, float]:

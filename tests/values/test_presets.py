@@ -151,10 +151,14 @@ def test_a_thick_slab_that_absorbs_nothing_gives_back_what_enters() -> None:
     assert diffuse_interface(1.3).entering == pytest.approx(0.939, abs=5e-4)
 
 
-def test_a_thick_slab_goes_by_reduced_albedos() -> None:
-    assert medium(1, 1000, 0.9).diffuse_reflectance == pytest.approx(medium(1, 100).diffuse_reflectance, rel=1e-6)
+def test_a_thick_slab_that_scatters_ahead_gives_back_less() -> None:
+    """Than by its reduced albedo, unless little is absorbed."""
     through_air = half_space_reflectance(100 / 101, 1.0)
     assert medium(1, 100).diffuse_reflectance == pytest.approx(np.full(3, through_air), rel=1e-6)
+    exact = half_space_reflectance(1000 / 1001, 1.0, 0.9)
+    assert medium(1, 1000, 0.9).diffuse_reflectance == pytest.approx(np.full(3, exact), rel=1e-6)
+    assert exact == pytest.approx(through_air, rel=1e-3)
+    assert medium(1, 1, 0.9).diffuse_reflectance[0] < 0.95 * half_space_reflectance(0.1 / 1.1, 1.0)
 
 
 @pytest.mark.parametrize("name", ["gummy", "amber", "honey", "sea_water"])

@@ -178,9 +178,9 @@ def diffusion_key(scene: Scene, diffusion: Diffusion, caustics: Caustics | None 
     )
     lights = tuple((type(light), *map(_bytes, astuple(light))) for light in scene.lights)
     dimming = tuple(
-        (i, _place(item), np.asarray(item.medium.extinction).tobytes())
-        for i, item in enumerate(scene.objects if lights else ())
-        if item.medium is not None
+        (i, _place(item), np.asarray(item.medium.extinction).tobytes(), np.asarray(item.medium.absorption).tobytes())
+        for i, item in enumerate(scene.objects)
+        if item.medium is not None and np.any(item.medium.extinction)
     )
     return (diffusion, bodies, opaque, lighting, lights, dimming, bending)
 

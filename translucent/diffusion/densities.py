@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Integers
 from translucent.diffusion.grid import BodyGrid
 from translucent.scene.scene import Object
 
@@ -52,12 +52,12 @@ class Densities:
         densest = float(self.cells.max(initial=0.0))
         return np.asarray(d / np.maximum(self.cells, min(d / self.longest, densest or np.inf)))
 
-    def lengths(self, ways: Array) -> Callable[[Array], Array]:
-        """Function from integrals of the density (s,), in m, on ways (s, 3) from the samples, to metres (s,)."""
+    def lengths(self, samples: Integers, ways: Array) -> Callable[[Array], Array]:
+        """Function from integrals of the density (k,), in m, on ways (k, 3) from samples (k,), to metres (k,)."""
         if self._means is None:
             return lambda integral: integral
         cells = self._grid.cells
-        start = (self._grid.points - cells.low) / cells.step - 0.5
+        start = (self._grid.points[samples] - cells.low) / cells.step - 0.5
         slow = np.where(np.abs(ways) > np.finfo(np.float64).eps, ways, np.finfo(np.float64).eps)
         end = np.where(slow > 0.0, np.array(self._means.shape) - start, -1.0 - start) / slow
         piece = end.min(axis=1) * cells.step / _PIECES

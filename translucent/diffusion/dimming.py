@@ -1,4 +1,4 @@
-"""Transmittance of other bodies on the straight way of light to a body in which it diffuses."""
+"""Light that other bodies take on its straight way to a body in which it diffuses."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from scipy import sparse
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Mask
 from translucent.formulas import optics
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
@@ -50,6 +51,26 @@ def light_passed(bodies: Sequence[Object], points: Array, directions: Array, dis
         assert body.medium is not None
         depth += _path(body, points, directions, distance)[:, None] * np.asarray(body.medium.extinction)
     return optics.transmittance(depth)
+
+
+def sky_paths(body: Object, points: Array, directions: Array, seen: Mask) -> sparse.csr_array:
+    """(s, k): metres in another body from points (s, 3) in unit directions (k, 3) that are `seen`."""
+    center, radius = _bounding_ball(body)
+    towards = center - points
+    along = towards @ directions.T
+    near = (towards**2).sum(axis=1)[:, None] - along**2 <= radius**2
+    within = (towards**2).sum(axis=1) <= radius**2
+    sample, direction = np.nonzero(seen & near & ((along > 0.0) | within[:, None]))
+    metres = _path(body, points[sample], directions[direction], np.full(len(sample), np.inf))
+    crossed = metres > 0.0
+    return sparse.csr_array((metres[crossed], (sample[crossed], direction[crossed])), seen.shape)
+
+
+def _bounding_ball(body: Object) -> tuple[Array, float]:
+    """Center and radius of a ball around a body."""
+    corners = body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3]
+    center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    return center, float(np.sqrt(((corners - center) ** 2).sum(axis=1).max()))
 
 
 def _path(body: Object, points: Array, directions: Array, distance: Array) -> Array:

@@ -12,10 +12,12 @@ from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.diffusion.dimming import light_passed
+from translucent.diffusion.first_events import Beam
 from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.photon_fluence import EnteringPhotons
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
+from translucent.formulas.interface import refracted_direction
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.triangles import Triangles, joined
@@ -191,8 +193,8 @@ def from_light(
     interface: DiffuseInterface,
     dimming: Sequence[Object] = (),
     stops: EmbreeMesh | None = None,
-) -> Array:
-    """(s, 3): flux of a light that enters at the samples, as far as nothing is in its way, and other bodies let it.
+) -> Beam:
+    """Light of a lamp or a sun that enters at the samples, as far as nothing is in its way, and other bodies let it.
 
     `stops` are surfaces of other bodies that none of it passes.
     """
@@ -204,18 +206,19 @@ def from_light(
         direction = np.broadcast_to(-np.asarray(light.direction), grid.points.shape)
         distance = np.full(len(grid.points), np.inf)
     cosine = (direction * grid.normals).sum(axis=1)
-    lit = (cosine > 0.0) & ((direction * grid.face_normals).sum(axis=1) > 0.0)
-    start = grid.points + BEFORE * grid.cells.step * grid.face_normals
-    if lit.any():
-        nearest = np.minimum(*casters.nearest(start[lit], direction[lit]))
-        if stops is not None:
-            nearest = np.minimum(nearest, _nearest(stops, start[lit], direction[lit]))
-        lit[lit] = nearest >= distance[lit]
-    polished = 1.0 - optics.fresnel_dielectric(np.maximum(cosine, 0.0), ior)
+    lit = np.flatnonzero((cosine > 0.0) & ((direction * grid.face_normals).sum(axis=1) > 0.0))
+    start = grid.points[lit] + BEFORE * grid.cells.step * grid.face_normals[lit]
+    nearest = np.minimum(*casters.nearest(start, direction[lit]))
+    if stops is not None:
+        nearest = np.minimum(nearest, _nearest(stops, start, direction[lit]))
+    free = nearest >= distance[lit]
+    lit, start = lit[free], start[free]
+    towards, normals = direction[lit], grid.normals[lit]
+    reflected = optics.fresnel_dielectric(cosine[lit], ior)[:, None]
     # What a rough interface loses, of any light as of uniform light.
     share = interface.entering / diffuse_interface(ior).entering
-    flux = np.asarray(light.irradiance_on(grid.points, grid.normals), np.float64)
-    entering = np.where(lit, polished * share, 0.0)[:, None] * flux
-    if dimming and lit.any():
-        entering[lit] *= light_passed(dimming, start[lit], direction[lit], distance[lit])
-    return np.asarray(entering)
+    flux = np.asarray(light.irradiance_on(grid.points[lit], normals), np.float64)
+    if dimming:
+        flux = flux * light_passed(dimming, start, towards, distance[lit])
+    ways = refracted_direction(-towards, normals, np.full(len(lit), ior))
+    return Beam(lit, ways, (1.0 - reflected) * share * flux, reflected * flux)

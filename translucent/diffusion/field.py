@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -9,11 +10,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 from scipy.ndimage import map_coordinates, uniform_filter
+from scipy.spatial import cKDTree
 
 from translucent.arrays import Array
 from translucent.diffusion.densities import Densities, densities
-from translucent.diffusion.dimming import dimming_bodies
+from translucent.diffusion.dimming import dimming_bodies, sky_paths
 from translucent.diffusion.entering import (
+    BEFORE,
     Casters,
     Sky,
     environment_parts,
@@ -31,6 +34,7 @@ from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_fluxes
 from translucent.formulas.diffusion import emergent_radiance, haze_shares
 from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Object, Scene
@@ -41,6 +45,9 @@ SPREAD = 3
 #: Share by which light that has entered just now can darken the rest, at most: where the two do not fit together, as
 #: beside the edge of a shadow.
 FRESH = 0.8
+
+#: Samples of a surface for each at which ways through other bodies are found.
+SAMPLES_FOR_PATH = 4
 
 #: Share of a cell that is inside from which all of it is.
 _WHOLE = 1.0 - 1e-9
@@ -156,11 +163,30 @@ class LitBody:
     casters: Casters
     sky: Sky
     _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
+    _sky_paths: dict[tuple[Mesh, bytes], sparse.csr_array] = field(default_factory=dict)
 
     @cached_property
     def densities(self) -> Densities:
         """Densities of the body."""
         return densities(self.casters.body, self.grid)
+
+    def sky_paths(self, others: Sequence[Object]) -> list[sparse.csr_array]:
+        """Metres in each of other bodies on the way to the sky, see `sky_paths`; those of the last ones are kept."""
+        places = [(body.mesh, body.matrix.tobytes()) for body in others]
+        found = {
+            place: self._sky_paths[place] if place in self._sky_paths else self._paths(body)
+            for place, body in zip(places, others, strict=True)
+        }
+        self._sky_paths.clear()
+        self._sky_paths.update(found)
+        return [found[place] for place in places]
+
+    def _paths(self, body: Object) -> sparse.csr_array:
+        """Metres in another body: those of a part of the samples, of which each stands for what is nearest to it."""
+        points, part = self.grid.points, slice(None, None, SAMPLES_FOR_PATH)
+        start = points[part] + BEFORE * self.grid.cells.step * self.grid.face_normals[part]
+        metres = sky_paths(body, start, self.sky.directions, self.sky.cosine[part] > 0.0)
+        return sparse.csr_array(metres[cKDTree(points[part]).query(points)[1]])
 
     def entrance(self, ior: float, roughness: float) -> Entrance:
         """Light that enters through this interface; that of the last one is kept."""
@@ -209,19 +235,40 @@ class DiffusingBody:
         """
         dimming = dimming_bodies(scene, body)
         grid = self._lit.grid
-        entering = self._entrance.seen @ environment_parts(scene.environment, self._lit.sky.directions)
-        inside = np.zeros((grid.count, 3))
+        entering = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
+        inside, beams = np.zeros((grid.count, 3)), []
         for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
-                entering = entering + from_light(
-                    grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops
+                beams.append(
+                    from_light(grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops)
                 )
         if photons is not None:
             entering = entering + flux_of(photons, grid)
-        found = self._system.solved(entering, self._entrance.itself, inside)
+        found = self._system.solved(entering, self._entrance.itself, inside, beams)
         return _field(self._lit, self._medium, self._roughness, found)
+
+    def _from_sky(self, parts: Array, others: list[Object]) -> Array:
+        """(s, 3): flux that enters of radiance over solid angles (k, 3), less what other bodies on its way absorb.
+
+        What they scatter goes on elsewhere, and as much comes from there: in uniform light it is not missing.
+        """
+        seen = self._entrance.seen
+        entering = np.asarray(seen @ parts, np.float64)
+        absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
+        if not absorbing or not parts.any():
+            return entering
+        paths = self._lit.sky_paths(absorbing)
+        for channel in range(3):
+            depth = sparse.csr_array(seen.shape)
+            for body, metres in zip(absorbing, paths, strict=True):
+                assert body.medium is not None
+                depth = depth + metres * float(np.asarray(body.medium.absorption)[channel])
+            lost = depth.tocoo()
+            values = seen[lost.row, lost.col] * optics.opacity(lost.data) * parts[lost.col, channel]
+            entering[:, channel] -= np.bincount(lost.row, values, len(entering))
+        return entering
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:

@@ -113,10 +113,6 @@ def emergent_fluxes(ior: float, mean_cosine: float) -> tuple[float, float, float
 def half_space_reflectance(albedo: float, ior: float = 1.0, anisotropy: float = 0.0) -> float:
     """Share of the diffuse light entering a half-space that leaves again after it has been scattered; exact.
 
-    The bare half-space reflects as Chandrasekhar's H functions say where it scatters to all sides alike, else as its
-    modes do (`bare_half_space`); its interface mirrors part of that back, and the half-space reflects it again: one
-    linear system on a quadrature.
-
     Parameters
     ----------
     albedo : float
@@ -126,6 +122,34 @@ def half_space_reflectance(albedo: float, ior: float = 1.0, anisotropy: float = 
     anisotropy : float
         g of Henyey and Greenstein, -1 < g < 1.
     """
+    cosine, flux, shares = _half_space(albedo, ior, anisotropy)
+    # Uniform radiance from outside stays uniform inside the cone that it refracts to, but for Fresnel's share.
+    down = flux * (1.0 - _inside_reflectance(cosine, ior))
+    return float((down * shares).sum() / down.sum())
+
+
+def half_space_reflectances(cosine: npt.ArrayLike, albedo: float, ior: float = 1.0, anisotropy: float = 0.0) -> Array:
+    """Share of the light entering a half-space in one direction that leaves again after it has been scattered.
+
+    Parameters
+    ----------
+    cosine : array_like (...)
+        Of the direction with the normal, inside, 0 to 1.
+    albedo, ior, anisotropy : float
+        See `half_space_reflectance`.
+    """
+    at, _, shares = _half_space(albedo, ior, anisotropy)
+    return np.asarray(np.interp(np.asarray(cosine, np.float64), at, shares))
+
+
+@lru_cache(maxsize=1024)
+def _half_space(albedo: float, ior: float, anisotropy: float) -> tuple[Array, Array, Array]:
+    """Cosines inside, flux of uniform radiance around each, and the share of light that enters there and leaves again.
+
+    The bare half-space reflects as Chandrasekhar's H functions say where it scatters to all sides alike, else as its
+    modes do (`bare_half_space`); its interface mirrors part of that back, and the half-space reflects it again: one
+    linear system on a quadrature.
+    """
     if anisotropy == 0.0:
         cosine, weight = _nodes(ior)
         h = _chandrasekhar_h(albedo, cosine, weight)
@@ -133,12 +157,10 @@ def half_space_reflectance(albedo: float, ior: float = 1.0, anisotropy: float = 
     else:
         cosine, weight = _nodes(ior, MODE_NODES)
         bare = bare_half_space(albedo, anisotropy, cosine, weight, 2 * MODE_NODES)
-    mirrored = _inside_reflectance(cosine, ior)
-    # Uniform radiance from outside stays uniform inside the cone that it refracts to, but for Fresnel's share.
-    down = 1.0 - mirrored
-    up = np.linalg.solve(np.eye(len(cosine)) - bare * mirrored, bare @ down)
-    flux = cosine * weight
-    return float((flux * (1.0 - mirrored) * up).sum() / (flux * down).sum())
+    mirrored, flux = _inside_reflectance(cosine, ior), cosine * weight
+    # The transposed system: what leaves for each radiance that goes up for the first time.
+    leaving = np.linalg.solve((np.eye(len(cosine)) - bare * mirrored).T, flux * (1.0 - mirrored))
+    return cosine, flux, (leaving @ bare) / flux
 
 
 def _chandrasekhar_h(albedo: float, cosine: Array, weight: Array) -> Array:

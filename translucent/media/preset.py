@@ -134,10 +134,11 @@ class Preset:
         """(3,): share of white light from all sides that a thick slab scatters back through a polished surface.
 
         What the medium looks like where it is thick, without the mirror image on the surface: the share that enters,
-        times `half_space_reflectance`. Exact where scattering is isotropic; else by the reduced coefficients.
+        times `half_space_reflectance`: exact, with each channel's own anisotropy.
         """
         ior = self.medium.ior
-        given_back = [half_space_reflectance(min(v, 1.0), ior) for v in self.reduced_albedo.tolist()]
+        channels = zip(self.albedo.tolist(), self.channel_anisotropy, strict=True)
+        given_back = [half_space_reflectance(min(albedo, 1.0), ior, float(g)) for albedo, g in channels]
         return diffuse_interface(ior).entering * np.array(given_back)
 
     @property
@@ -145,7 +146,8 @@ class Preset:
         """(2, 3, 3): what slabs of 1, 5 and 20 mm on a white and a black card (`CARDS`) send back of white light.
 
         From all sides to all sides, polished, without the mirror image, the card below in optical contact: as paint on
-        a contrast chart. Exact where scattering is isotropic; else by the reduced coefficients.
+        a contrast chart. Exact where scattering is isotropic; else by the reduced coefficients; of thick
+        slabs that is right to 0.04 (`diffuse_reflectance` is exact).
         """
         reduced = self.absorption + self.reduced_scattering
         return _on_cards(*(tuple(v.tolist()) for v in (self.reduced_albedo, reduced)), self.medium.ior)

@@ -129,8 +129,8 @@ def _given_back_effects(scene: Scene) -> list[Note]:
         notes.append(Note(NoteKind.SPREAD_INSIDE, text))
     if bodies := [body for body in scene.bodies if isinstance(body.medium, DiffusedMedium)]:
         text = (
-            f"{object_names(bodies)}: light of the environment that crosses other bodies on its way to them is not "
-            "dimmed there, and what is smaller than a cell has no light of its own"
+            f"{object_names(bodies)}: what other bodies scatter of the environment's light reaches them, and "
+            "what is smaller than a cell has no light of its own"
         )
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes

@@ -74,7 +74,8 @@ class Shot:
     @property
     def diffuse_color(self) -> Array:
         """(3,): of diffuse light that enters a half-space of the medium, the share that it gives back; exact."""
-        return np.array([half_space_reflectance(float(one), self.medium.ior) for one in self.reduced[1]])
+        albedo = np.asarray(self.medium.scattering) / self.medium.extinction
+        return np.array([half_space_reflectance(float(w), self.medium.ior, self.medium.anisotropy) for w in albedo])
 
     @property
     def entering(self) -> float:

@@ -1,0 +1,314 @@
+"""First events of light that enters a body: where it is scattered for the first time, and what that makes at once.
+
+Light of the environment, and of the body itself, goes on below the surface as uniform light from outside does. Light
+of lamps and suns goes one way below each sample: refracted, so that it is scattered deeper where it enters straight,
+and farther along the surface where it enters at a slant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from scipy import sparse
+
+from translucent.arrays import Array, Integers
+from translucent.diffusion.densities import Densities
+from translucent.diffusion.grid import BodyGrid, box_points, other_plane_points
+from translucent.formulas import optics
+from translucent.formulas.diffuse_interface import (
+    diffuse_interface,
+    diffusion_coefficient,
+    half_space_reflectance,
+    half_space_reflectances,
+)
+
+#: First events above the depth at which the fluence is read, and below it, for each sample.
+EVENTS, DEEP_EVENTS = 4, 2
+
+#: Share of the light below which no first events are looked for.
+_NOTHING = 1e-3
+
+#: Over 1 / STRAIGHT reduced mean free paths light that leaves has been turned little by little, and not straight back.
+STRAIGHT = 1.0
+
+#: Reduced albedo below which what half-spaces give back is in proportion to it.
+_LEAST_ALBEDO = 1e-6
+
+#: Least cosine of a way with the normal of the surface: where smooth normals turn it more, as if it was so much.
+_LEAST_COSINE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """Light of a lamp or a sun that enters a body at samples of its surface, in one direction at each.
+
+    Attributes
+    ----------
+    samples : (k,) int
+        Numbers of the samples that it reaches.
+    directions : (k, 3) float64
+        Inside, unit vectors.
+    entering, mirrored : (k, 3) float64
+        Flux that enters, and that the surface mirrors, in W/m^2.
+    """
+
+    samples: Integers
+    directions: Array
+    entering: Array
+    mirrored: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """One-dimensional solutions between the surface (depth 0) and the depth at which the fluence is read, per sample.
+
+    u is 1 at the surface, where it satisfies the condition; the fluence below is that at the depth over u there, and
+    the flux to the surface D u' / u times it. All are given times exp(-k d), d the depth of reading, so that nothing
+    overflows however dense the medium. Depths are integrals of the density.
+    """
+
+    depth: Array
+    attenuation: float
+    condition: float
+
+    def u(self, depth: Array) -> Array:
+        """Solution without a source: cosh(k z) + c / D sinh(k z) / k."""
+        return np.asarray(self._cosh(depth) + self.condition * self.rise(depth))
+
+    def slope(self) -> Array:
+        """u' at the depth of reading."""
+        return np.asarray(self.attenuation**2 * self.rise(self.depth) + self.condition * self._cosh(self.depth))
+
+    def rise(self, depth: Array) -> Array:
+        """sinh(k z) / k, z where nothing is absorbed."""
+        both_ways = optics.mean_transmittance(2.0 * self.attenuation * depth)
+        return np.asarray(self._from(depth) * depth * both_ways)
+
+    def bend(self) -> Array:
+        """(cosh(k d) - 1) / k^2 at the depth of reading, d^2 / 2 where nothing is absorbed."""
+        return np.asarray(0.5 * (self.depth * optics.mean_transmittance(self.attenuation * self.depth)) ** 2)
+
+    def _cosh(self, depth: Array) -> Array:
+        return 0.5 * self._from(depth) * (1.0 + optics.transmittance(2.0 * self.attenuation * depth))
+
+    def _from(self, depth: Array) -> Array:
+        """exp(k (z - d))."""
+        return np.asarray(optics.transmittance(self.attenuation * np.maximum(self.depth - depth, 0.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """Ways of light below samples of a body.
+
+    Attributes
+    ----------
+    samples : (k,) int
+    directions : (k, 3) float64
+        Inside.
+    cosine : (k,) float64, or float
+        With the normal, which says how deep an event is.
+    diffuse : bool
+        Whether the light is uniform outside; else each way is the one.
+    length : callable
+        From integrals of the density (k,), in m, along the ways, to metres (k,).
+    """
+
+    samples: Integers
+    directions: Array
+    cosine: Array | float
+    diffuse: bool
+    length: Callable[[Array], Array]
+
+
+def diffuse_ways(grid: BodyGrid, dense: Densities, ior: float) -> Ways:
+    """One way below each sample, as uniform light from outside has them."""
+    directions, samples = first_ways(grid, ior), np.arange(len(grid.points))
+    return Ways(samples, directions, diffuse_interface(ior).mean_cosine, True, dense.lengths(samples, directions))
+
+
+def ways_of(beam: Beam, grid: BodyGrid, dense: Densities) -> Ways:
+    """Ways of a beam."""
+    cosine = -(beam.directions * grid.face_normals[beam.samples]).sum(axis=1)
+    lengths = dense.lengths(beam.samples, beam.directions)
+    return Ways(beam.samples, beam.directions, np.clip(cosine, _LEAST_COSINE, 1.0), False, lengths)
+
+
+@dataclass(frozen=True, eq=False)
+class Events:
+    """First events for a unit of flux that enters at each of some samples.
+
+    Attributes
+    ----------
+    near : (k,) float64
+        Fluence at the surface that events above the depth of reading make, less what diffusion gives back too much.
+    above : (k,) float64
+        Share that is scattered above that depth, as the cells receive it.
+    below : list of ((k,) int, (k,) float64)
+        Cells in which light is scattered below that depth, and shares.
+    """
+
+    near: Array
+    above: Array
+    below: list[tuple[Integers, Array]]
+
+    def matrix(self, grid: BodyGrid, read: sparse.csr_array) -> sparse.csr_array:
+        """(cells, s): power in the cells for the flux at all samples."""
+        count = len(self.near)
+        deep = sparse.csr_array((count, grid.count))
+        for cell, share in self.below:
+            deep = deep + sparse.csr_array((share, (np.arange(count), cell)), deep.shape)
+        return sparse.csr_array((grid.area * (deep + sparse.diags_array(self.above) @ read)).T)
+
+    def power_below(self, flux: Array, cells: int) -> Array:
+        """(cells,): power in the cells of events below the depth of reading, for a flux (k,)."""
+        total = np.zeros(cells)
+        for cell, share in self.below:
+            total += np.bincount(cell, share * flux, cells)
+        return total
+
+
+class FirstEvents:
+    """First events in one channel of a body.
+
+    Parameters
+    ----------
+    grid : BodyGrid
+    layer : Layer
+        Below each sample.
+    ior, anisotropy : float
+    absorption, scattering : float
+        The reduced one, in 1/m.
+    chord : float
+        Mean chord of the body in m, weighted by the density.
+    """
+
+    def __init__(
+        self,
+        grid: BodyGrid,
+        layer: Layer,
+        ior: float,
+        absorption: float,
+        scattering: float,
+        anisotropy: float,
+        chord: float,
+    ) -> None:
+        self._grid, self._layer, self._ior, self._anisotropy = grid, layer, ior, anisotropy
+        self._extinction = absorption + scattering
+        self._albedo = scattering / self._extinction
+        self._d = float(diffusion_coefficient(absorption, scattering))
+        # In thin bodies light that is not turned back leaves on the far side.
+        self._thick = float(optics.opacity(self._extinction * chord))
+
+    def of(self, ways: Ways) -> Events:
+        """Events of light that goes these ways."""
+        grid, extinction, cosine = self._grid, self._extinction, ways.cosine
+        layer = replace(self._layer, depth=self._layer.depth[ways.samples])
+        relative = 1.0 / layer.u(layer.depth)
+        # What of the entering light the exact half-space gives back less than diffusion would.
+        asked = None if ways.diffuse else np.asarray(cosine)
+        straight = straight_back(self._albedo, self._ior, self._anisotropy, asked) * self._thick
+        excess = half_space_excess(self._albedo, self._ior, asked) / diffuse_interface(self._ior).conductance
+
+        def counted(path: Array) -> Array:
+            """Share of the first events after an optical path from the surface that count as if they were isotropic."""
+            return np.asarray(1.0 - straight * optics.transmittance(STRAIGHT * path))
+
+        # Shares of the light that is scattered above the depth of reading, and below it.
+        slant = layer.depth / cosine
+        below, above = optics.transmittance(extinction * slant), optics.opacity(extinction * slant)
+        near, into_cells = np.zeros(len(slant)), np.zeros(len(slant))
+        for quantile in (np.arange(EVENTS) + 0.5) / EVENTS:
+            path = -np.log1p(-quantile * above)
+            depth = path * cosine / extinction
+            share = self._albedo / EVENTS * above * relative * counted(path)
+            into_cells += share * layer.u(depth)
+            near += share * layer.rise(layer.depth - depth) / self._d
+        deep = []
+        # Interpolation by chance: each place stands for the cell around it.
+        spread, quantiles = _places(len(grid.points))
+        start = grid.points[ways.samples] + grid.cells.step * spread[ways.samples]
+        for quantile in quantiles[:, ways.samples] if below.max(initial=0.0) > _NOTHING else ():
+            length = slant - np.log1p(-quantile) / extinction
+            # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
+            at = start + ways.length(length)[:, None] * ways.directions
+            cell, inside = grid.cell_at(at)
+            deep.append((cell, self._albedo / DEEP_EVENTS * below * inside * counted(extinction * length)))
+        return Events(near - excess, into_cells, deep)
+
+
+@lru_cache(maxsize=16)
+def _places(samples: int) -> tuple[Array, Array]:
+    """Shifts (samples, 3) in cells, and quantiles, of the events of each sample."""
+    return box_points(samples) - 0.5, tails(samples)
+
+
+def tails(samples: int) -> Array:
+    """(DEEP_EVENTS, samples): quantiles of the paths below the depth of reading, other ones for each sample."""
+    shift = (0.5 + 0.6180339887498949 * np.arange(samples)) % 1.0
+    return np.asarray((np.arange(DEEP_EVENTS)[:, None] + shift) / DEEP_EVENTS)
+
+
+def first_ways(grid: BodyGrid, ior: float) -> Array:
+    """(s, 3): a direction inside for each sample, as uniform light from outside has them."""
+    # Not the numbers by which the samples lie on large triangles: there, light would come from one side alone.
+    first, second = other_plane_points(len(grid.points)).T
+    cosine = optics.refracted_cosine(np.sqrt(first), ior)
+    normal = grid.face_normals
+    aside = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    across = np.cross(normal, aside)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    along = np.cross(normal, across)
+    angle, level = 2.0 * np.pi * second, np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+    sideways = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * along
+    return np.asarray(level[:, None] * sideways - cosine[:, None] * normal)
+
+
+def half_space_excess(albedo: float, ior: float, cosine: Array | None = None) -> Array | float:
+    """Share of the light entering a half-space that diffusion gives back beyond the exact one.
+
+    Of light that is uniform outside, or goes on inside at cosines (k,) with the normal.
+    """
+    return diffused_share(albedo, ior, cosine) - _exact(round(albedo, 6), ior, 0.0, cosine)
+
+
+def straight_back(albedo: float, ior: float, anisotropy: float, cosine: Array | None = None) -> Array | float:
+    """Share of the first events at the surface that do not count, as media that scatter ahead turn less light back.
+
+    After an optical path t it is exp(-STRAIGHT t) times as much: so much in all that a half-space gives back what the
+    exact one does.
+
+    Parameters
+    ----------
+    albedo : float
+        The reduced one, which both have.
+    ior, anisotropy : float
+    cosine : (k,), optional
+        Of the way of the light inside, with the normal; default: of light that is uniform outside.
+    """
+    if anisotropy == 0.0:
+        return 0.0
+    reduced = max(round(albedo, 6), _LEAST_ALBEDO)
+    own = reduced / (reduced + (1.0 - reduced) * (1.0 - anisotropy))
+    less = _exact(reduced, ior, 0.0, cosine) - _exact(own, ior, anisotropy, cosine)
+    return less / diffused_share(reduced, ior, cosine, STRAIGHT)
+
+
+def _exact(albedo: float, ior: float, anisotropy: float, cosine: Array | None) -> Array | float:
+    if cosine is None:
+        return half_space_reflectance(albedo, ior, anisotropy)
+    return half_space_reflectances(cosine, albedo, ior, anisotropy)
+
+
+def diffused_share(albedo: float, ior: float, cosine: Array | None = None, dimmed: float = 0.0) -> Array | float:
+    """Share of the light entering a half-space that diffusion gives back.
+
+    `dimmed`: of first events after an optical path t from the surface those count that exp(-dimmed t) leaves.
+    """
+    interface = diffuse_interface(ior)
+    d, c = float(diffusion_coefficient(1.0 - albedo, albedo)), interface.conductance
+    attenuation = float(np.sqrt((1.0 - albedo) / d))
+    depth = interface.mean_cosine if cosine is None else cosine
+    return albedo * c / ((d * attenuation + c) * (1.0 + attenuation * depth + dimmed))
