@@ -94,7 +94,7 @@ SCENES = (
         "fog", "Thin fog", "a bright cone behind the ball, and its shadow", fog, 3072, (slice(14, 23), slice(5, 19))
     ),
     MediumScene("wax", "Block of wax", "what falls on it spreads inside", wax, 192, _BELOW),
-    MediumScene("milk", "Milk", "the same, in a medium that scatters ahead and absorbs blue", milk, 64, _BELOW),
+    MediumScene("milk", "Milk", "the same, in a medium that scatters ahead and absorbs blue", milk, 256, _BELOW),
 )
 
 
