@@ -14,7 +14,7 @@ from tests.preview.waiting import wait
 from translucent.assets import shader_path
 from translucent.preview import preferences
 from translucent.preview.browser import Browser, with_recent
-from translucent.preview.document import Display, Look, Material, Orbit
+from translucent.preview.document import FINISH, Display, Look, Material, Orbit
 from translucent.preview.environments import EnvironmentFolder, title
 from translucent.preview.orbiting import camera_of
 from translucent.preview.picturing import model_key, model_picture
@@ -182,7 +182,7 @@ def test_every_knob_is_explained() -> None:
     sections = {"material": Material, "look": Look, "display": Display, "orbit": Orbit}
     fields = {f"{section}.{one.name}" for section, kind in sections.items() for one in dataclasses.fields(kind)}
     assert set(TIPS) == (fields - silent) | {"model.unit"}
-    for name in ("ior", "roughness", "transmission", "dispersion", "color", "distance", "thickness"):
+    for name in ("ior", "color", "distance", "thickness", *FINISH):
         assert "glTF" in TIPS[f"material.{name}"]
         if name != "color":
             assert "Typical" in TIPS[f"material.{name}"]
