@@ -13,7 +13,7 @@ from types import FrameType
 INTERVAL = 0.004
 
 #: Functions of the toolkit that are told, the innermost last.
-TOLD = 3
+TOLD = 4
 
 
 class Sampler:
@@ -30,7 +30,7 @@ class Sampler:
 
     def told(self) -> str:
         """Functions that the thread was most often in since then."""
-        return next((where for where, _ in self._seen.most_common(1)), "")
+        return ", ".join(f"{count} x {where}" for where, count in self._seen.most_common(3))
 
     def _run(self) -> None:
         while True:

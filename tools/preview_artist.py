@@ -77,9 +77,9 @@ def drag_color(a: Artist) -> Waiting:
 
 def distance(a: Artist) -> Waiting:
     yield from a.seen("##distance")
-    yield from a.hand.key("ctrl", True)
+    yield from a.hand.hold("ctrl", down=True)
     yield from a.click("##distance")
-    yield from a.hand.key("ctrl", False)
+    yield from a.hand.hold("ctrl", down=False)
     yield from a.enter("7.5")
     yield from a.until(lambda: math.isclose(a.document.material.distance, 0.0075), "the distance is 7.5 mm")
 
@@ -152,9 +152,9 @@ def undo_ten(a: Artist) -> Waiting:
     yield from a.panel("Material")
     first = a.document.material.roughness
     for tenths in range(1, 11):
-        yield from a.hand.key("ctrl", True)
+        yield from a.hand.hold("ctrl", down=True)
         yield from a.click("##material.roughness")
-        yield from a.hand.key("ctrl", False)
+        yield from a.hand.hold("ctrl", down=False)
         yield from a.enter(f"{tenths / 20:g}")
         yield from a.until(lambda x=tenths / 20: math.isclose(a.document.material.roughness, x, rel_tol=1e-6), "typed")
     before = len(a.desk.work.history.past)
@@ -213,9 +213,9 @@ def save_glb(a: Artist) -> Waiting:
 def turn_environment(a: Artist) -> Waiting:
     before = a.document.look.rotation
     yield from a.hand.move(a.in_view(0.4, 0.6))
-    yield from a.hand.key("e", True)
+    yield from a.hand.hold("e", down=True)
     yield from a.drag(a.in_view(0.4, 0.6), a.in_view(0.6, 0.6))
-    yield from a.hand.key("e", False)
+    yield from a.hand.hold("e", down=False)
     yield from a.until(lambda: a.document.look.rotation != before, "it turns")
 
 

@@ -141,19 +141,34 @@ class Hand:
             imgui.get_io().add_mouse_wheel_event(0.0, steps)
             yield from frames()
 
-    def key(self, name: str, down: bool | None = None) -> Waiting:
-        """Press and release a key, with modifiers before a plus sign; or one of both."""
+    def key(self, name: str) -> Waiting:
+        """Press and release a key, while those before plus signs are held."""
+        *modifiers, last = name.split("+")
+        for modifier in modifiers:
+            yield from self.hold(modifier, down=True)
         if self.real:
-            verb = {None: "key", True: "keydown", False: "keyup"}[down]
-            between = ("--delay", 60)  # each in a frame of its own, as by a hand
-            yield from self._x(verb, *between, "+".join(X_KEYS.get(word, word) for word in name.split("+")))
-            return
-        modifiers = {"ctrl": imgui.Key.mod_ctrl, "shift": imgui.Key.mod_shift}
-        keys = [modifiers.get(word) or getattr(imgui.Key, word) for word in name.split("+")]
-        for pressed in (True, False) if down is None else (down,):
-            for one in keys:
-                imgui.get_io().add_key_event(one, pressed)
+            yield from self._x("key", X_KEYS.get(last, last))
+        else:
+            for pressed in (True, False):
+                imgui.get_io().add_key_event(getattr(imgui.Key, last), pressed)
         yield from frames()
+        for modifier in modifiers:
+            yield from self.hold(modifier, down=False)
+
+    def hold(self, name: str, *, down: bool) -> Waiting:
+        """Press or release a key, and wait until the window knows: of keys that change in one frame, it sees the last
+        state alone.
+        """
+        key = {"ctrl": imgui.Key.mod_ctrl, "shift": imgui.Key.mod_shift}.get(name) or getattr(imgui.Key, name)
+        if self.real:
+            yield from self._x("keydown" if down else "keyup", name)
+        else:
+            imgui.get_io().add_key_event(key, down)
+            yield from frames()
+        for _ in range(RESTING):
+            if imgui.is_key_down(key) == down:
+                break
+            yield
 
     def type(self, text: str) -> Waiting:
         if self.real:

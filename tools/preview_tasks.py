@@ -2,9 +2,10 @@
 
 On a display of its own (Xvfb), in two windows one after the other. Where xdotool is installed, the pointer and the
 keys are those of the system; else imgui is told of them. Each task (`preview_artist`) checks its result, and waits for
-the window's own state (`preview_hand`). For each are told the seconds that it took, the longest frame, how much of that
-the renderer took, the time of all cores in it, which tells more where others use them, and what the window's thread was
-at. ``--size 2560x1600 --scale 2`` for a large display, ``--keep FOLDER`` for a picture of the window after each task.
+the window's own state (`preview_hand`). For each are told the seconds that it took, the longest frame, and the one that
+took most time of all cores, which tells more where others use them: that of the window's thread, what of it was
+drawing, and what the thread was at. ``--size 2560x1600 --scale 2`` for a large display, ``--keep FOLDER`` for a picture
+of the window after each task.
 """
 
 from __future__ import annotations
@@ -37,12 +38,17 @@ from translucent.preview.script import PAUSE, Script
 
 @dataclass(frozen=True, order=True)
 class Frame:
-    """Frame of the window: seconds, those of drawing, those of all cores, and what its thread was at."""
+    """Frame of the window: seconds of all cores, by the clock, of its thread and of drawing, and what that was at."""
 
-    seconds: float = 0.0
-    drawing: float = 0.0
     cores: float = 0.0
+    seconds: float = 0.0
+    thread: float = 0.0
+    drawing: float = 0.0
     at: str = ""
+
+    def __str__(self) -> str:
+        parts = f"{1e3 * self.thread:4.0f} of its thread, {1e3 * self.drawing:4.0f} of drawing"
+        return f"{1e3 * self.cores:4.0f} ms of all cores, {parts}: {self.at}"
 
 
 @dataclass
@@ -57,25 +63,25 @@ class Tasks(Script):
     _running: Waiting | None = None
     _name: str = ""
     _began: float = 0.0
-    _last: float = 0.0
-    _last_spent: float = 0.0
-    _longest: Frame = field(default_factory=lambda: Frame())
+    _last: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    _longest: float = 0.0
+    _busiest: Frame = field(default_factory=Frame)
     _sampler: Sampler = field(default_factory=Sampler)
     _artist: Artist | None = None
     _places: Places = field(default_factory=Places)
 
     def step(self, desk: Desk) -> bool:
         """Continue the task; returns whether all are done."""
-        now = time.perf_counter()
-        if self._running is not None and self._last:
-            spent = time.process_time() - self._last_spent
-            if now - self._last > self._longest.seconds:
-                self._longest = Frame(now - self._last, desk.stage.drawing, spent, self._sampler.told())
+        if self._running is not None and self._last[0]:
+            seconds, cores, thread = (now - before for now, before in zip(clocks(), self._last, strict=True))
+            self._longest = max(self._longest, seconds)
+            if cores > self._busiest.cores:
+                self._busiest = Frame(cores, seconds, thread, desk.stage.drawing, self._sampler.told())
         ended = self._continue(desk)
         if desk.drawn:
             time.sleep(PAUSE)  # other processes need the time more
         # What the tool does is no part of a frame.
-        self._last, self._last_spent = time.perf_counter(), time.process_time()
+        self._last = clocks()
         self._sampler.begin()
         return ended
 
@@ -90,7 +96,8 @@ class Tasks(Script):
             if not self.todo:
                 return True
             self._name, task = self.todo.pop(0)
-            self._running, self._began, self._longest = task(self._artist), time.perf_counter(), Frame()
+            self._running, self._began = task(self._artist), time.perf_counter()
+            self._longest, self._busiest = 0.0, Frame()
         problem = ""
         try:
             next(self._running)
@@ -106,13 +113,17 @@ class Tasks(Script):
         return False
 
     def _tell(self, problem: str) -> None:
-        spent, longest = time.perf_counter() - self._began, self._longest
-        parts = f"{1e3 * longest.drawing:5.0f} of drawing, {1e3 * longest.cores:5.0f} ms of all cores: {longest.at}"
-        text = f"longest frame {1e3 * longest.seconds:5.0f} ms, {parts}"
+        spent = time.perf_counter() - self._began
+        text = f"longest frame {1e3 * self._longest:5.0f} ms, busiest {self._busiest}"
         print(f"{self._name:22} {spent:6.1f} s, {text}{'; FAILED: ' if problem else ''}{problem}", flush=True)
         if self.keep is not None:
             picture = ImageGrab.grab(xdisplay=os.environ["DISPLAY"])
             picture.save(self.keep / f"{len(list(self.keep.glob('*.png'))):02d}_{self._name.replace(' ', '_')}.png")
+
+
+def clocks() -> tuple[float, float, float]:
+    """Seconds by the clock, of all cores in this process, and of this thread."""
+    return time.perf_counter(), time.process_time(), time.thread_time()
 
 
 def make_files(folder: Path) -> None:
@@ -170,7 +181,7 @@ def main() -> int:
         if options.keep:
             Path(options.keep).mkdir(parents=True, exist_ok=True)
         own = {key: str(folder / key.lower()) for key in ("XDG_CONFIG_HOME", "XDG_CACHE_HOME")}
-        own |= {"MESA_SHADER_CACHE_DIR": str(Path.home() / ".cache" / "mesa_shader_cache")}
+        own |= {"MESA_SHADER_CACHE_DIR": str(folder / "shaders")}  # the first use of everything
         screen = f"-screen 0 {options.size}x24"
         command = ["xvfb-run", "-a", "-s", screen, sys.executable, __file__, *sys.argv[1:], "--folder", str(folder)]
         failed = 0
