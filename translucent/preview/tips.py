@@ -108,7 +108,8 @@ TIPS = {
     "display.split": "Position of the split, 0 to 1 from the left. Or drag the line.",
     "display.inset": (
         "The float64 reference as a small picture in the corner, while the view is still. It has straight "
-        "rays, plain media and the holes of leaves, and shows no other textures."
+        "rays, paint and opaque surfaces with their textures, and the holes of leaves; nothing mirrors there, "
+        "and what tints clear glass is left out."
     ),
     "display.antialias": "More samples of a pixel while the view is still.",
     "display.converge": (
