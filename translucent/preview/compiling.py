@@ -177,7 +177,7 @@ def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], de
         try:
             viewport.resize(FRAME)
             for number, plan in enumerate(plans):
-                report(number / len(plans), str(plan.method))
+                report(number / len(plans), type(plan.method).__name__)
                 engine.draw(scene, picture, plan, 0.0, "none")
                 viewport.restart()
                 for _ in range(2):  # into other kinds of targets: the centers of pixels, and what is added to them
