@@ -17,12 +17,14 @@ import trimesh
 import translucent as tl
 from tests.rays import Found, agreeing, embree_nearest, inside_points, random_rays, through
 from translucent.assets import mesh_path
+from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import hierarchies as module
 from translucent.gpu import packed_meshes
 from translucent.gpu.hierarchies import HierarchyCache, SceneHierarchies
 from translucent.gpu.layout import TRACED_BODY
 from translucent.gpu.packed_meshes import packed_mesh
 from translucent.gpu.ray_probe import RayProbe
+from translucent.gpu.textures import unlike_powers
 from translucent.reference.hits import camera_hits
 
 OWN = ("bear", "goblet", "knot", "bangle")
@@ -292,3 +294,14 @@ def test_numbers_of_nodes_survive_float32() -> None:
         record["first_node"] = divmod(number, 1 << 12)
         packed = TRACED_BODY.pack([record]).ravel().view(TRACED_BODY.dtype)["first_node"][0]
         assert int(packed[0]) << 12 | int(packed[1]) == number
+
+
+def test_code_compiled_for_a_small_scene_fits_a_large_one(renderer: tl.Renderer) -> None:
+    assert [unlike_powers(side) for side in (1, 2, 3, 64, 100)] == [3, 3, 3, 65, 100]
+    with renderer.gpu.context.current() as gl:
+        for mesh in (Box().tessellate(), Sphere().tessellate(32)):
+            made = SceneHierarchies(gl, [mesh], 1)
+            for texture in (made.nodes, made.triangles):
+                # Another code is compiled where a side is a power of two: the width always is, the height never.
+                assert texture.height & (texture.height - 1) != 0
+            made.release()

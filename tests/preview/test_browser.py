@@ -13,11 +13,12 @@ import pytest
 from tests.preview.waiting import wait
 from translucent.assets import shader_path
 from translucent.preview import preferences
+from translucent.preview import shelf as shelves
 from translucent.preview.browser import Browser, with_recent
-from translucent.preview.document import Display, Look, Material, Orbit
+from translucent.preview.document import FINISH, Display, Look, Material, Orbit
 from translucent.preview.environments import EnvironmentFolder, title
 from translucent.preview.orbiting import camera_of
-from translucent.preview.picturing import model_key, model_picture
+from translucent.preview.picturing import draw_panorama, model_key, model_picture, panorama_key
 from translucent.preview.tips import TIPS
 from translucent.preview.workspace import Workspace
 
@@ -182,7 +183,7 @@ def test_every_knob_is_explained() -> None:
     sections = {"material": Material, "look": Look, "display": Display, "orbit": Orbit}
     fields = {f"{section}.{one.name}" for section, kind in sections.items() for one in dataclasses.fields(kind)}
     assert set(TIPS) == (fields - silent) | {"model.unit"}
-    for name in ("ior", "roughness", "transmission", "dispersion", "color", "distance", "thickness"):
+    for name in ("ior", "color", "distance", "thickness", *FINISH):
         assert "glTF" in TIPS[f"material.{name}"]
         if name != "color":
             assert "Typical" in TIPS[f"material.{name}"]
@@ -207,3 +208,37 @@ def test_the_scale_of_errors_has_the_colors_of_the_picture() -> None:
         assert f"vec3({', '.join(f'{channel:.2f}' for channel in color)})" in text
     assert viewport.error_color(-1.0) == viewport.THINNER
     assert viewport.error_color(0.0) == (0.95, 0.95, 0.95)
+
+
+def test_of_ten_dropped_files_one_model_and_one_environment_are_taken(desk: Any, folder: Path) -> None:
+    from translucent.preview.drops import take_dropped
+
+    skies = [folder / f"sky-{i}.hdr" for i in range(4)]
+    for path in skies:
+        path.write_bytes(b"no picture")
+    opened: list[str] = []
+    desk.work.open = lambda model: opened.append(Path(model.path).name)
+    take_dropped(desk, [str(folder / name) for name in ("a.glb", "b.GLB", *(path.name for path in skies), *"cdef")])
+    assert opened == ["a.glb"]
+    assert desk.get("look.environment") == str(skies[0])
+    assert desk.environments.files() == [str(path) for path in skies]
+    (told,) = desk.work.messages
+    assert told.text.startswith("8 dropped files are left out")
+
+
+def test_of_a_folder_of_500_environments_few_are_read_in_a_frame(
+    desk: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for i in range(500):
+        (tmp_path / f"{i:03}.hdr").write_bytes(b"no picture")
+    desk.environments.take(str(tmp_path))
+    assert len(desk.environments.files()) == 500
+    monkeypatch.setattr(os, "listdir", lambda _: pytest.fail("the folder has not changed"))
+    assert desk.environments.files()[-1] == str(tmp_path / "499.hdr")
+    shelf, read = desk.work.shelf, list[Path]()
+    monkeypatch.setattr(shelves, "_read", lambda path: read.append(path))
+    for _ in range(2):
+        shelf.begin_frame(idle=False)
+        for path in desk.environments.files():
+            assert shelf.picture(panorama_key(path), draw_panorama, path) is None
+    assert 0 < len(read) <= 2 * shelves.READ_AT_ONCE

@@ -28,3 +28,25 @@ def test_the_reference_has_the_holes_of_a_leaf() -> None:
     seen, float32 = found.errors[0], 1e-6 * 0.01
     assert (seen.coverage_mismatch, seen.max < float32) == (0.0, True)
     assert (found.truth.min(axis=(1, 2)) < 250).mean() < 0.3, "half of the leaf is seen"
+
+
+def test_the_inset_shows_textures_paint_and_leaves() -> None:
+    halves = np.zeros((2, 2, 4), dtype=np.float32)  # red above; blue, and cut out on the right, below
+    halves[0, :] = (1.0, 0.0, 0.0, 1.0)
+    halves[1, :] = (0.0, 0.0, 1.0, 1.0)
+    halves[1, 1, 3] = 0.0
+    uv = [(0, 0), (1, 0), (0, 1), (1, 1)]
+    square = tl.Mesh([(*place, 0) for place in uv], [(0, 1, 2), (1, 3, 2)], uv=uv)
+    texture = Texture(halves, wrap=("clamp", "clamp"))
+    leaf = tl.Object(square, surface=tl.Surface(color_texture=texture, alpha_cutoff=0.5))
+    painted = tl.Surface(color_texture=texture, transmission=0.0)
+    beside = np.eye(4)
+    beside[0, 3] = 1.0
+    glass = tl.Object(square, tl.Medium(ior=1.5), transform=beside, surface=painted, sheet_thickness=0.01)
+    camera = tl.Camera.orthographic((1.0, 0.5, 3), (1.0, 0.5, 0), height=1.0)
+    seen = measure(lambda *_: None, tl.Scene([leaf, glass], camera), None, (16, 8)).truth
+    for first in (0, 90):
+        above, below, cut_out = (seen[y, first + x].tolist() for x, y in ((10, 10), (10, 80), (80, 80)))
+        assert above == [255, 0, 0]
+        assert below == [0, 0, 255]
+        assert cut_out == [255, 255, 255], "the hole shows what is behind"

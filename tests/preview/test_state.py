@@ -11,13 +11,18 @@ import pytest
 
 import translucent as tl
 from translucent.cli import main
+from translucent.geometry.solids import Box
+from translucent.gpu.strides import STRIDES
+from translucent.planning.plan import plan
 from translucent.preview import numbers, orbiting
 from translucent.preview.actions import Change, ChoosePreset, Open, Pan, SetOrbit, Turn, Zoom, apply
-from translucent.preview.document import RANGES, Document, Material, Orbit
+from translucent.preview.document import RANGES, Document, Material, Model, Orbit
 from translucent.preview.history import MAX_STEPS, History
-from translucent.preview.scenes import material_of, medium_of, scattering_of
+from translucent.preview.loaded import Loaded
+from translucent.preview.scenes import material_of, medium_of, scattering_of, scene_of
 from translucent.preview.script import read_script
 from translucent.preview.session import load_session, save_session
+from translucent.preview.timing import Pace
 from translucent.scene.showcase import framing, showcase
 
 ORBIT = Orbit((0.1, 0.2, 0.3), 40.0, 20.0, 2.0)
@@ -238,3 +243,29 @@ def test_a_camera_comes_back_from_its_orbit() -> None:
 def test_nothing_moves_before_there_is_a_model() -> None:
     assert apply(Document(), Turn(5.0, 5.0)) == Document()
     assert apply(Document(), SetOrbit(ORBIT)).orbit == ORBIT
+
+
+def test_a_film_and_a_coat_reach_the_scene_and_come_back_from_it() -> None:
+    loaded = Loaded(Model("box"), showcase(Box().tessellate(), stage="none"), Material())
+    document = dataclasses.replace(Document(), orbit=ORBIT)
+    values = {"iridescence": 1.0, "iridescence_thickness": 3e-7, "clearcoat": 0.5, "clearcoat_roughness": 0.2}
+    for name, value in values.items():
+        document = apply(document, Change(f"material.{name}", value))
+    scene = scene_of(document, loaded)
+    surface = scene.objects[0].surface
+    assert surface is not None
+    assert {name: getattr(surface, name) for name in values} == values
+    assert material_of(scene).finish == document.material.finish
+    assert document.material.unsaid == ["iridescence", "clearcoat"]
+    assert Material().unsaid == []
+
+
+def test_what_nobody_has_timed_yet_is_drawn_coarsely_and_traced_rays_most_of_all() -> None:
+    factors = {}
+    for name, ior in (("clear", 1.0), ("glass", 1.5)):
+        scene = showcase(Box().tessellate(), tl.Medium(5.0, ior=ior), stage="none")
+        pace, found = Pace(), plan(scene)
+        factors[name] = [pace.factor(found, STRIDES, 0.045)]
+        pace.note(found, 0.01)
+        factors[name].append(pace.factor(found, STRIDES, 0.045))
+    assert factors == {"clear": [4, 1], "glass": [8, 1]}

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.diffusion.cache import FieldCache, Fields
+from translucent.gpu.textures import unlike_powers
 from translucent.planning.caustics import Caustics
 from translucent.planning.scattering import Diffusion
 from translucent.planning.slots import MAX_SLOTS, Slot
@@ -33,7 +34,8 @@ class DiffusedLight:
         self.first_layers: dict[int, int] = {}
         volumes = {number: field.volumes for number, field in (fields.surfaces | fields.volumes).items()}
         shapes = np.array([values.shape for arrays in volumes.values() for values in arrays])
-        width, height, layers = int(shapes[:, 0].max()), int(shapes[:, 1].max()), int(shapes[:, 2].sum())
+        extent = shapes[:, 0].max(), shapes[:, 1].max(), shapes[:, 2].sum()
+        width, height, layers = (unlike_powers(int(side)) for side in extent)
         texels = np.zeros((layers, height, width, 4), np.float32)
         first = 0
         for number, arrays in volumes.items():

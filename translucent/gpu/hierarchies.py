@@ -24,6 +24,7 @@ from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
 from translucent.gpu.layout import TRACED_BODY
 from translucent.gpu.ledger import before_making
 from translucent.gpu.packed_meshes import FIRST_BITS, Words, frame, has_packed, packed_mesh, packed_nodes
+from translucent.gpu.textures import unlike_powers
 from translucent.media.medium import VACUUM, Medium
 from translucent.scene.falloff import Falloff
 from translucent.scene.scene import Object, Scene
@@ -304,6 +305,7 @@ def _rows(pieces: Sequence[_Piece], begin: int, end: int) -> Words:
 def _texture(gl: moderngl.Context, count: int, pieces: Sequence[_Piece]) -> moderngl.Texture:
     """Texture with so many texels, in whole rows, which are made some at a time."""
     rows, step = -(-count // _WIDTH), _MOST_WRITTEN
+    rows = unlike_powers(rows) if rows < step else rows
     try:
         content = _rows(pieces, 0, rows * _WIDTH) if rows <= step else None
         texture = gl.texture((_WIDTH, rows), 4, content, dtype="u4")

@@ -19,6 +19,17 @@ _WHITE = Texture(np.ones((1, 1, 3), dtype=np.float32))
 _STRAIGHT = Texture(np.full((1, 1, 3), (0.5, 0.5, 1.0), dtype=np.float32))
 
 
+def unlike_powers(side: int) -> int:
+    """Smallest side of a texture of data from this one on that is no power of two.
+
+    Drivers compile other code for textures whose sides are, so that what another process has compiled for a small scene
+    would be of no use to a large one.
+    """
+    while side & (side - 1) == 0:
+        side += 1
+    return side
+
+
 def texture_units(first: int) -> dict[str, int]:
     """Units of a surface's textures by the names of their samplers, as in ``shaders/shade/surface_textures.glsl``."""
     return {name: unit for unit, name in enumerate(TEXTURE_FIELDS, first)}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import sys
 import warnings
@@ -278,11 +277,11 @@ class _Window:
             self.desk.folders = read_folders()
             self.desk.environments.take(read_environments())
 
-    def _dropped(self, path: str) -> None:
-        if Path(path).suffix.lower() == ".toml":
-            self.work.open_session(path)
-        else:
-            self.work.open(dataclasses.replace(self.work.document.model, path=path))
+    def _dropped(self, paths: list[str]) -> None:
+        from translucent.preview.drops import take_dropped
+
+        if self.desk is not None:
+            self._guarded(lambda: take_dropped(self.desk, paths))()
 
     def _closed(self) -> None:
         from imgui_bundle import implot

@@ -169,21 +169,26 @@ def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:
 
 
 def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], device: str) -> Compiled:
-    """Draw a scene by plans, and return the programs that this needed."""
+    """Draw a scene by plans, as it is drawn while it moves and at rest, and return the programs that this needed."""
     engine, ledger = _engine(newest_shader(), device)
     trouble = ""
     with engine.context.current() as gl:
-        picture = gl.framebuffer([gl.texture(FRAME, 4)])
+        picture, viewport = gl.framebuffer([gl.texture(FRAME, 4)]), Viewport(engine)
         try:
+            viewport.resize(FRAME)
             for number, plan in enumerate(plans):
-                report(number / len(plans), str(plan.method))
+                report(number / len(plans), type(plan.method).__name__)
                 engine.draw(scene, picture, plan, 0.0, "none")
+                viewport.restart()
+                for _ in range(2):  # into other kinds of targets: the centers of pixels, and what is added to them
+                    viewport.step(0, scene, plan, 1, 1)
                 if plan.caustics is not None:
                     _light_by_photons(engine, scene, plan)
         except TranslucentError as error:
             trouble = str(error)
         finally:
             gl.finish()
+            viewport.release()
             picture.release()
     return Compiled(frozenset(ledger.needed), trouble)
 

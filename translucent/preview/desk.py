@@ -308,18 +308,26 @@ def row(label: str, tip: str = "") -> None:
 
 
 def slider(
-    desk: Desk, label: str, name: str, low: float, high: float, form: str = "%.3f", *, log: bool = False, tip: str = ""
+    desk: Desk,
+    label: str,
+    name: str,
+    low: float,
+    high: float,
+    form: str = "%.3f",
+    *,
+    log: bool = False,
+    unit: float = 1.0,
 ) -> None:
-    """Slider for a number of the document."""
-    row(label, tip or TIPS.get(name, ""))
+    """Slider for a number of the document, shown in a unit."""
+    row(label, TIPS.get(name, ""))
     flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if log else 0)
-    changed, value = imgui.slider_float(f"##{name}", float(desk.get(name)), low, high, form, flags)
+    changed, value = imgui.slider_float(f"##{name}", desk.get(name) / unit, low / unit, high / unit, form, flags)
     if not imgui.is_item_active():
-        tooltip(tip or TIPS.get(name, ""))
+        tooltip(TIPS.get(name, ""))
     if imgui.is_item_activated():
         desk.drag += 1
     if changed and math.isfinite(value):
-        desk.change(name, value)
+        desk.change(name, value * unit)
 
 
 def triple(desk: Desk, label: str, name: str, speed: float, form: str = "%.5g", *, tip: str = "") -> None:

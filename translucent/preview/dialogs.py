@@ -61,16 +61,15 @@ def answer(dialog: Any) -> str | None:
 _Callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.POINTER(ctypes.c_char_p))
 
 
-def accept_drops(take: Callable[[str], None]) -> object:
-    """Call `take` for each file that is dropped on the window; the returned object has to be kept alive. None: not
+def accept_drops(take: Callable[[list[str]], None]) -> object:
+    """Call `take` with the files that are dropped on the window; the returned object has to be kept alive. None: not
     possible.
     """
     if (library := _glfw()) is None:
         return None
 
     def dropped(_: int, count: int, paths: Any) -> None:
-        for i in range(count):
-            take(paths[i].decode("utf-8", "surrogateescape"))
+        take([paths[i].decode("utf-8", "surrogateescape") for i in range(count)])
 
     callback = _Callback(dropped)
     library.glfwSetDropCallback(_window(), callback)

@@ -18,7 +18,7 @@ from translucent.scene.environment import MAX_EXPOSURE
 from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.showcase import DEFAULT_COLOR
 from translucent.scene.stages import NO_STAGE, STAGES
-from translucent.scene.surface import MAX_DISPERSION
+from translucent.scene.surface import MAX_DISPERSION, MAX_FILM
 from translucent.units import METRES_PER_UNIT
 
 Triple = tuple[float, float, float]
@@ -35,6 +35,18 @@ STAGE_WORDS = (AUTO, NO_STAGE, *STAGES)
 
 #: Units of length that panels offer.
 SHOWN_UNITS = ("mm", "cm", "m", "in")
+
+#: Fields of a material that its surface has, too.
+FINISH = (
+    "roughness",
+    "transmission",
+    "dispersion",
+    "iridescence",
+    "iridescence_ior",
+    "iridescence_thickness",
+    "clearcoat",
+    "clearcoat_roughness",
+)
 
 #: Largest elevation of a camera: closer to the poles, "up" would lose its meaning.
 MAX_PITCH = 89.9
@@ -69,6 +81,9 @@ class Material:
     anisotropy : float
         Henyey-Greenstein g.
     ior, roughness, transmission, dispersion : float
+    iridescence, iridescence_ior, iridescence_thickness : float
+        Of a thin film on the surface; its thickness in metres.
+    clearcoat, clearcoat_roughness : float
     thickness : float
         thicknessFactor in metres, written to files and taken by thin layers.
     """
@@ -85,7 +100,23 @@ class Material:
     roughness: float = 0.0
     transmission: float = 1.0
     dispersion: float = 0.0
+    iridescence: float = 0.0
+    iridescence_ior: float = 1.3
+    iridescence_thickness: float = 400e-9
+    clearcoat: float = 0.0
+    clearcoat_roughness: float = 0.0
     thickness: float = 0.001
+
+    @property
+    def finish(self) -> dict[str, float]:
+        """Values of its surface, by the names of `Surface`."""
+        return {name: getattr(self, name) for name in FINISH}
+
+    @property
+    def unsaid(self) -> list[str]:
+        """Parts of the finish that neither presets nor options of the command line hold."""
+        parts = ("transmission", "dispersion", "iridescence", "clearcoat")
+        return [name for name in parts if getattr(self, name) != getattr(Material, name)]
 
 
 @dataclass(frozen=True)
@@ -269,6 +300,11 @@ RANGES: dict[str, _Range] = {
     "material.roughness": _Range(0.0, 1.0),
     "material.transmission": _Range(0.0, 1.0),
     "material.dispersion": _Range(0.0, MAX_DISPERSION),
+    "material.iridescence": _Range(0.0, 1.0),
+    "material.iridescence_ior": _Range(1.0, MAX_IOR),
+    "material.iridescence_thickness": _Range(0.0, MAX_FILM),
+    "material.clearcoat": _Range(0.0, 1.0),
+    "material.clearcoat_roughness": _Range(0.0, 1.0),
     "material.thickness": _POSITIVE,
     "look.stage": _Range(words=STAGE_WORDS),
     "look.rotation": _Range(-1e6, 1e6),

@@ -78,9 +78,7 @@ class Library:
         one = Preset(name, medium, "estimated", source, "", (), (g, g, g), False, material.roughness, OWN)
         path = save_own_preset(one, self.folder)
         self._checked = -WATCH
-        left_out = ["transmission"] if material.transmission != 1.0 else []
-        left_out += ["dispersion"] if material.dispersion else []
-        return path, left_out
+        return path, material.unsaid
 
     def _refresh(self) -> None:
         if time.monotonic() - self._checked < WATCH:

@@ -19,6 +19,7 @@ from translucent.frames.frame import Frame
 from translucent.frames.metrics import Errors, compare
 from translucent.planning.methods import Method
 from translucent.preview.numbers import Seen
+from translucent.preview.painting import shows_paint, with_paint
 from translucent.preview.tasks import Report
 from translucent.reference.hits import camera_hits
 from translucent.renderer import Renderer
@@ -55,7 +56,7 @@ class Compared:
         Why they are empty.
     seen : Seen
     truth : (h, w, 3) uint8
-        The reference as a picture, for a corner of the viewport.
+        The reference as a picture, for a corner of the viewport, with the paint of its surfaces.
     """
 
     errors: tuple[Errors, ...]
@@ -137,7 +138,8 @@ def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> 
     except InputError:
         samples = np.zeros(0)
     seen = Seen.of(samples, covered, int(np.count_nonzero(~frame.valid)))
-    return Compared(errors, doubt, seen, truth.to_srgb8())
+    shown = _reference(with_paint(plain, scene), small, method) if shows_paint(scene) else truth
+    return Compared(errors, doubt, seen, shown.to_srgb8())
 
 
 def straight(scene: Scene) -> Scene:

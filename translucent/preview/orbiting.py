@@ -14,6 +14,7 @@ from translucent.preview.document import MAX_PITCH, Orbit
 from translucent.scene.camera import MAX_COORDINATE, Camera
 from translucent.scene.scene import Object
 from translucent.scene.showcase import framing
+from translucent.scene.staging import world_vertices
 
 #: Factor by which an orthographic camera stands farther back, so that a model around the target is before it.
 _STEP_BACK = 4.0
@@ -69,7 +70,7 @@ def zoomed(orbit: Orbit, factor: float, at: tuple[float, float] = (0.0, 0.0)) ->
 def framed(orbit: Orbit | None, objects: Sequence[Object], size: tuple[int, int]) -> Orbit:
     """Orbit that frames all of the objects, from the same side as before."""
     side = orbit or Orbit(yaw=math.degrees(math.atan2(0.45, 1.0)), pitch=math.degrees(math.atan2(0.35, 1.097)))
-    corners = np.concatenate([_corners(item) for item in objects]) if orbit else None
+    corners = np.concatenate([world_vertices(item) for item in objects]) if orbit else None
     if corners is None:
         camera = framing(objects, size, fov_y=side.fov_y)  # as translucent render frames it
     else:
@@ -92,8 +93,3 @@ def orbit_of(camera: Camera, center: npt.ArrayLike) -> Orbit:
     return Orbit(
         tuple(target.tolist()), yaw, min(max(pitch, -MAX_PITCH), MAX_PITCH), distance, fov, camera.fov_y is None
     )
-
-
-def _corners(item: Object) -> Array:
-    used = item.mesh.vertices[np.unique(item.mesh.faces)]
-    return np.asarray(used @ item.matrix[:3, :3].T + item.matrix[:3, 3])

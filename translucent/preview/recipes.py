@@ -125,8 +125,7 @@ def _options_of(material: Material) -> tuple[list[str], list[str]]:
         words = ["--color", f"linear({color})", "--distance", f"{material.distance:.12g}m"]
     fields = {"ior": "the index of refraction", "scattering": "scattering", "emission": "emission"}
     left_out = [told for name, told in fields.items() if np.any(getattr(found, name) != getattr(wanted, name))]
-    left_out += ["transmission"] if material.transmission != 1.0 else []
-    left_out += ["dispersion"] if material.dispersion else []
+    left_out += material.unsaid
     return [*words, "--roughness", f"{material.roughness:g}"], left_out
 
 
@@ -185,7 +184,7 @@ def _filling_lines(shot: Shot, material: Material, number: int | None) -> list[s
     lines = [f"scene = filled(scene, tl.Medium({told}){among})"]
     if material.source == "file" and number is None:
         return lines
-    finish = ", ".join(f"{name}={getattr(material, name):.12g}" for name in ("roughness", "transmission", "dispersion"))
+    finish = ", ".join(f"{name}={value:.12g}" for name, value in material.finish.items())
     return [
         *lines,
         f"finish = dict({finish}, opacity=None)",

@@ -14,7 +14,7 @@ from translucent.media.color_distance import color_at
 from translucent.media.medium import Medium
 from translucent.planning.methods import Method, method_from_name
 from translucent.planning.scattering import SCATTERINGS, Scattering
-from translucent.preview.document import AUTO, Assigned, Document, Look, Material
+from translucent.preview.document import AUTO, FINISH, Assigned, Document, Look, Material
 from translucent.preview.loaded import Loaded
 from translucent.preview.orbiting import camera_of
 from translucent.preview.staging import environment_of, stage_name, standing
@@ -49,9 +49,7 @@ def material_of(scene: Scene, number: int | None = None) -> Material:
         emission=given[3],
         anisotropy=medium.anisotropy,
         ior=medium.ior,
-        roughness=surface.roughness,
-        transmission=surface.transmission,
-        dispersion=surface.dispersion,
+        **{name: getattr(surface, name) for name in FINISH},
         thickness=body.sheet_thickness or 0.1 * diagonal,
     )
 
@@ -131,13 +129,7 @@ def _bent(objects: Sequence[Object], ior: float) -> list[Object]:
 
 
 def _filled(item: Object, material: Material, medium: Medium) -> Object:
-    surface = dataclasses.replace(
-        item.surface or Surface(),
-        roughness=material.roughness,
-        transmission=material.transmission,
-        dispersion=material.dispersion,
-        opacity=None,
-    )
+    surface = dataclasses.replace(item.surface or Surface(), **material.finish, opacity=None)  # type: ignore[arg-type]
     return dataclasses.replace(item, medium=medium, surface=surface, sheet_thickness=None)
 
 

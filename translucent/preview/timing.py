@@ -51,6 +51,6 @@ class Pace:
         """Smallest factor of reduction at which a picture is expected to be drawn within so many seconds."""
         known = None if plan is None else self._seconds.get(kind(plan))
         if known is None:
-            slow = plan is not None and plan.has(PassName.SHADOW_MAPS)
+            slow = plan is not None and (plan.has(PassName.SHADOW_MAPS) or plan.has(PassName.TRACED))
             return factors[0] if plan is None else factors[-1] if slow else factors[-2]
         return next((factor for factor in factors if known / factor**2 <= budget), factors[-1])

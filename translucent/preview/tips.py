@@ -33,6 +33,25 @@ TIPS = {
         "dispersion (glTF), 20 / Abbe number, no unit: how far colors part when they are refracted.\n"
         "Typical: crown glass 0.3, flint glass 0.55, diamond 0.36; 0: none."
     ),
+    "material.iridescence": (
+        "iridescenceFactor (glTF), 0 to 1, no unit: share of the surface with a thin film, whose interference\n"
+        "colors what is mirrored. Typical: 0 none; soap bubbles, oil on water and coated glass 1."
+    ),
+    "material.iridescence_ior": (
+        "iridescenceIor (glTF): index of refraction of the film, no unit. Typical: soapy water 1.33, oxides 2 to 2.7."
+    ),
+    "material.iridescence_thickness": (
+        "iridescenceThicknessMaximum (glTF), in nm: thickness of the film, which sets its colors.\n"
+        "Typical: 100 to 1000; below 50 it darkens what is mirrored, above 2000 its colors fade."
+    ),
+    "material.clearcoat": (
+        "clearcoatFactor (glTF), 0 to 1, no unit: share of the surface with a clear coat of ior 1.5, which\n"
+        "mirrors light from outside. Typical: 0 none; lacquer and glaze 1."
+    ),
+    "material.clearcoat_roughness": (
+        "clearcoatRoughnessFactor (glTF), 0 to 1, no unit: how much the coat blurs what it mirrors.\n"
+        "Typical: fresh lacquer 0, satin 0.3."
+    ),
     "material.absorption": (
         "sigma_a in 1/m, for red, green and blue: light that is lost. Typical: water 0.3, wine 100."
     ),
@@ -89,7 +108,8 @@ TIPS = {
     "display.split": "Position of the split, 0 to 1 from the left. Or drag the line.",
     "display.inset": (
         "The float64 reference as a small picture in the corner, while the view is still. It has straight "
-        "rays, plain media and the holes of leaves, and shows no other textures."
+        "rays, paint and opaque surfaces with their textures, and the holes of leaves; nothing mirrors there, "
+        "and what tints clear glass is left out."
     ),
     "display.antialias": "More samples of a pixel while the view is still.",
     "display.converge": (

@@ -11,10 +11,10 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.opaque import Irradiance
+from translucent.reference.painted import painted, sampled
 from translucent.reference.rays import Rays
 from translucent.scene.scene import Object
 from translucent.scene.surface import LEAST_COVER
-from translucent.scene.texture import Texture
 
 #: Transmittance of an opaque layer: the smallest that float32 can hold.
 _LEAST_LEFT = 1e-37
@@ -26,7 +26,7 @@ def without_holes(body: Object, hits: Hits) -> Hits:
         return hits
     if body.covers and not body.surface.double_sided:
         hits = hits.where(hits.sign > 0)
-    alpha = _painted(body, hits)[:, 3]
+    alpha = painted(body, hits.face, hits.barycentric)[:, 3]
     return hits.where(alpha >= (body.surface.alpha_cutoff or LEAST_COVER))
 
 
@@ -34,7 +34,9 @@ def layer_depth(body: Object, hits: Hits) -> Array:
     """(k,): optical depth of a layer at its hits; 0 if the object is not a layer."""
     if body.surface is None or body.surface.opacity is None:
         return np.zeros(len(hits.pixel))
-    return np.asarray(-np.log(np.maximum(1.0 - body.surface.opacity * _painted(body, hits)[:, 3], _LEAST_LEFT)))
+    return np.asarray(
+        -np.log(np.maximum(1.0 - body.surface.opacity * painted(body, hits.face, hits.barycentric)[:, 3], _LEAST_LEFT))
+    )
 
 
 def layer_radiance(body: Object, hits: Hits, rays: Rays, irradiance: Irradiance) -> Array:
@@ -45,27 +47,10 @@ def layer_radiance(body: Object, hits: Hits, rays: Rays, irradiance: Irradiance)
     normals = world_normals(body, hits.face)
     normals[np.einsum("ki,ki->k", normals, directions) > 0] *= -1.0
     points = rays.origins[hits.pixel] + hits.distance[:, None] * directions
-    glow = np.asarray(body.surface.emissive) * _sampled(body, hits, body.surface.emissive_texture)[:, :3]
+    glow = (
+        np.asarray(body.surface.emissive)
+        * sampled(body, hits.face, hits.barycentric, body.surface.emissive_texture)[:, :3]
+    )
     with np.errstate(under="ignore"):
         lit = irradiance(points, normals) / np.pi
-        return np.asarray(body.base_color * _painted(body, hits)[:, :3] * lit + glow)
-
-
-def _painted(body: Object, hits: Hits) -> Array:
-    """(k, 4): color and opacity of texture and vertices."""
-    painted = _sampled(body, hits, None if body.surface is None else body.surface.color_texture)
-    return painted if body.mesh.colors is None else painted * _across(body, body.mesh.colors, hits)
-
-
-def _sampled(body: Object, hits: Hits, texture: Texture | None) -> Array:
-    """(k, 4): a texture's values; 1 without one."""
-    values = np.ones((len(hits.pixel), 4))
-    if texture is not None and body.mesh.uv is not None:
-        found = texture.sample(_across(body, body.mesh.uv, hits))
-        values[:, : found.shape[1]] = found
-    return values
-
-
-def _across(body: Object, values: Array, hits: Hits) -> Array:
-    """(k, n): vertex attributes (v, n) interpolated at the hits."""
-    return np.asarray(np.einsum("kc,kcn->kn", hits.barycentric, values[body.mesh.faces[hits.face]]))
+        return np.asarray(body.base_color * painted(body, hits.face, hits.barycentric)[:, :3] * lit + glow)

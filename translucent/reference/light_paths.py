@@ -12,6 +12,7 @@ from translucent.formulas import optics
 from translucent.reference.boxes import Lines
 from translucent.reference.hits import Hits
 from translucent.reference.intervals import Intervals, body_intervals, merge, sum_signs
+from translucent.reference.painted import without_cut_out
 from translucent.reference.rays import Rays
 from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
 from translucent.reference.tracer import Tracer
@@ -148,7 +149,7 @@ class LightPaths:
             if body.medium is None:
                 near = margin[line.pixel]
                 between = (line.distance > near) & (line.distance < length[line.pixel] - near)
-                shadowed[line.pixel[between]] = True
+                shadowed[without_cut_out(body, line.where(between)).pixel] = True
         return shadowed
 
 

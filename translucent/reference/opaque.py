@@ -9,6 +9,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.reference.hits import Hits, world_normals
+from translucent.reference.painted import painted, sampled, without_cut_out
 from translucent.reference.rays import Rays
 from translucent.scene.scene import Object, Scene
 
@@ -28,19 +29,24 @@ class OpaqueHits:
         Index into `Scene.objects`; -1 where there is none.
     face : (n,) int64
         Index into the mesh's faces.
+    barycentric : (n, 3) float64, optional
+        Weights of the face's corners; None: surfaces are even, and show neither textures nor colors of vertices.
     """
 
     distance: Array
     item: Integers
     face: Integers
+    barycentric: Array | None = None
 
     def where(self, chosen: Integers) -> OpaqueHits:
         """Selection of rays by indices."""
-        return OpaqueHits(self.distance[chosen], self.item[chosen], self.face[chosen])
+        across = None if self.barycentric is None else self.barycentric[chosen]
+        return OpaqueHits(self.distance[chosen], self.item[chosen], self.face[chosen], across)
 
 
 def nearest_opaque(scene: Scene, hits: Sequence[Hits], pixels: int) -> OpaqueHits:
-    """Find the first opaque surface ahead of each origin; of several at one distance, that of the first object.
+    """Find the first opaque surface ahead of each origin, past holes; of several at one distance, that of the first
+    object.
 
     Parameters
     ----------
@@ -50,18 +56,19 @@ def nearest_opaque(scene: Scene, hits: Sequence[Hits], pixels: int) -> OpaqueHit
     pixels : int
         Number of rays.
     """
-    nearest = OpaqueHits(np.full(pixels, np.inf), np.full(pixels, -1), np.full(pixels, -1))
+    across = np.zeros((pixels, 3))
+    nearest = OpaqueHits(np.full(pixels, np.inf), np.full(pixels, -1), np.full(pixels, -1), across)
     for i, body in enumerate(scene.objects):
         if body.medium is None:
-            closer = hits[i].before(nearest.distance)
+            closer = without_cut_out(body, hits[i].before(nearest.distance))
             pixel, first = np.unique(closer.pixel, return_index=True)
             nearest.distance[pixel], nearest.item[pixel] = closer.distance[first], i
-            nearest.face[pixel] = closer.face[first]
+            nearest.face[pixel], across[pixel] = closer.face[first], closer.barycentric[first]
     return nearest
 
 
 def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits, irradiance: Irradiance) -> Array:
-    """Diffusely reflected radiance of opaque surfaces towards the origins, (n, 3); 0 on rays without one.
+    """Diffusely reflected radiance of opaque surfaces towards the origins, and emission, (n, 3); 0 on rays without one.
 
     Lambert: color / pi times the irradiance on the side that is seen, as `SurfaceLight.on_opaque` gives it.
     """
@@ -69,16 +76,22 @@ def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits, irradiance
     for i, body in enumerate(scene.objects):
         seen = np.flatnonzero(nearest.item == i)
         if seen.size:
-            radiance[seen] = _lambert(body, nearest.face[seen], nearest.distance[seen], rays.where(seen), irradiance)
+            radiance[seen] = _lambert(body, nearest.where(seen), rays.where(seen), irradiance)
     return radiance
 
 
-def _lambert(body: Object, face: Integers, distance: Array, rays: Rays, irradiance: Irradiance) -> Array:
-    """(k, 3): radiance that one object reflects along rays that meet it at `distance`."""
-    normals = world_normals(body, face)
+def _lambert(body: Object, hits: OpaqueHits, rays: Rays, irradiance: Irradiance) -> Array:
+    """(k, 3): radiance that one object reflects and emits along rays that meet it."""
+    normals = world_normals(body, hits.face)
     away = np.einsum("ki,ki->k", normals, rays.directions) > 0
     normals[away] *= -1.0
     # From the eye, as the rays are, so that the way to a light keeps its digits far from the world's origin.
-    points = rays.origins + distance[:, None] * rays.directions
+    points = rays.origins + hits.distance[:, None] * rays.directions
+    color, glow = np.broadcast_to(body.base_color, points.shape), np.zeros(3)
+    if hits.barycentric is not None:
+        color = color * painted(body, hits.face, hits.barycentric)[:, :3]
+        if body.surface is not None and body.surface.glows:
+            texture = sampled(body, hits.face, hits.barycentric, body.surface.emissive_texture)
+            glow = np.asarray(body.surface.emissive) * texture[:, :3]
     with np.errstate(under="ignore"):
-        return np.asarray(body.base_color / np.pi * irradiance(points, normals))
+        return np.asarray(color / np.pi * irradiance(points, normals) + glow)

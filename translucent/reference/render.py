@@ -68,7 +68,8 @@ def render(
     Where light changes at the interfaces of bodies (`Object.has_interface`), radiance is that of rays that bend and
     split there; see `translucent.reference.refracted`. All else is that of the straight rays, also then. Lights reach
     media straight on. Of `Surface`, multiple scattering is left to `path_trace`, and bodies do not glow. Layers
-    (`Surface.opacity`) have their place in the order, and what they show is matt.
+    (`Surface.opacity`) have their place in the order, and what they show is matt, as are opaque objects, which have
+    their textures and holes.
 
     Parameters
     ----------
@@ -101,7 +102,7 @@ def render(
     Raises
     ------
     InputError
-        If the size is not one, a number not in its range, a surface has textures, or the planner refuses the scene.
+        If the size is not one, a number not in its range, an interface has textures, or the planner refuses the scene.
     """
     start = time.perf_counter()
     check_scene(scene)

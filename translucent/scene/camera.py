@@ -10,9 +10,13 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.frozen import Frozen
+from translucent.geometry.grouping import extent
 
 #: Factor by which a picture is larger than the objects that it frames.
 FRAMING_MARGIN = 1.12
+
+#: Points that are framed at a time.
+FRAMED_AT_ONCE = 1 << 16
 
 #: Largest coordinate of an eye or target in metres, as for meshes.
 MAX_COORDINATE = 1e18
@@ -121,20 +125,22 @@ class Camera(Frozen):
             Upwards in the picture.
         """
         seen = np.asarray(points, dtype=np.float64)
-        low, high = seen.min(axis=0), seen.max(axis=0)
+        low, high = extent(seen)
         reach = float(np.linalg.norm(high - low)) or 1.0
         axis = np.asarray(direction, dtype=np.float64)
         pose = cls(_look_at(-axis, np.zeros(3), up), fov_y=fov_y).pose
-        local = (seen - 0.5 * (low + high)) @ pose[:3, :3]  # right, up, backward
+        aside, back = pose[:3, :2], pose[:3, 2:3]
         half = np.tan(np.radians(fov_y) / 2) * np.array([size[0] / size[1], 1.0]) / FRAMING_MARGIN
         # Each point asks for |x - cx| <= half (distance - z): the two sides of the picture meet where both are tight.
-        upper, lower = (
-            (local[:, :2] + half * local[:, 2:]).max(axis=0),
-            (half * local[:, 2:] - local[:, :2]).max(axis=0),
-        )
+        asked = np.concatenate([half * back + aside, half * back - aside, back], axis=1)
+        middle, farthest = 0.5 * (low + high), np.full(5, -np.inf)
+        for begin in range(0, len(seen), FRAMED_AT_ONCE):  # millions of points would take room
+            part = (seen[begin : begin + FRAMED_AT_ONCE] - middle) @ asked
+            farthest = np.maximum(farthest, extent(part)[1])
+        upper, lower = farthest[:2], farthest[2:4]
         center, distance = (upper - lower) / 2, float(((upper + lower) / (2 * half)).max())
-        distance = max(distance, float(local[:, 2].max()) + 1e-3 * reach)
-        target = 0.5 * (low + high) + pose[:3, :2] @ center
+        distance = max(distance, float(farthest[4]) + 1e-3 * reach)
+        target = middle + aside @ center
         return cls.look_at(target + pose[:3, 2] * distance, target, up, fov_y)
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.geometry.grouping import extent
 from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
 from translucent.scene.camera import Camera
@@ -135,7 +136,7 @@ def framing(
     if stage is None:
         return Camera.framing(points, size, fov_y=fov_y, up=up)
     points = with_shadows(points, stage_lights(stage))
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    middle = extent(points).mean(axis=0)
     return Camera.framing(middle + ROOM * (points - middle), size, stage.view, fov_y, up)
 
 
