@@ -1,5 +1,6 @@
 // What branches of a tree of rays see where they end: the environment, or an opaque object. Needs <View>, <Surfaces>,
-// <TracedBody>, shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl and opaque_objects.glsl.
+// <TracedBody>, shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl, opaque_objects.glsl and
+// footprint.glsl.
 
 vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
 #if MICROFACETS
@@ -22,6 +23,9 @@ struct Glimpse {
     vec3 share;        // of the light that reaches the eye
     bool reflected;
     float blur;
+#if FOOTPRINTS
+    Ellipse ellipse;
+#endif
 };
 
 #if OPAQUE
@@ -59,6 +63,9 @@ bool opaque_shown(Glimpse end, out vec3 light) {
 #endif
 
 vec3 light_at(Glimpse end) {
+#if FOOTPRINTS
+    if (end.object == AIR && (end.reflected || SEEN_LIGHTS == 1)) { return averaged_environment(end.direction, end.blur, end.ellipse); }
+#endif
     if (end.object == AIR) { return environment_seen(end.origin, end.direction, end.reflected, end.blur); }
 #if OPAQUE
     vec3 light;

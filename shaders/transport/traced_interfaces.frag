@@ -25,6 +25,9 @@
 #include "transport/record.glsl"
 #include "transport/place.glsl"
 #include "transport/light_passed.glsl"
+#if FOOTPRINTS
+#include "transport/footprint.glsl"
+#endif
 #include "transport/opaque_objects.glsl"
 #include "transport/branch_ends.glsl"
 #include "transport/sampled_facets.glsl"
@@ -57,6 +60,9 @@ struct Ray {
     float blur;       // squared alpha of a mirror with the same blur
     int turns;        // which of its interfaces it was reflected at, a bit each
     vec3 outwards;    // normal of the body where it starts inside one
+#if FOOTPRINTS
+    Footprint footprint;
+#endif
 };
 
 float strength(vec3 share) {
@@ -85,7 +91,11 @@ uniform vec4 ground_plane;   // unit normal upwards, and metres along it from th
 
 // What a ray sees that is not followed on: the environment, or the ground before it.
 Glimpse seen_ahead(Ray ray, vec3 direction, vec3 share, bool reflected) {
-    Glimpse end = Glimpse(AIR, vec3(0.0), ray.origin, ray.origin, direction, share, reflected, ray.blur);
+    Glimpse end = Glimpse(AIR, vec3(0.0), ray.origin, ray.origin, direction, share, reflected, ray.blur
+#if FOOTPRINTS
+        , ellipse_of(ray.footprint.direction)
+#endif
+    );
 #if OPAQUE
     float falling = -dot(ground_plane.xyz, direction), height = dot(ground_plane.xyz, ray.origin) - ground_plane.w;
     if (ground_object >= 0 && falling > 1e-3 && height > 0.0) {
@@ -158,11 +168,18 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
                 ray.share *= passed;
             }
             if (hit.object < 0) {
-                glimpses[ended++] = Glimpse(AIR, vec3(0.0), ray.origin, ray.origin, ray.direction, ray.share, ray.reflected, ray.blur);
+                glimpses[ended++] = Glimpse(AIR, vec3(0.0), ray.origin, ray.origin, ray.direction, ray.share, ray.reflected, ray.blur
+#if FOOTPRINTS
+                    , ellipse_of(ray.footprint.direction)
+#endif
+                );
                 ends = true;
                 continue;
             }
             vec3 point = ray.origin + hit.path * ray.direction;
+#if FOOTPRINTS
+            ray.footprint.point += hit.path * ray.footprint.direction;
+#endif
             bool sound = true;
             Place place = place_at(ray.origin, ray.direction, ray.record, hit, before, channel, sound);
             TracedBody body = traced_body(place.object);
@@ -185,7 +202,11 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             sum.light += ray.share * place.glow;
             ray.share *= place.coat;
             if (kind == KIND_OPAQUE && (outside || body.one_sided == 0.0)) {
-                glimpses[ended++] = Glimpse(place.object, smooth_normal, ray.origin, point, ray.direction, ray.share, ray.reflected, ray.blur);
+                glimpses[ended++] = Glimpse(place.object, smooth_normal, ray.origin, point, ray.direction, ray.share, ray.reflected, ray.blur
+#if FOOTPRINTS
+                    , ellipse_of(ray.footprint.direction)
+#endif
+                );
                 ends = true;
                 continue;
             }
@@ -290,11 +311,24 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             if (enters) { share_on *= transmission * tint; }
             float ior_inside = max(ior, 1.0 / ior);
             float occlusion = first ? seen.finish.unoccluded : 1.0;
+#if FOOTPRINTS
+            ray.footprint.point = onto_plane(ray.footprint.point, ray.direction, face_normal);
+            mat2x3 normals = normal_differentials(hit, ray.footprint.point, smooth_normal);
+#endif
             Ray back = Ray(point, 0.0, back_way, occlusion * ray.share * share_back, ray.record, ray.met + 1,
                 ray.met == 0 ? 0 : ray.forks, true, ray.blur + alpha * alpha * (outside ? 1.0 : ior_inside * ior_inside),
-                ray.turns * 2 + 1, -smooth_normal);
+                ray.turns * 2 + 1, -smooth_normal
+#if FOOTPRINTS
+                , Footprint(ray.footprint.point, reflected_differentials(ray.footprint.direction, normals, ray.direction, smooth_normal))
+#endif
+            );
             Ray on = Ray(point, 0.0, on_way, ray.share * share_on, place.record, ray.met + 1, ray.forks, ray.reflected,
-                ray.blur + alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0), ray.turns * 2, smooth_normal);
+                ray.blur + alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0), ray.turns * 2, smooth_normal
+#if FOOTPRINTS
+                , Footprint(ray.footprint.point, kind == KIND_SHEET ? ray.footprint.direction
+                    : refracted_differentials(ray.footprint.direction, normals, ray.direction, smooth_normal, ior))
+#endif
+            );
             leave(back, point, face_normal);
             leave(on, ray.origin + place.path * ray.direction, face_normal);
             bool on_stronger = strength(on.share) >= strength(back.share);
@@ -370,11 +404,18 @@ void main() {
     Seen seen = Seen(front.w < NOTHING ? int(surface.x + 0.5) : AIR, point_at(pixel, front.w), front.xyz, finish);
     vec3 eye = point_at(pixel, surface_eye_axial_depth);
     float margin = min(1e-3 * surface_reach, distance(seen.point, eye));
-    Ray ray = Ray(seen.point - margin * direction, 0.0, direction, vec3(1.0), uvec4(0u), 0, FORKS, false, 0.0, 0, -direction);
+    Ray ray = Ray(seen.point - margin * direction, 0.0, direction, vec3(1.0), uvec4(0u), 0, FORKS, false, 0.0, 0, -direction
+#if FOOTPRINTS
+        , footprint_of(pixel, front.w)
+#endif
+    );
     float reach = margin + 1e-3 * surface_reach;
 #if FROM_EYE
     // Something may lie before the first interface.
     ray.origin = point_at(pixel, 0.0);
+#if FOOTPRINTS
+    ray.footprint = footprint_of(pixel, starts_inside ? surface_eye_axial_depth : 0.0);
+#endif
     if (starts_inside) {
         ray.skipped = 2.0 * SURFACE_OFFSET * surface_reach;
         ray.origin = eye + ray.skipped * direction;

@@ -18,6 +18,7 @@ from translucent.assets import mesh_path
 from translucent.bench.shapes import joined
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.gpu.passes import traced_interfaces
+from translucent.scene.showcase import framing
 
 Array = npt.NDArray[np.float64]
 
@@ -407,3 +408,19 @@ def test_a_method_that_makes_sheets_traces_sheets(thorough: tl.Renderer) -> None
     frame = thorough.render(scene, SIZE, tl.ThinLayer(1e-3), interfaces=DEEP, samples=1)
     assert frame.valid.all()
     assert frame.radiance.min() > 0.98  # a ball of glass absorbs half of the light
+
+
+def test_the_environment_is_averaged_over_the_footprints_of_pixels(
+    renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    glass = tl.Object(tl.load_mesh(mesh_path("knot")), tl.Medium(absorption=(2.0, 1.0, 1.5), ior=1.5))
+    scene = tl.Scene([glass], framing([glass], (48, 36)), environment=tl.Environment.studio())
+    averaged = renderer.render(scene, (48, 36), samples=1, interfaces=tl.TracedInterfaces())
+    monkeypatch.setattr(traced_interfaces, "FOOTPRINT_STEP", 0.0)
+    plain, truth = (
+        renderer.render(scene, (48, 36), samples=n, interfaces=tl.TracedInterfaces()).radiance for n in (1, 36)
+    )
+    inside = averaged.coverage
+    errors = [np.sqrt(np.mean((found - truth)[inside] ** 2)) for found in (averaged.radiance, plain)]
+    assert errors[0] < 0.8 * errors[1]
+    assert averaged.radiance[inside].mean() == pytest.approx(truth[inside].mean(), rel=0.01)

@@ -35,6 +35,8 @@ class Beams:
         Whether an interface has reflected it.
     blur : (n,) float64
         Square of the width of what it sees, as of the microfacets of a mirror: the sum over rough interfaces.
+    footprint : (n, 2, 2, 3) float64
+        Differentials of origins and of directions; (n, 0, 2, 3) where nothing is averaged over footprints.
     """
 
     origins: Array
@@ -47,6 +49,7 @@ class Beams:
     last: Integers
     reflected: Mask
     blur: Array
+    footprint: Array
 
     def __len__(self) -> int:
         return len(self.owner)

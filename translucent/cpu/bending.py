@@ -43,7 +43,8 @@ class BentLight:
         `tree`: depth and forks, as of `TracedInterfaces`.
         """
         scene = shader.scene
-        rays = RayTree(shader.light, caster, size[0] / size[1], *tree, diffused)
+        pixel = 2.0 * scene.camera.half_extent(size)[1] / size[1]
+        rays = RayTree(shader.light, caster, size[0] / size[1], *tree, diffused, pixel)
         return cls(rays, tuple(i for i, body in enumerate(scene.objects) if body.has_interface))
 
     def put_into(self, shaded: Arrays, rays: Rays, hits: Sequence[Hits], band: Band, spread: Spread | None) -> None:

@@ -31,13 +31,14 @@ class Spread:
 
     Attributes
     ----------
+    samples : int
     blurred : float
         Share of the variance of microfacets that is left to the blur of the environment: few samples would show noise,
         and many need no blur (as in Krivanek & Colbert 2008, "Real-time shading with filtered importance sampling").
     """
 
     def __init__(self, number: int, samples: int) -> None:
-        self.blurred = samples**-0.25
+        self.samples, self.blurred = samples, samples**-0.25
         self._points = _sobol(samples)[number]
 
     def at(self, pixel: Integers, interface: Integers) -> tuple[Array, Array]:

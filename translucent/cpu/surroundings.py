@@ -10,6 +10,9 @@ import numpy as np
 
 from translucent.arrays import Array, Mask
 from translucent.cpu.beams import Beams
+from translucent.cpu.footprints import ellipses
+from translucent.cpu.vectors import dot, unit
+from translucent.formulas.footprint import ALPHA_OF_DEVIATION, LEAST_BREADTH, MOST_LOOKUPS
 from translucent.reference.ray_ends import ACROSS
 from translucent.reference.rays import Rays
 from translucent.scene.environment import Environment, equirectangular_uv
@@ -53,17 +56,42 @@ class Surroundings:
 
     def blurred(self, beams: Beams, directions: Array, roughness: float | Array) -> Array:
         """(n, 3): light of the environment in directions (n, 3), as mirrors of a roughness (n,) would blur it."""
-        hazy = replace(beams, directions=directions, blur=np.broadcast_to(roughness, len(beams)) ** 4)
+        blur = np.broadcast_to(roughness, len(beams)) ** 4
+        hazy = replace(beams, directions=directions, blur=blur, footprint=beams.footprint[:, :0])
         return self._light(self.environment, hazy)
 
     def _light(self, environment: Environment, beams: Beams) -> Array:
         blur = beams.blur
         # A gradient is smooth already.
-        if environment.map is None or environment.map is not self.environment.map or not blur.any():
+        if environment.map is None or environment.map is not self.environment.map:
+            return environment.lighting(beams.directions)
+        if beams.footprint.size:
+            return self._averaged(environment, beams)
+        if not blur.any():
             return environment.lighting(beams.directions)
         return environment.scale * blurred_lookups(
             self._maps, equirectangular_uv(beams.directions, environment.turn), np.minimum(blur**0.25, 1.0)
         )
+
+    def _averaged(self, environment: Environment, beams: Beams) -> Array:
+        """(n, 3): light averaged over the footprints of beams."""
+        axis, breadth = ellipses(beams.footprint[:, 1])
+        longer = np.sqrt(dot(axis, axis))
+        lookups = np.clip(np.ceil(longer / np.maximum(breadth, LEAST_BREADTH)), 1.0, MOST_LOOKUPS)
+        breadth = np.maximum(breadth, longer / lookups)
+        with np.errstate(under="ignore"):
+            roughness = np.minimum(beams.blur + (ALPHA_OF_DEVIATION * breadth) ** 2, 1.0) ** 0.25
+            # Between the map as it is and the first that is blurred, shares are of the variance.
+            sharpest = 1.0 / (len(self._maps) - 1)
+            narrow = (beams.blur == 0.0) & (roughness < sharpest)
+            roughness = np.where(narrow, sharpest * (roughness / sharpest) ** 4, roughness)
+        found = np.zeros((len(beams), 3))
+        for i in range(int(lookups.max())):
+            own = np.flatnonzero(i < lookups)
+            aside = np.sqrt(12.0) * ((i + 0.5) / lookups[own] - 0.5)[:, None] * axis[own]
+            uv = equirectangular_uv(unit(beams.directions[own] + aside), environment.turn)
+            found[own] += blurred_lookups(self._maps, uv, roughness[own]) / lookups[own, None]
+        return environment.scale * found
 
     def _background(self, seen: Environment, beams: Beams, rays: Rays) -> Array:
         if seen.kind != "checkerboard":

@@ -18,6 +18,7 @@ from translucent.cpu.beams import Beams, joined
 from translucent.cpu.caster import Caster
 from translucent.cpu.diffused import DiffusedLight
 from translucent.cpu.facets import Spread
+from translucent.cpu.footprints import first_footprints, moved_on, parted
 from translucent.cpu.interface_light import InterfaceLight
 from translucent.cpu.legs import LegMedia
 from translucent.cpu.media_record import NOTHING, Items, Record, RecordedMedia, empty_records, enter, has, leave
@@ -74,6 +75,8 @@ class RayTree:
         How often a path takes the weaker branch, at most.
     diffused : DiffusedLight
         Of the bodies of the scene.
+    pixel : float
+        Extent of a pixel in metres, or in metres at distance 1, over which the environment is averaged; 0 for points.
     """
 
     def __init__(
@@ -84,10 +87,11 @@ class RayTree:
         depth: int,
         forks: int,
         diffused: DiffusedLight,
+        pixel: float = 0.0,
     ) -> None:
         scene = light.scene
         self.light, self.scene, self.caster, self.depth, self.forks = light, scene, caster, depth, forks
-        self.diffused = diffused
+        self.diffused, self.pixel = diffused, pixel
         self.surroundings = Surroundings(scene, aspect)
         dispersed = any(body.surface is not None and body.surface.dispersion > 0 for body in scene.bodies)
         self._channels = [
@@ -150,12 +154,19 @@ class _Growth:
             np.full((count, self.caster.groups), -1),
             np.zeros(count, dtype=bool),
             np.zeros(count),
+            self._pixel_footprints(rays.directions),
         )
         # The eye may be far away, where float32 is coarse.
         start = np.maximum(-dot(origins, rays.directions) - BEFORE, 0.0)
         beams = self._step(beams, start)
         while len(beams):
             beams = self._step(beams)
+
+    def _pixel_footprints(self, directions: Array) -> Array:
+        """Footprints of rays of the camera; none where the environment is smooth, no picture."""
+        seen = self.scene.environment.map is not None
+        samples = 1 if self.spread is None else self.spread.samples
+        return first_footprints(self.scene.camera, directions, seen * self.tree.pixel, samples, self.caster.radius)
 
     def _records(self, hits: Sequence[Hits], count: int) -> Record:
         """Records of rays at their origins, from all surfaces behind them."""
@@ -197,7 +208,8 @@ class _Growth:
         face = np.where(distance[met] <= place[met, None] + TOGETHER, face[met], -1)
         beams = self._through_media(beams.where(met), place[met])
         points = beams.origins + place[met, None] * beams.directions
-        return self._at_surfaces(replace(beams, origins=points, last=face))
+        footprint = moved_on(beams.footprint, place[met])
+        return self._at_surfaces(replace(beams, origins=points, last=face, footprint=footprint))
 
     def _correct(self, beams: Beams, face: Integers, distance: Array) -> None:
         """Search in float64 where surfaces do not fit the records: beams leave what they are not in, or never leave."""
@@ -300,6 +312,9 @@ class _Growth:
         self._add_coats(beams, met)
         beams = replace(beams, met=beams.met + 1)
         back, on = self._both(beams, there, met, places.before == places.after)
+        if beams.footprint.size:
+            ways = parted(self.caster, beams, places, met)
+            back, on = (replace(branch, footprint=way) for branch, way in zip((back, on), ways, strict=True))
         if self.tree.diffused:
             for branch in (back, on):
                 points = self._rays(branch).origins + self.scene.camera.eye

@@ -7,6 +7,7 @@ from typing import get_args
 from translucent.formulas.brdf_table import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
 from translucent.formulas.diffusion import HAZE_ROUGHNESS
+from translucent.formulas.footprint import ALPHA_OF_DEVIATION, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
 from translucent.formulas.interface import CLEARCOAT_IOR
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
 from translucent.formulas.spherical_harmonics import BAND_0, BAND_1, BAND_2, BAND_2_ZONAL
@@ -125,6 +126,10 @@ CONSTANTS: dict[str, str] = {
     "PHOTON_WIDTH": f"{PHOTON_WIDTH}u",
     "SURFACE_OFFSET": "1e-6",  # from a surface to where the next segment of a ray starts, as a share of the scene
     "TOUCHING": "1e-6",  # axial depth between surfaces that count as one interface
+    "LEAST_ACROSS": repr(LEAST_ACROSS),
+    "LEAST_BREADTH": repr(LEAST_BREADTH),
+    "MOST_LOOKUPS": f"{MOST_LOOKUPS:.1f}",
+    "ALPHA_OF_DEVIATION": repr(ALPHA_OF_DEVIATION),
     "REFLECTANCE_TABLE_SIZE": f"{TABLE_SIZE:.1f}",
     **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},
     "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored

@@ -8,6 +8,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from translucent.formulas.footprint import FOOTPRINT_STEP
 from translucent.gpu.coverage import extents, part_of
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
@@ -112,6 +113,7 @@ class TracedInterfacesPass:
             "objects_frame": frame,
             "bodies_radius": bodies_radius(job.scene),
             **_ground(job.scene),
+            **_footprint(job),
         }
         _set(program, values)
         if job.bending or not job.bent_apart:
@@ -174,6 +176,7 @@ class TracedInterfacesPass:
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,
+            FOOTPRINTS=environment.kind == "image",
             **coat_switches(scene.objects),
         )
 
@@ -207,6 +210,11 @@ class TracedInterfacesPass:
             textures["seen_map"] = environments.sharp(environment.seen)
         for name, texture in textures.items():
             texture.use(_UNITS[name])
+
+
+def _footprint(job: FrameJob) -> dict[str, float]:
+    """Pixels that a sample stands for, where rays see more than a pixel of a picture of all directions."""
+    return {"pixel_step": FOOTPRINT_STEP * job.samples**-0.5} if job.scene.environment.kind == "image" else {}
 
 
 def _ground(scene: Scene) -> dict[str, Any]:
