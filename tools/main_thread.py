@@ -1,4 +1,4 @@
-"""What the main thread of a process is at, looked at by another thread every few milliseconds."""
+"""Watch over the main thread of a process: another thread looks every few milliseconds what it is at."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ ENVIRONMENTS = {
 
 
 def blender_command() -> list[str] | None:
-    """How a script is started in Blender: by a Python that has its module, or by the program; None without it."""
+    """Command that starts a script in Blender: by a Python that has its module, or by the program; None without it."""
     if python := os.environ.get("BLENDER_PYTHON"):
         return [python, "-W", "error"]
     if importlib.util.find_spec("bpy") is not None:

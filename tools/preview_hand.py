@@ -185,7 +185,7 @@ def frames(count: int = FRAMES) -> Waiting:
 
 @dataclass
 class Artist:
-    """What a user does in the window, and sees there."""
+    """A user's hand and eye in the window."""
 
     desk: Desk
     places: Places
@@ -198,7 +198,7 @@ class Artist:
 
     @property
     def resting(self) -> bool:
-        """Whether nothing is under way in the window."""
+        """True while nothing is under way in the window."""
         work = self.desk.work
         return not (self.desk.more or work.shelf.busy or any(lane.task for lane in work.lanes.values()))
 

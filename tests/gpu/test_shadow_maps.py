@@ -287,7 +287,7 @@ def test_maps_are_rendered_when_something_changes(renderer: tl.Renderer, monkeyp
 
 
 def test_maps_of_two_media_are_paths_and_stay_when_these_change(renderer: tl.Renderer) -> None:
-    """Of a third one they are optical depths; clear bodies are none."""
+    """Maps hold paths for two media, optical depths for three; clear bodies count as none."""
     clear = moved(CUBE, (-1.5, 0.0, 0.0), tl.Medium())
     objects = [tl.Object(BALL, LEAF), clear, moved(CUBE, (0, 0.9, 0), WINE), ground()]
     shown, atlas = replace(scene("ball", "sun"), objects=objects), renderer.gpu._resources.shadows

@@ -461,7 +461,7 @@ def test_light_of_a_sun_goes_on_as_it_falls(rng: np.random.Generator) -> None:
 
 
 def test_bodies_on_the_way_absorb_light_of_the_environment() -> None:
-    """What Beer says of the mean way through a lid over all of the sky; and nothing of what they scatter alone."""
+    """Beer's law for the mean way through a lid over all of the sky; media that scatter alone take nothing."""
     ball = tl.Object(BALL, tl.Medium(scattering=5.0, ior=1.5))
     geometry = lit_body(ball, None, Diffusion(10).cell_size(ball))
     free, lidded, white = (

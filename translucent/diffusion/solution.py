@@ -130,7 +130,7 @@ class BodySystem:
 
 @dataclass(frozen=True, eq=False)
 class _Beamed:
-    """What beams make in one channel: flux, mirrored flux and fluence at the samples (s,), and power in the cells."""
+    """Effects of beams in one channel: flux, mirrored flux and fluence at the samples (s,), and power in the cells."""
 
     flux: Array
     mirrored: Array

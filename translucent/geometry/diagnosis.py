@@ -214,7 +214,7 @@ class _Edges:
 
 
 def _is_one_sheet(faces: npt.NDArray[np.integer], edges: _Edges | None, components: int) -> bool:
-    """Whether edges join all faces, and none has more than two: a face twice would be a part of its own."""
+    """True if edges join all faces, and none has more than two: a face twice would be a part of its own."""
     if edges is None:
         return len(faces) > 2
     return components == 1 and len(edges.faces) > 2 and bool((edges.sizes <= 2).all())

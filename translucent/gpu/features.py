@@ -102,7 +102,7 @@ class FrameFeatures:
 
     @property
     def can_be_compact(self) -> bool:
-        """Whether radiance, thickness, its validity and optical depth are all that the passes over pixels find."""
+        """True if radiance, thickness, its validity and optical depth are all that the passes over pixels find."""
         return self.last_pass == PassName.TRANSMITTANCE and not self.has_unlit
 
     @cached_property

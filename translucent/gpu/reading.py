@@ -1,4 +1,4 @@
-"""What a frame holds, read from the targets of a job."""
+"""Arrays of a frame, read from the targets of a job."""
 
 from __future__ import annotations
 

@@ -65,8 +65,9 @@ def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
 
 
 def view_span(view: SampleView) -> tuple[float, float, float, float]:
-    """Of rays, to the right and down from the camera's axis at distance 1: per pixel, and at the top left corner of the
-    view; 0 for parallel rays.
+    """Steps of rays right and down at distance 1: per pixel, and from the axis to the top left corner of the view.
+
+    0 for parallel rays.
     """
     camera, (width, height) = view.camera, view.size
     if camera.fov_y is None:

@@ -40,7 +40,7 @@ def with_paint(straight: Scene, scene: Scene) -> Scene:
 
 
 def shows_paint(scene: Scene) -> bool:
-    """Whether its surfaces show more than straight rays do without them."""
+    """True if its surfaces show more than straight rays do without them."""
     return any((item.medium is None and item.surface is not None) or _paint(item) is not None for item in scene.shown)
 
 
