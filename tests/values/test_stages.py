@@ -11,7 +11,7 @@ import translucent as tl
 from translucent.commands.common import STAGE_NAMES
 from translucent.geometry.solids import Box, Sphere
 from translucent.scene.shadow_catchers import before_page, page_radiance
-from translucent.scene.showcase import framing, showcase
+from translucent.scene.showcase import DEFAULT_COLOR, default_medium, framing, showcase
 from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, STAGES, stage_named
 from translucent.scene.staging import GAP, has_ground, staged, upright, upright_turn, world_vertices
 from translucent.scene.turntable import turntable
@@ -218,3 +218,11 @@ def test_several_bodies_are_framed_for_a_stage():
 def test_a_scene_on_a_stage_gets_no_second_one() -> None:
     with pytest.raises(tl.InputError, match="it has a ground that catches shadows; make it without one"):
         tl.staged(showcase(BOX, GLASS, SIZE), "night")
+
+
+def test_default_media_are_as_bright_in_compact_meshes_as_in_slender_ones() -> None:
+    """The default color is that on the mean chord of a ball, 4 r / 3, and after 15 % of the diagonal of a plate."""
+    ball, plate = Sphere(radius=0.3).tessellate(), Box.slab((1.0, 1.0), 0.02).tessellate()
+    for mesh, distance in ((ball, 0.4), (plate, 0.15 * plate.diagonal)):
+        medium = default_medium(mesh, None)
+        assert np.allclose(medium.transmittance(distance), DEFAULT_COLOR, rtol=0.01)

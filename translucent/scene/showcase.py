@@ -22,7 +22,8 @@ from translucent.scene.staging import stage_lights, staged, with_shadows, world_
 from translucent.scene.surface import Surface
 from translucent.suggestions import close_names, did_you_mean
 
-#: Linear color of white light in the default medium after `DEFAULT_REACH` of the mesh's diagonal.
+#: Linear color of white light in the default medium on its mean way through a closed mesh, if that is more than
+#: `DEFAULT_REACH` of the mesh's diagonal, else after that.
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
 DEFAULT_REACH = 0.15
 
@@ -59,7 +60,8 @@ def showcase(
     ----------
     mesh : Mesh
     medium : Medium, optional
-        Default: jade green after 15 % of the mesh's diagonal, whatever its size; on a stage, with the ior of glass.
+        Default: jade green on the mean way through the mesh, or after 15 % of its diagonal where that is more, whatever
+        its size; on a stage, with the ior of glass.
     size : (width, height)
         Size of the picture in pixels, which the framing and the stage depend on.
     camera : Camera, optional
@@ -86,9 +88,15 @@ def showcase(
 
 
 def default_medium(mesh: Mesh, stage: Stage | None) -> Medium:
-    """Jade green medium that suits the size of a mesh, with an interface on a stage, where there is much to mirror."""
-    ior = 1.0 if stage is None else STAGED_IOR
-    return Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0), ior=ior)
+    """Jade green medium that suits a mesh: compact ones are as bright as slender ones.
+
+    With an interface on a stage, where there is much to mirror.
+    """
+    reach = DEFAULT_REACH * (mesh.diagonal or 1.0)
+    if mesh.diagnosis.sound:
+        # The mean chord of rays through a body is 4 V / S (Cauchy): twice its mean thickness.
+        reach = max(reach, 2.0 * Object(mesh, medium=Medium()).mean_thickness)
+    return Medium.from_color(DEFAULT_COLOR, reach, ior=1.0 if stage is None else STAGED_IOR)
 
 
 def named_environment(name: str, rotation: float = 0.0) -> Environment:
