@@ -40,7 +40,7 @@ def test_a_scene_of_opaque_objects_is_refused_and_yet_explained(run: Run, tmp_pa
 def test_explain_tells_the_mesh_and_the_plan(run: Run, cube: Path) -> None:
     result = run("explain", cube)
     assert (result.code, result.err) == (0, "")
-    for words in ("cube.ply: 8 vertices, 12 faces, 1 x 1 x 1 m", "mesh: closed, convex, 1 component", "signed_depth:"):
+    for words in ("cube.ply: 8 vertices, 12 faces, 1 x 1 x 1 m", "mesh: closed, convex, 1 component", "signed_depth:", "bytes in"):
         assert words in result.out
 
 
@@ -52,6 +52,7 @@ def test_explain_as_json(run: Run, cube: Path) -> None:
     assert told["plan"]["method"] == "BackFaceDepth()"
     assert told["plan"]["exact"] is True
     assert [step["name"] for step in told["plan"]["passes"]] == ["back_face_depth", "transmittance"]
+    assert [step["pixel"]["written"] for step in told["plan"]["traffic"]["passes"]] == [16 + 8 + 8, 16]
 
 
 def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:
