@@ -40,8 +40,9 @@ def test_a_scene_of_opaque_objects_is_refused_and_yet_explained(run: Run, tmp_pa
 def test_explain_tells_the_mesh_and_the_plan(run: Run, cube: Path) -> None:
     result = run("explain", cube)
     assert (result.code, result.err) == (0, "")
-    for words in ("cube.ply: 8 vertices, 12 faces, 1 x 1 x 1 m", "mesh: closed, convex, 1 component", "signed_depth:", "bytes in"):
+    for words in ("cube.ply: 8 vertices, 12 faces, 1 x 1 x 1 m", "mesh: closed, convex, 1 component", "signed_depth:"):
         assert words in result.out
+    assert "transmittance: 8 read" in result.out
 
 
 def test_explain_as_json(run: Run, cube: Path) -> None:

@@ -62,7 +62,7 @@ class FrameTraffic:
         lines = ["bytes in targets at most, of one sample:"]
         for step in told:
             assert step.pixel is not None
-            face = " and {} for each face over it".format(_words(*step.face)) if any(step.face) else ""
+            face = f" and {_words(*step.face)} for each face over it" if any(step.face) else ""
             lines.append(f"  {step.name}: {_words(*step.pixel)} per pixel{face}")
         read, written = (sum(step.pixel[i] for step in told if step.pixel is not None) for i in range(2))
         lines.append(f"  together: {_words(read, written)} per pixel, and {self.read_back} read back")
