@@ -42,6 +42,7 @@ def test_explain_tells_the_mesh_and_the_plan(run: Run, cube: Path) -> None:
     assert (result.code, result.err) == (0, "")
     for words in ("cube.ply: 8 vertices, 12 faces, 1 x 1 x 1 m", "mesh: closed, convex, 1 component", "signed_depth:"):
         assert words in result.out
+    assert "transmittance: 8 read" in result.out
 
 
 def test_explain_as_json(run: Run, cube: Path) -> None:
@@ -52,6 +53,7 @@ def test_explain_as_json(run: Run, cube: Path) -> None:
     assert told["plan"]["method"] == "BackFaceDepth()"
     assert told["plan"]["exact"] is True
     assert [step["name"] for step in told["plan"]["passes"]] == ["back_face_depth", "transmittance"]
+    assert [step["pixel"]["written"] for step in told["plan"]["traffic"]["passes"]] == [16 + 8 + 8, 16]
 
 
 def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:

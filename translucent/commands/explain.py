@@ -36,6 +36,7 @@ from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
     from translucent.geometry.mesh import Mesh
+    from translucent.gpu.traffic import FrameTraffic
     from translucent.planning.render_plan import RenderPlan
     from translucent.scene.scene import Object, Scene
 
@@ -105,13 +106,14 @@ def explain(
     if scene.bodies:
         chosen = plan(scene, method, interfaces=interfaces, scattering=scattering, caustics=asked, shadows=shadows)
     if as_json:
-        echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
-    elif is_scene_file(model):
+        found = None if chosen is None else {**chosen.summary(), "traffic": _traffic(scene, chosen).summary()}
+        echo(json.dumps({**_summary(model, scene), "plan": found}))
+        return
+    if is_scene_file(model):
         _tell_scene(model, scene)
-        _tell_plan(chosen)
     else:
         _tell_mesh(scene.objects[0].mesh)
-        _tell_plan(chosen)
+    _tell_plan(scene, chosen)
 
 
 def _summary(model: str, scene: Scene) -> dict[str, Any]:
@@ -168,8 +170,16 @@ def _tell_scene(model: str, scene: Scene) -> None:
         echo(f"medium: {line}")
 
 
-def _tell_plan(chosen: RenderPlan | None) -> None:
+def _traffic(scene: Scene, chosen: RenderPlan) -> FrameTraffic:
+    from translucent.gpu.traffic import frame_traffic
+    from translucent.planning.scattering.choice import shown
+
+    return frame_traffic(shown(scene, chosen.given_back).with_ambient_emitted, chosen)
+
+
+def _tell_plan(scene: Scene, chosen: RenderPlan | None) -> None:
     if chosen is None:
         echo("plan: none, since no object is translucent; see with --preset NAME, or --color C and --distance D")
     else:
         echo(f"plan: {chosen}")
+        echo(str(_traffic(scene, chosen)))

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import RenderError
+from translucent.gpu.formats import FORMATS, Format, accumulator_format, compact_format
 from translucent.gpu.storage import Storage
 
 Size = tuple[int, int]
@@ -29,27 +30,27 @@ class Targets:
 
     def path_and_count(self, spectral: bool, name: str = "accumulated") -> moderngl.Framebuffer:
         """Accumulator of thickness passes: RG32F (path, count), or RGBA32F (optical depth, count) and R32F (path)."""
-        return self._get(f"{name}-{spectral}", (4, 1) if spectral else (2,))
+        return self._get(f"{name}-{spectral}", accumulator_format(spectral))
 
     def nearest_and_farthest(self) -> moderngl.Framebuffer:
         """RGBA32F: nearest front face, farthest back face, nothing, number of faces."""
-        return self._get("nearest_and_farthest", (4,))
+        return self._get("nearest_and_farthest")
 
     def opaque(self) -> moderngl.Framebuffer:
         """R32F depth and RGBA32F radiance of the nearest opaque surface, with a depth buffer."""
-        return self._get("opaque", (1, 4), with_depth=True)
+        return self._get("opaque")
 
     def paint(self) -> moderngl.Framebuffer:
         """RGBA32F share of light that the nearest opaque surface reflects diffusely, and its normal; depth buffer."""
-        return self._get("paint", (4, 4), with_depth=True)
+        return self._get("paint")
 
     def photons(self) -> moderngl.Framebuffer:
         """RGBA32F irradiance of photons on the nearest opaque surface, and how many there are."""
-        return self._get("photons", (4,))
+        return self._get("photons")
 
     def photon_spread(self) -> moderngl.Framebuffer:
         """RG32F: how far the photons of a pixel are spread, and the share that each pixel gets."""
-        return self._get("photon_spread", (2,))
+        return self._get("photon_spread")
 
     def opaque_ends(self) -> moderngl.Framebuffer:
         """Framebuffer `opaque` without radiance."""
@@ -60,27 +61,27 @@ class Targets:
 
     def entered(self) -> moderngl.Framebuffer:
         """RGBA32F interface where a ray first enters a body: normal, axial depth, finish, color; with depth buffer."""
-        return self._get("entered", (4, 4, 4), with_depth=True)
+        return self._get("entered")
 
     def left(self) -> moderngl.Framebuffer:
         """RGBA32F interface where a ray first leaves one beyond it: normal, axial depth, finish; with depth buffer."""
-        return self._get("left", (4, 4), with_depth=True)
+        return self._get("left")
 
     def surfaced(self) -> moderngl.Framebuffer:
         """RGBA32F radiance with what interfaces do to it, and transmittance, with a depth buffer."""
-        return self._get("surfaced", (4, 4), with_depth=True)
+        return self._get("surfaced")
 
     def ordered(self) -> moderngl.Framebuffer:
         """RGBA32F optical depth and soundness, emitted radiance and thickness, and counts of layers."""
-        return self._get("ordered", (4, 4, 4))
+        return self._get("ordered")
 
     def peeled(self, number: int) -> moderngl.Framebuffer:
         """RGBA32F: what one pass of depth peeling finds, with a depth buffer that all of them share."""
-        return self._get(f"peeled-{number}", (4,), with_depth=True, depth_of="peeled-0" if number else None)
+        return self._get(f"peeled-{number}", FORMATS["peeled"], depth_of="peeled-0" if number else None)
 
     def peel_state(self, number: int) -> moderngl.Framebuffer:
         """State of the two walks along each ray during peeling: five RGBA32F and two RGBA32UI."""
-        return self._get(f"peel_state-{number}", (4, 4, 4, 4, 4), windings=2)
+        return self._get(f"peel_state-{number}", FORMATS["peel_state"])
 
     def nothing(self) -> moderngl.Framebuffer:
         """Framebuffer for passes that write to buffers only.
@@ -88,49 +89,49 @@ class Targets:
         Its colors are masked. Else llvmpipe takes a face that fills a tile of 64 x 64 pixels for one that hides what
         has been drawn there, and leaves that out with all that it would have written to buffers.
         """
-        framebuffer = self._get("nothing", (-1,))
+        framebuffer = self._get("nothing")
         framebuffer.color_mask = (False, False, False, False)
         return framebuffer
 
     def steepest(self) -> moderngl.Framebuffer:
         """R32F: how far the rasterizer may misplace the steepest face of a pixel, in axial depth."""
-        return self._get("steepest", (1,))
+        return self._get("steepest")
 
     def result(self) -> moderngl.Framebuffer:
         """Arrays of a frame: radiance, transmittance, optical depth (RGBA32F), thickness (R32F) and flags (R8)."""
-        return self._get("result", (4, 4, 4, 1, -1))
+        return self._get("result")
 
     def compact(self, *, with_depth: bool) -> moderngl.Framebuffer:
         """RGBA32F radiance and thickness, with the sign bit where it cannot be trusted; and RGBA32F optical depth."""
-        return self._get(f"compact-{with_depth}", (4, 4) if with_depth else (4,))
+        return self._get(f"compact-{with_depth}", compact_format(with_depth))
 
     def average(self) -> moderngl.Framebuffer:
         """RGBA32F radiance and transmittance, summed over the samples of a pixel, with a depth buffer."""
-        return self._get("average", (4, 4), with_depth=True)
+        return self._get("average")
 
     def bent(self) -> moderngl.Framebuffer:
         """RGBA32F light of traced samples of a pixel and their number; squared luminance and trust; depth buffer."""
-        return self._get("bent", (4, 4), with_depth=True)
+        return self._get("bent")
 
     def unsettled(self) -> moderngl.Framebuffer:
         """R8: pixels that need more samples."""
-        return self._get("unsettled", (-1,))
+        return self._get("unsettled")
 
     def opaque_mean(self) -> moderngl.Framebuffer:
         """RGBA32F radiance of opaque surfaces, the mean of all samples, and the share of the pixel that they fill."""
-        return self._get("opaque_mean", (4,))
+        return self._get("opaque_mean")
 
     def paths(self) -> moderngl.Framebuffer:
         """RGBA32F means of random paths and how many were lost, and sums of squared differences from the means."""
-        return self._get("paths", (4, 4))
+        return self._get("paths")
 
     def layers(self) -> moderngl.Framebuffer:
         """RGBA32F layers in front of all bodies, and those behind the first one on a ray."""
-        return self._get("layers", (4, 4))
+        return self._get("layers")
 
     def fronts(self) -> moderngl.Framebuffer:
         """R32F depth at which a ray first meets a body, with a depth buffer."""
-        return self._get("fronts", (1,), with_depth=True)
+        return self._get("fronts")
 
     def view(self, name: str, attachment: int) -> moderngl.Framebuffer:
         """Framebuffer with only one attachment of the framebuffer of this name."""
@@ -151,25 +152,15 @@ class Targets:
         per_pixel = sum(t.components * (1 if t.dtype == "f1" else 4) for t in textures)
         return int(per_pixel + self.buffers.size // (self.size[0] * self.size[1]))
 
-    def _get(
-        self,
-        name: str,
-        components: tuple[int, ...],
-        *,
-        with_depth: bool = False,
-        depth_of: str | None = None,
-        windings: int = 0,
-    ) -> moderngl.Framebuffer:
-        """The framebuffer of this name: float textures, or bytes where a count is negative, then RGBA32UI ones.
-
-        With a depth buffer of its own, or that of the framebuffer `depth_of`.
-        """
+    def _get(self, name: str, own: Format | None = None, *, depth_of: str | None = None) -> moderngl.Framebuffer:
+        """The framebuffer of this name, with its own depth buffer or that of the framebuffer `depth_of`."""
         if name not in self._framebuffers:
+            found = own or FORMATS[name]
             try:
                 depth = self._framebuffers[depth_of].depth_attachment if depth_of is not None else None
-                self._framebuffers[name] = self._make(components, with_depth, depth, windings)
+                self._framebuffers[name] = self._make(found, depth)
             except moderngl.Error as error:
-                megabytes = sum(4 * abs(count) for count in components) * self.size[0] * self.size[1] / 1e6
+                megabytes = found.bytes_of() * self.size[0] * self.size[1] / 1e6
                 raise RenderError(
                     f"frame size {self.size[0]}x{self.size[1]}",
                     f"OpenGL has no room for {megabytes:.0f} MB of it ({error})",
@@ -177,20 +168,14 @@ class Targets:
                 ) from error
         return self._framebuffers[name]
 
-    def _make(
-        self,
-        components: tuple[int, ...],
-        with_depth: bool,
-        depth: moderngl.Renderbuffer | moderngl.Texture | None,
-        windings: int,
-    ) -> moderngl.Framebuffer:
+    def _make(self, found: Format, depth: moderngl.Renderbuffer | moderngl.Texture | None) -> moderngl.Framebuffer:
         attachments = [
-            self._gl.texture(self.size, abs(count), dtype="f4" if count > 0 else "f1") for count in components
+            self._gl.texture(self.size, abs(count), dtype="f4" if count > 0 else "f1") for count in found.components
         ]
-        attachments += [self._gl.texture(self.size, 4, dtype="u4") for _ in range(windings)]
+        attachments += [self._gl.texture(self.size, 4, dtype="u4") for _ in range(found.windings)]
         for texture in attachments:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        if with_depth and depth is None:
+        if found.with_depth and depth is None:
             depth = self._gl.depth_renderbuffer(self.size)
         return self._gl.framebuffer(attachments, depth)
 

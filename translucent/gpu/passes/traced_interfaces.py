@@ -176,7 +176,8 @@ class TracedInterfacesPass:
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,
-            FOOTPRINTS=environment.kind == "image",
+            # Rays that a ground has mirrored have none.
+            FOOTPRINTS=environment.kind == "image" and not mirror,
             **coat_switches(scene.objects),
         )
 
