@@ -178,7 +178,8 @@ void main() {
     out_radiance = vec4(background(pixel, ray, texel) * through + emitted, 1.0);
 #endif
 #if COMPACT
-    out_radiance.a = uintBitsToFloat(floatBitsToUint(path.thickness) | (valid ? 0u : 0x80000000u));
+    // The larger of -0 and 0 may be either.
+    out_radiance.a = uintBitsToFloat((floatBitsToUint(path.thickness) & 0x7fffffffu) | (valid ? 0u : 0x80000000u));
 #if SPECTRAL
     out_optical_depth = vec4(path.optical_depth, 1.0);
 #endif

@@ -35,6 +35,9 @@ def test_photons_light_the_ground_as_the_rays_of_the_ball_do() -> None:
     beside = found[(from_axis > 1.2) & (from_axis < 1.3)]
     assert beside.min() >= 1.0, "the sun beside its shadow"
     assert light.on_opaque(points - SCENE.camera.eye, -up).max() == 0.0
+    few = CausticLight(SCENE, (None, None), meshes, tl.Caustics(200), frozenset({0}))
+    sums = (step**2 * each.sum() for each in (few.on_opaque(points - SCENE.camera.eye, up)[:, 0], found))
+    assert next(sums) == pytest.approx(next(sums), abs=0.1 * np.pi), "few photons have no more light than many"
     assert CausticLight(SCENE, (None, None), meshes, tl.Caustics(1), frozenset()).on_opaque(
         np.array([(0.0, -DEEP, 0.0)]) - SCENE.camera.eye, up[:1]
     ) == pytest.approx(1.0, abs=0.2), "of a body that photons do not replace"

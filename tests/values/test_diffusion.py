@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy import sparse
 
 import translucent as tl
 from translucent.bench.shapes import joined
+from translucent.diffusion.cache import diffusion_key
 from translucent.diffusion.cells import TOLERANCE
 from translucent.diffusion.densities import even_densities
 from translucent.diffusion.entering import Casters, from_light, opaque_surfaces
@@ -483,6 +485,20 @@ def test_bodies_on_the_way_absorb_light_of_the_environment() -> None:
     for channel, absorption in ((1, 1.0), (2, 4.0)):
         share = float((sky * optics.transmittance(0.5 * absorption / cosine)).sum() / sky.sum())
         assert lidded[(*top, channel)] / free[(*top, channel)] == pytest.approx(share, rel=0.05)
+
+
+def test_nothing_of_the_environment_passes_what_is_black() -> None:
+    """Next to the edges of a box as well, where samples stand for those of other sides."""
+    box, lid = Box().tessellate(), Sphere(radius=2.0).tessellate(8)
+    body, black = tl.Object(box, tl.Medium(scattering=5.0)), tl.Object(lid, tl.Medium(absorption=1e9))
+    scene, geometry = tl.Scene([body, black], CAMERA), lit_body(body, None, Diffusion(8).cell_size(body))
+    assert body.medium is not None
+    assert DiffusingBody(geometry, body.medium, 0.0).field(scene, 0).entering.max() < 1e-9
+    keys = {
+        diffusion_key(replace(scene, objects=[body, lid]), Diffusion())
+        for lid in (black, replace(black, sheet_thickness=0.1))
+    }
+    assert len(keys) == 2  # sheets take nothing on the way
 
 
 def test_opaque_objects_shadow_a_directional_light() -> None:

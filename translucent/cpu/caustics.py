@@ -1,8 +1,10 @@
-"""Caustics on opaque objects: photons that Embree follows, gathered around each point."""
+"""Caustics on opaque objects: photons that Embree follows, and whose light is spread over discs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -18,15 +20,28 @@ from translucent.planning.caustics import Caustics
 from translucent.reference.surface_light import SurfaceLight
 from translucent.scene.scene import Light, Scene
 
-#: Photons that a point gathers: the noise of its light is 1.15 over the root of them.
+#: Photons that the disc of one holds: the noise of light at a point is 1.15 over the root of them.
 GATHERED = 64
 
-#: Largest height of a photon over the plane of the point, in radii of what is gathered.
+#: Largest height of a photon over the plane of the point, in radii of its disc.
 FLAT = 0.2
+
+#: Least radius of a disc, as a share of the scene's diagonal.
+LEAST_RADIUS = 1e-4
+
+#: Factor between the largest and the smallest radius of discs that are looked for together.
+TOGETHER = 1.5
+
+#: Points at which light is gathered together.
+BATCH = 1 << 14
 
 
 class CausticLight(SurfaceLight):
     """Light that reaches surfaces, and that of photons on opaque ones (Jensen 1996).
+
+    The light of each photon is spread over a disc that holds so many of its neighbors (Breiman, Meisel & Purcell 1977,
+    "Variable kernel estimates"). What the nearest photons of a point carry over the area that they lie in would, added
+    up over all points, be more than they carry: far off a caustic it falls as slowly as the squared distance.
 
     Parameters
     ----------
@@ -49,9 +64,7 @@ class CausticLight(SurfaceLight):
     ) -> None:
         super().__init__(EmbreeLightPaths(scene, sheets, meshes))
         self._dark = SurfaceLight(EmbreeLightPaths(darkened(scene, bending), sheets, meshes))
-        points, self._ways, self._power = _landed(scene, caustics)
-        self._points = points - scene.camera.eye
-        self._tree = cKDTree(self._points) if len(points) else None
+        self._discs = _discs(*_landed(scene, caustics), scene)
 
     def straight(self, light: Light, points: Array, before: float) -> Array:
         """(k, 3): as of `SurfaceLight`; to opaque objects, for which `before` is 0, past all that bends light."""
@@ -62,19 +75,54 @@ class CausticLight(SurfaceLight):
         return np.asarray(super().on_opaque(points, normals) + self._gathered(points, normals))
 
     def _gathered(self, points: Array, normals: Array) -> Array:
-        """(k, 3): power of the nearest photons on the same side of the same plane, over the area that they lie in."""
-        if self._tree is None or not len(points):
-            return np.zeros(points.shape)
-        count = min(GATHERED, len(self._points))
-        distance, found = (part.reshape(len(points), count) for part in self._tree.query(points, k=count))
-        radius = np.maximum(distance[:, -1:], np.finfo(np.float64).tiny)
-        height = np.einsum("kni,ki->kn", self._points[found] - points[:, None], normals)
-        lit = np.einsum("kni,ki->kn", self._ways[found], normals) < 0.0
+        """(k, 3): irradiance of the photons that come from before the surface, and whose discs points are on."""
+        found = np.zeros(points.shape)
+        for first in range(0, len(points), BATCH):
+            part = slice(first, first + BATCH)
+            places = cKDTree(points[part])
+            for discs in self._discs:
+                found[part] += discs.light(places, normals[part])
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Discs:
+    """Photons with discs of about the same size: points from the eye, directions, power (n, 3) and radii (n,)."""
+
+    points: Array
+    ways: Array
+    power: Array
+    radius: Array
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)
+
+    def light(self, places: cKDTree, normals: Array) -> Array:
+        """(k, 3): irradiance at places with unit normals (k, 3)."""
+        near = places.sparse_distance_matrix(self._tree, float(self.radius.max()), output_type="ndarray")
+        place, photon, distance = near["i"], near["j"], near["v"] / self.radius[near["j"]]
+        height = ((self.points[photon] - places.data[place]) * normals[place]).sum(axis=1)
+        seen = (distance < 1.0) & (np.abs(height) < FLAT * self.radius[photon])
+        seen &= (self.ways[photon] * normals[place]).sum(axis=1) < 0.0
+        place, photon, distance = place[seen], photon[seen], distance[seen]
         with np.errstate(under="ignore"):
             # Those near the edge count less (Epanechnikov), so that no photon comes or goes at once.
-            share = 2.0 * (1.0 - np.minimum(distance / radius, 1.0) ** 2) / (np.pi * radius**2)
-            share = np.where(lit & (np.abs(height) < FLAT * radius), share, 0.0)
-            return np.asarray(np.einsum("kn,knc->kc", share, self._power[found]))
+            share = 2.0 * (1.0 - distance**2) / (np.pi * self.radius[photon] ** 2)
+            light = share[:, None] * self.power[photon]
+            return np.stack([np.bincount(place, light[:, channel], len(normals)) for channel in range(3)], axis=1)
+
+
+def _discs(points: Array, ways: Array, power: Array, scene: Scene) -> list[_Discs]:
+    """Discs of photons by their size."""
+    if not len(points):
+        return []
+    points = points - scene.camera.eye
+    radius = cKDTree(points).query(points, k=[min(GATHERED, len(points))])[0][:, 0]
+    radius = np.maximum(radius, LEAST_RADIUS * scene.diagonal)
+    size = np.floor(np.log(radius) / np.log(TOGETHER))
+    kinds = [np.flatnonzero(size == one) for one in np.unique(size)]
+    return [_Discs(points[own], ways[own], power[own], radius[own]) for own in kinds]
 
 
 def _landed(scene: Scene, caustics: Caustics) -> tuple[Array, Array, Array]:

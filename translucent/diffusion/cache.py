@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from translucent.diffusion.dimming import may_dim
 from translucent.diffusion.entering import opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
 from translucent.diffusion.photon_fluence import EnteringPhotons, FineCells, bent_light
@@ -180,7 +181,7 @@ def diffusion_key(scene: Scene, diffusion: Diffusion, caustics: Caustics | None 
     dimming = tuple(
         (i, _place(item), np.asarray(item.medium.extinction).tobytes(), np.asarray(item.medium.absorption).tobytes())
         for i, item in enumerate(scene.objects)
-        if item.medium is not None and np.any(item.medium.extinction)
+        if item.medium is not None and may_dim(item)
     )
     return (diffusion, bodies, opaque, lighting, lights, dimming, bending)
 

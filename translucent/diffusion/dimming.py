@@ -26,18 +26,14 @@ def embree_mesh(mesh: Mesh) -> EmbreeMesh:
 
 
 def dimming_bodies(scene: Scene, body: int) -> list[Object]:
-    """Other bodies that take of the light on its way to one: closed ones of one density, neither layers nor sheets."""
-    return [
-        item
-        for i, item in enumerate(scene.objects)
-        if i != body
-        and item.medium is not None
-        and item.density is None
-        and item.sheet_thickness is None
-        and not item.covers
-        and item.mesh.diagnosis.solid
-        and np.any(item.medium.extinction)
-    ]
+    """Other bodies that take of the light on its way to one: those that may, and are closed."""
+    return [item for i, item in enumerate(scene.objects) if i != body and may_dim(item) and item.mesh.diagnosis.solid]
+
+
+def may_dim(item: Object) -> bool:
+    """True for a body of one density, neither a layer nor a sheet, that takes of light if it is closed."""
+    plain = item.density is None and item.sheet_thickness is None and not item.covers
+    return plain and item.medium is not None and bool(np.any(item.medium.extinction))
 
 
 def light_passed(bodies: Sequence[Object], points: Array, directions: Array, distance: Array) -> Array:

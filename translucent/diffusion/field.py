@@ -185,8 +185,11 @@ class LitBody:
         """Metres in another body: those of a part of the samples, of which each stands for what is nearest to it."""
         points, part = self.grid.points, slice(None, None, SAMPLES_FOR_PATH)
         start = points[part] + BEFORE * self.grid.cells.step * self.grid.face_normals[part]
-        metres = sky_paths(body, start, self.sky.directions, self.sky.cosine[part] > 0.0)
-        return sparse.csr_array(metres[cKDTree(points[part]).query(points)[1]])
+        nearest = cKDTree(points[part]).query(points)[1]
+        # Next to an edge they face other ways: of each, ways to all that the samples see for which it stands.
+        groups = sparse.csr_array((np.ones(len(points)), (nearest, np.arange(len(points)))), (len(start), len(points)))
+        metres = sky_paths(body, start, self.sky.directions, groups @ self.sky.seen.astype(np.float64) > 0.0)
+        return sparse.csr_array(metres[nearest])
 
     def entrance(self, ior: float, roughness: float) -> Entrance:
         """Light that enters through this interface; that of the last one is kept."""

@@ -114,6 +114,6 @@ def tone_curve(name: str) -> Callable[[npt.ArrayLike], Array]:
     InputError
         If there is none.
     """
-    if name not in _CURVES:
+    if name not in TONES:
         raise InputError(f"tone {name!r}", "not a known tone curve", f"use one of {', '.join(TONES)}")
     return _CURVES[name]

@@ -119,6 +119,10 @@ class Frame:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
             return self.__dict__.setdefault(name, deferred.made())
 
+    def __dir__(self) -> list[str]:
+        """Names, those of arrays that nobody has asked for yet included."""
+        return sorted({*super().__dir__(), *self.__dict__.get(_DEFERRED, {})})
+
     def rendered_from(self, scene: Scene, choices: RenderChoices) -> Frame:
         """The frame, as one of that scene, rendered with these choices."""
         frame = copy.copy(self)
@@ -278,8 +282,12 @@ def check_exposure(stops: float) -> float:
     Raises
     ------
     InputError
-        If it is not within 100 stops.
+        If it is not a number within 100 stops.
     """
-    if not abs(stops) <= MAX_EXPOSURE:
+    try:
+        within = bool(abs(stops) <= MAX_EXPOSURE)
+    except (TypeError, ValueError):  # texts, arrays
+        raise InputError(f"exposure {stops!r}", "not a number", "give stops, for example 1.5") from None
+    if not within:
         raise InputError(f"exposure {stops}", f"not within {MAX_EXPOSURE:g} stops", "give for example 1.5")
     return stops

@@ -161,6 +161,8 @@ def page_html(
     check_page_size(size)
     check_exposure(exposure)
     tone_curve(tone)
+    if not isinstance(name, str):
+        raise InputError(f"name {name!r}", "not a text", "give the title of the page, for example 'Wine'")
     if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
         raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MOST_SAMPLES}", "give for example 16")
     script = web_path("page.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
