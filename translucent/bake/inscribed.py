@@ -62,6 +62,7 @@ class InscribedSpheres:
     def __init__(self, surface: Surface) -> None:
         self._planes = surface.planes
         self._corners = surface.corners
+        self._sides = _sides(surface.corners, surface.planes[:, :3])
         self._middles = surface.corners.mean(axis=1)
         self._tree = _Tree.of(surface)
         self._slack = LARGE_SLACK if len(surface.corners) > LARGE else 0.0
@@ -91,26 +92,31 @@ class InscribedSpheres:
 
     def _narrow(self, points: Points, pair: Integers, face: Integers, radius: Array) -> None:
         """Make spheres as small as the middles of faces that count allow, in pairs."""
-        inward = -points.normal[pair]
-        away = self._middles[face] - points.start[pair]
-        along, square = _dot(away, inward), _dot(away, away)
-        counts = (along * along > _CONE * _CONE * square) & (along > 0) & (face != points.face[pair])
-        np.minimum.at(radius, pair[counts], (1.0 + LOOSE) * 0.5 * square[counts] / along[counts])
+        away = self._middles.take(face, axis=0)
+        away -= points.start.take(pair, axis=0)
+        along = -_dot(away, points.normal.take(pair, axis=0))
+        square = _dot(away, away)
+        counts = np.flatnonzero(
+            (along * along > _CONE * _CONE * square) & (along > 0) & (face != points.face.take(pair))
+        )
+        np.minimum.at(radius, pair.take(counts), (0.5 * (1.0 + LOOSE)) * square.take(counts) / along.take(counts))
 
     def _touch(self, points: Points, pair: Integers, face: Integers, radius: Array) -> None:
         """Make spheres as small as faces allow, in pairs."""
-        other = face != points.face[pair]
+        other = face != points.face.take(pair)
         pair, face = pair[other], face[other]
-        point, inward = points.start[pair], -points.normal[pair]
-        plane = self._planes[face]
+        point, inward = points.start.take(pair, axis=0), -points.normal.take(pair, axis=0)
+        plane = self._planes.take(face, axis=0)
         height, facing = plane[:, 3] - _dot(plane, point), _dot(plane, inward)
         side = np.where(height < -ON_PLANE, -1.0, 1.0)
         touching, touch = _on_plane(side[:, None] * plane[:, :3], np.abs(height), side * facing, inward)
         # Where the sphere that touches the plane is too large, no part of the face is met by a smaller one.
         kept = np.flatnonzero(touching < radius[pair])
         pair, face, point, inward = pair[kept], face[kept], point[kept], inward[kept]
-        corners = self._corners[face] - point[:, None]
-        found = _smallest(corners, inward, plane[kept, :3], touching[kept], touch[kept])
+        found = touching[kept]
+        outside = np.flatnonzero(~_inside(self._sides.take(face, axis=0), point + touch[kept]))
+        corners = self._corners.take(face[outside], axis=0) - point[outside, None]
+        found[outside] = _smallest(corners, inward[outside])
         np.minimum.at(radius, pair, found)
 
     def first(self, points: Points, directions: Floats, distance: Array, face: npt.NDArray[np.int32]) -> Array:
@@ -157,15 +163,14 @@ class _Boxes:
         along = (corners * np.repeat(normal, size, axis=0)[: len(corners), None]).sum(axis=2)
         low, high = np.minimum.reduceat(corners.min(axis=1), starts), np.maximum.reduceat(corners.max(axis=1), starts)
         offset = np.minimum.reduceat(along.min(axis=1), starts)
-        return cls(
-            *(_in_parents(values, width) for values in (low.T, high.T, normal.T, offset)),
-            order[np.minimum(starts + size // 2, len(order) - 1)],
-        )
+        sample = order[np.minimum(starts + size // 2, len(order) - 1)]
+        wide = [_in_parents(values, width) for values in (low.T, high.T, normal.T, offset)]
+        return cls(wide[0], wide[1], wide[2], wide[3], sample)
 
     @property
     def width(self) -> int:
         """Number of boxes in each one of the level above."""
-        return self.offset.shape[1]
+        return int(self.offset.shape[1])
 
     def met(self, pair: Integers, parent: Integers, points: Points, radius: Array) -> tuple[Integers, Integers]:
         """Pairs of a point and a box that the sphere of `radius` there may meet."""
@@ -240,25 +245,27 @@ def _on_plane(normal: Array, height: Array, facing: Array, inward: Array) -> tup
     return radius, finite[:, None] * np.where(beside[:, None], rim, inward + normal)
 
 
-def _smallest(corners: Array, inward: Array, normal: Array, touching: Array, touch: Array) -> Array:
-    """(n,): radii of the smallest spheres at the origin that touch triangles (n, 3, 3) within the cone; inf where none.
-
-    Those of radii `touching` (n,) touch the planes, at points (n, 3).
+def _smallest(corners: Array, inward: Array) -> Array:
+    """(n,): radii of the smallest spheres at the origin that touch edges of triangles (n, 3, 3) within the cone; inf
+    where none.
     """
-    found = np.where(_inside(corners, normal, touch), touching, np.inf)
-    edges = np.flatnonzero(np.isinf(found))
-    corners, inward = corners[edges], inward[edges]
-    least = np.full(len(edges), np.inf)
+    least = np.full(len(corners), np.inf)
     for i in range(3):
-        least = np.minimum(least, _on_edge(corners[:, i], corners[:, (i + 1) % 3] - corners[:, i], inward))
-    found[edges] = least
-    return found
+        np.minimum(least, _on_edge(corners[:, i], corners[:, (i + 1) % 3] - corners[:, i], inward), out=least)
+    return least
 
 
-def _inside(corners: Array, normal: Array, point: Array) -> Mask:
+def _inside(sides: Array, point: Array) -> Mask:
     """(n,): whether points of the planes of triangles are inside them."""
-    sides = [_dot(np.cross(corners[:, (i + 1) % 3] - corners[:, i], point - corners[:, i]), normal) for i in range(3)]
-    return ((sides[0] >= 0) & (sides[1] >= 0) & (sides[2] >= 0)) | ((sides[0] <= 0) & (sides[1] <= 0) & (sides[2] <= 0))
+    a, b, c = (_dot(sides[:, i], point) > sides[:, i, 3] for i in range(3))
+    return a & b & c
+
+
+def _sides(corners: Array, normals: Array) -> Array:
+    """(m, 3, 4): normals and offsets of the planes through the sides of triangles, which look inwards."""
+    along = np.roll(corners, -1, axis=1) - corners
+    inward = np.cross(normals[:, None], along)
+    return np.concatenate([inward, (inward * corners).sum(axis=2, keepdims=True)], axis=2)
 
 
 def _on_edge(start: Array, along: Array, inward: Array) -> Array:
