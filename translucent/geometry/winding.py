@@ -98,6 +98,11 @@ def part_volumes(
     return volume / 6.0
 
 
+def one_volume(vertices: Array, faces: npt.NDArray[np.integer]) -> float:
+    """Signed volume of a mesh in cubic metres; meaningful for closed ones."""
+    return float(part_volumes(vertices, faces, np.zeros(len(faces), dtype=np.int64), 1)[0])
+
+
 def triple_products(x: Array, y: Array, z: Array) -> Array:
     """(m,): six times the signed volume between the origin and each triangle, of coordinates (3 corners, m)."""
     triple: Array = x[0] * (y[1] * z[2] - z[1] * y[2])
