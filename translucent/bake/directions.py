@@ -29,7 +29,7 @@ DIGITS = 24
 SPHERE_CONE = 0.5 * (math.pi - CREASE)
 
 #: Rays that a first sphere comes from: more take longer than the faces that they spare.
-SPHERE_RAYS = 4
+SPHERE_RAYS = 3
 
 #: Distance, as a share of the radius, within which points have the same set: the same point of two charts, rounded
 #: twice.

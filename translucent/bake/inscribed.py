@@ -30,6 +30,9 @@ from translucent.geometry.bvh import curve_order
 #: Children of a box, and the largest number of boxes at the top of the tree.
 CHILDREN, TOP = 4, 16
 
+#: Level from which a face in each box makes spheres smaller, so that fewer boxes are met on the next one.
+NARROWING = 3
+
 #: Coordinate of boxes that are none, in radii: no sphere meets them.
 FAR = 10.0
 
@@ -86,7 +89,7 @@ class InscribedSpheres:
         if level + 1 == len(self._tree.levels):
             self._touch(points, pair, self._tree.order[node], radius)
             return
-        if level:  # what is within a box makes the sphere smaller, so that fewer boxes are left on the next level
+        if level >= NARROWING:
             self._narrow(points, pair, boxes.sample[node], radius)
         self._descend(points, pair, node, level + 1, radius)
 
