@@ -2,9 +2,11 @@
 
 ``python tools/measure_baking.py [MODEL...]`` measures points a second of the modes ``normal`` and ``inscribed``, beside
 ``trimesh.proximity.thickness`` with ``ray`` and ``max_sphere`` for the same points and normals; default: the bear and
-the knot of the toolkit. Both take one ray for a point, or one sphere; trimesh needs rtree for its spheres. ``--memory``
-bakes a map instead, of 4096 x 4096 texels, writes it and tells the most memory that the process has held; rays are
-traced in strips, so a ``--share`` of the rows takes as much memory as all of them, and less time.
+the knot of the toolkit. Both take one ray for a point, or one sphere; trimesh needs rtree for its spheres. Seconds are
+those of the clock, in as many threads as there are processors, of which trimesh uses one; ``--processor-time`` takes
+one thread and the processor's time, which other work on the machine changes less. ``--memory`` bakes a map instead, of
+4096 x 4096 texels, writes it and tells the most memory that the process has held; rays are traced in strips, so a
+``--share`` of the rows takes as much memory as all of them, and less time.
 """
 
 from __future__ import annotations
@@ -48,14 +50,14 @@ def sampled(surface: Surface, count: int) -> tuple[npt.NDArray[np.int64], Array]
     return face, 0.02 + 0.94 * rng.dirichlet([1, 1, 1], count)
 
 
-def seconds(call: Callable[[], object]) -> float:
-    """Seconds that a call takes."""
-    begin = time.perf_counter()
+def seconds(call: Callable[[], object], clock: Callable[[], float] = time.perf_counter) -> float:
+    """Seconds that a call takes, by a clock."""
+    begin = clock()
     call()
-    return time.perf_counter() - begin
+    return clock() - begin
 
 
-def compare(mesh: tl.Mesh, mode: str, rounds: int) -> str:
+def compare(mesh: tl.Mesh, mode: str, rounds: int, processor_time: bool) -> str:
     """One line of the table."""
     smooth = Surface.of(mesh)
     # trimesh has the normals of the faces.
@@ -66,7 +68,8 @@ def compare(mesh: tl.Mesh, mode: str, rounds: int) -> str:
     normals = surface.planes[face, :3]
     peer = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     points = surface.points(face, weights)
-    threads = processors()
+    threads = 1 if processor_time else processors()
+    spent = partial(seconds, clock=time.process_time if processor_time else time.perf_counter)
 
     def ours(count: int) -> object:
         return in_threads(measure.at, [points[begin:count:threads] for begin in range(threads)], threads)
@@ -78,12 +81,11 @@ def compare(mesh: tl.Mesh, mode: str, rounds: int) -> str:
     calls = ours, theirs
     for call in calls:
         call(FEWEST)  # what it prepares once
-    counts = [int(np.clip(FEWEST * SECONDS / seconds(partial(call, FEWEST)), FEWEST, MOST)) for call in calls]
+    counts = [int(np.clip(FEWEST * SECONDS / spent(partial(call, FEWEST)), FEWEST, MOST)) for call in calls]
     counts = [
-        int(np.clip(n * SECONDS / seconds(partial(call, n)), FEWEST, MOST))
-        for call, n in zip(calls, counts, strict=True)
+        int(np.clip(n * SECONDS / spent(partial(call, n)), FEWEST, MOST)) for call, n in zip(calls, counts, strict=True)
     ]
-    pairs = [[n / seconds(partial(call, n)) for call, n in zip(calls, counts, strict=True)] for _ in range(rounds)]
+    pairs = [[n / spent(partial(call, n)) for call, n in zip(calls, counts, strict=True)] for _ in range(rounds)]
     own, other = np.array(pairs).T
     return (
         f"{mesh.name:20} {len(mesh.faces):7} triangles  {mode:9} {np.median(own) / 1e3:9.1f} k points/s, trimesh "
@@ -112,7 +114,8 @@ def most_memory(mesh: tl.Mesh, rays: int, share: float) -> str:
 @click.option("--rays", default=64, show_default=True, help="With --memory: from each texel.")
 @click.option("--share", default=1.0, show_default=True, help="With --memory: of the rows that the mesh fills.")
 @click.option("--rounds", default=5, show_default=True, help="Of each; medians are printed.")
-def main(models: tuple[Path, ...], memory: bool, rays: int, rounds: int, share: float) -> None:
+@click.option("--processor-time", is_flag=True, help="Of one thread, in place of the clock's.")
+def main(models: tuple[Path, ...], memory: bool, rays: int, rounds: int, share: float, processor_time: bool) -> None:
     """Time for a point beside trimesh, or memory of a large map."""
     meshes = [tl.load_mesh(path) for path in models or (mesh_path("bear"), mesh_path("knot"))]
     if memory:
@@ -120,7 +123,7 @@ def main(models: tuple[Path, ...], memory: bool, rays: int, rounds: int, share: 
         return
     for mesh in meshes:
         for mode in THEIRS:
-            click.echo(compare(mesh, mode, rounds))
+            click.echo(compare(mesh, mode, rounds, processor_time))
 
 
 if __name__ == "__main__":

@@ -159,7 +159,7 @@ def _report(unwrapped: Unwrapped, strips: Strips, canvas: Canvas, traced: int, s
     degenerate = len(unwrapped.mesh.faces) - len(strips.low.faces)
     said = list(unwrapped.warnings)
     source = unwrapped.mesh if strips.projection is None else None
-    said += escape_warnings(escaped, source is None or source.diagnosis.closed)
+    said += escape_warnings(escaped, escaped == 0 or source is None or source.diagnosis.closed)
     if overlapping := canvas.count("overlapping"):
         said.append(f"{overlapping} texels lie in several triangles in UV; the first triangle has them")
     hidden = ~canvas.owners[strips.shown]

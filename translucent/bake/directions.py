@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +29,7 @@ DIGITS = 24
 SPHERE_CONE = 0.5 * (math.pi - CREASE)
 
 #: Rays that a first sphere comes from: more take longer than the faces that they spare.
-SPHERE_RAYS = 8
+SPHERE_RAYS = 3
 
 #: Distance, as a share of the radius, within which points have the same set: the same point of two charts, rounded
 #: twice.
@@ -87,6 +88,7 @@ class Directions:
         return world
 
 
+@lru_cache(maxsize=1)  # a batch asks for the same ones again and again
 def _sobol(count: int, sets: int, seed: int) -> Array:
     """(sets, count, 2): the first points of the Sobol sequence in 0..1, scrambled independently (Owen 1995).
 
@@ -109,7 +111,9 @@ def _sobol(count: int, sets: int, seed: int) -> Array:
         own = (digits >> np.uint64(DIGITS - 1 - digit)) & np.uint64(1)
         turned = _mix(coins ^ prefix) >> np.uint64(63)
         scrambled = (scrambled << np.uint64(1)) | (own ^ turned)
-    return np.asarray((scrambled + 0.5) / 2.0**DIGITS)
+    found = np.asarray((scrambled + 0.5) / 2.0**DIGITS)
+    found.setflags(write=False)
+    return found
 
 
 def _in_cone(points: Array, half_angle: float, weighting: str) -> Floats:

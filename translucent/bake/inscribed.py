@@ -30,6 +30,12 @@ from translucent.geometry.bvh import curve_order
 #: Children of a box, and the largest number of boxes at the top of the tree.
 CHILDREN, TOP = 4, 16
 
+#: Level from which a face in each box makes spheres smaller, so that fewer boxes are met on the next one.
+NARROWING = 3
+
+#: Coordinate of boxes that are none, in radii: no sphere meets them.
+FAR = 10.0
+
 #: Largest number of pairs of a point and a box that are looked at at a time.
 MOST_PAIRS = 1 << 16
 
@@ -59,6 +65,7 @@ class InscribedSpheres:
     def __init__(self, surface: Surface) -> None:
         self._planes = surface.planes
         self._corners = surface.corners
+        self._sides = _sides(surface.corners, surface.planes[:, :3])
         self._middles = surface.corners.mean(axis=1)
         self._tree = _Tree.of(surface)
         self._slack = LARGE_SLACK if len(surface.corners) > LARGE else 0.0
@@ -66,51 +73,53 @@ class InscribedSpheres:
     def diameters(self, points: Points, radius: Array) -> Array:
         """(k,): diameters in radii of the mesh; no sphere is larger than with `radius` (k,), its first one."""
         radius = radius.copy()
-        count = self._tree.levels[0].count
-        pair, node = np.repeat(np.arange(len(points)), count), np.tile(np.arange(count), len(points))
-        self._descend(points, pair, node, 0, radius)
+        self._descend(points, np.arange(len(points)), np.zeros(len(points), dtype=np.int64), 0, radius)
         return 2.0 * radius
 
-    def _descend(self, points: Points, pair: Integers, node: Integers, level: int, radius: Array) -> None:
-        """Make spheres as small as the faces in boxes of a level allow, in pairs."""
-        if len(pair) > MOST_PAIRS:
-            for begin in range(0, len(pair), MOST_PAIRS):
-                part = slice(begin, begin + MOST_PAIRS)
-                self._descend(points, pair[part], node[part], level, radius)
-            return
+    def _descend(self, points: Points, pair: Integers, parent: Integers, level: int, radius: Array) -> None:
+        """Make spheres as small as the faces in boxes of a level allow, in pairs of a point and what these are in."""
         boxes = self._tree.levels[level]
-        pair, node = boxes.met(pair, node, points, (1.0 - self._slack) * radius)
+        most = MOST_PAIRS // boxes.width
+        if len(pair) > most:
+            for begin in range(0, len(pair), most):
+                part = slice(begin, begin + most)
+                self._descend(points, pair[part], parent[part], level, radius)
+            return
+        pair, node = boxes.met(pair, parent, points, (1.0 - self._slack) * radius)
         if level + 1 == len(self._tree.levels):
             self._touch(points, pair, self._tree.order[node], radius)
             return
-        if level:  # what is within a box makes the sphere smaller, so that fewer boxes are left on the next level
+        if level >= NARROWING:
             self._narrow(points, pair, boxes.sample[node], radius)
-        node = (node[:, None] * CHILDREN + np.arange(CHILDREN)).ravel()
-        there = np.flatnonzero(node < self._tree.levels[level + 1].count)
-        self._descend(points, np.repeat(pair, CHILDREN)[there], node[there], level + 1, radius)
+        self._descend(points, pair, node, level + 1, radius)
 
     def _narrow(self, points: Points, pair: Integers, face: Integers, radius: Array) -> None:
         """Make spheres as small as the middles of faces that count allow, in pairs."""
-        inward = -points.normal[pair]
-        away = self._middles[face] - points.start[pair]
-        along, square = _dot(away, inward), _dot(away, away)
-        counts = (along * along > _CONE * _CONE * square) & (along > 0) & (face != points.face[pair])
-        np.minimum.at(radius, pair[counts], (1.0 + LOOSE) * 0.5 * square[counts] / along[counts])
+        away = self._middles.take(face, axis=0)
+        away -= points.start.take(pair, axis=0)
+        along = -_dot(away, points.normal.take(pair, axis=0))
+        square = _dot(away, away)
+        counts = np.flatnonzero(
+            (along * along > _CONE * _CONE * square) & (along > 0) & (face != points.face.take(pair))
+        )
+        np.minimum.at(radius, pair.take(counts), (0.5 * (1.0 + LOOSE)) * square.take(counts) / along.take(counts))
 
     def _touch(self, points: Points, pair: Integers, face: Integers, radius: Array) -> None:
         """Make spheres as small as faces allow, in pairs."""
-        other = face != points.face[pair]
+        other = face != points.face.take(pair)
         pair, face = pair[other], face[other]
-        point, inward = points.start[pair], -points.normal[pair]
-        plane = self._planes[face]
+        point, inward = points.start.take(pair, axis=0), -points.normal.take(pair, axis=0)
+        plane = self._planes.take(face, axis=0)
         height, facing = plane[:, 3] - _dot(plane, point), _dot(plane, inward)
         side = np.where(height < -ON_PLANE, -1.0, 1.0)
         touching, touch = _on_plane(side[:, None] * plane[:, :3], np.abs(height), side * facing, inward)
         # Where the sphere that touches the plane is too large, no part of the face is met by a smaller one.
         kept = np.flatnonzero(touching < radius[pair])
         pair, face, point, inward = pair[kept], face[kept], point[kept], inward[kept]
-        corners = self._corners[face] - point[:, None]
-        found = _smallest(corners, inward, plane[kept, :3], touching[kept], touch[kept])
+        found = touching[kept]
+        outside = np.flatnonzero(~_inside(self._sides.take(face, axis=0), point + touch[kept]))
+        corners = self._corners.take(face[outside], axis=0) - point[outside, None]
+        found[outside] = _smallest(corners, inward[outside])
         np.minimum.at(radius, pair, found)
 
     def first(self, points: Points, directions: Floats, distance: Array, face: npt.NDArray[np.int32]) -> Array:
@@ -131,10 +140,11 @@ class _Boxes:
 
     Attributes
     ----------
-    low, high : (3, n) float64
-    normal : (3, n) float64
+    low, high : (3, parents, width) float64
+        Those of the last parent that are none are far away.
+    normal : (3, parents, width) float64
         About that of the faces.
-    offset : (n,) float64
+    offset : (parents, width) float64
         Least normal . x in a box.
     sample : (n,) int64
         A face in each.
@@ -147,40 +157,47 @@ class _Boxes:
     sample: Integers
 
     @classmethod
-    def of(cls, corners: Array, normals: Array, order: Integers, size: int) -> _Boxes:
+    def of(cls, corners: Array, normals: Array, order: Integers, size: int, width: int) -> _Boxes:
         """Boxes of `size` faces each; corners (m, 3, 3) and normals (m, 3) are in this order of the faces."""
         starts = np.arange(0, len(corners), size)
         normal = np.add.reduceat(normals, starts)
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         normal = normal / np.where(length > 0, length, 1.0)
         along = (corners * np.repeat(normal, size, axis=0)[: len(corners), None]).sum(axis=2)
-        return cls(
-            np.ascontiguousarray(np.minimum.reduceat(corners.min(axis=1), starts).T),
-            np.ascontiguousarray(np.maximum.reduceat(corners.max(axis=1), starts).T),
-            np.ascontiguousarray(normal.T),
-            np.minimum.reduceat(along.min(axis=1), starts),
-            order[np.minimum(starts + size // 2, len(order) - 1)],
-        )
+        low, high = np.minimum.reduceat(corners.min(axis=1), starts), np.maximum.reduceat(corners.max(axis=1), starts)
+        offset = np.minimum.reduceat(along.min(axis=1), starts)
+        sample = order[np.minimum(starts + size // 2, len(order) - 1)]
+        wide = [_in_parents(values, width) for values in (low.T, high.T, normal.T, offset)]
+        return cls(wide[0], wide[1], wide[2], wide[3], sample)
 
     @property
-    def count(self) -> int:
-        """Number of boxes."""
-        return len(self.offset)
+    def width(self) -> int:
+        """Number of boxes in each one of the level above."""
+        return int(self.offset.shape[1])
 
-    def met(self, pair: Integers, node: Integers, points: Points, radius: Array) -> tuple[Integers, Integers]:
+    def met(self, pair: Integers, parent: Integers, points: Points, radius: Array) -> tuple[Integers, Integers]:
         """Pairs of a point and a box that the sphere of `radius` there may meet."""
-        center = np.ascontiguousarray((points.start - radius[:, None] * points.normal).T)
-        reach = radius.take(pair)
-        away, across = np.zeros(len(node)), -self.offset.take(node)
+        start, normal, reach = points.start.take(pair, axis=0), points.normal.take(pair, axis=0), radius.take(pair)
+        reach = reach[:, None]
+        center = start - reach * normal
+        away, across = np.zeros((len(pair), self.width)), self.offset.take(parent, axis=0)
         for axis in range(3):
-            here = center[axis].take(pair)
-            across += here * self.normal[axis].take(node)
-            beside = np.maximum(self.low[axis].take(node) - here, here - self.high[axis].take(node))
+            here = center[:, axis, None]
+            across -= here * self.normal[axis].take(parent, axis=0)
+            beside = np.maximum(self.low[axis].take(parent, axis=0) - here, here - self.high[axis].take(parent, axis=0))
             np.maximum(beside, 0.0, out=beside)
             beside *= beside
             away += beside
-        near = np.flatnonzero((away < reach * reach) & (across > -reach))
-        return pair[near], node[near]
+        near = np.flatnonzero((away < reach * reach) & (across < reach))
+        row = near // self.width
+        return pair[row], parent[row] * self.width + near % self.width
+
+
+def _in_parents(values: Array, width: int) -> Array:
+    """(..., parents, width) of values (..., n)."""
+    missing = -values.shape[-1] % width
+    filled = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, missing)], constant_values=FAR)
+    return np.ascontiguousarray(filled.reshape(*values.shape[:-1], -1, width))
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +224,9 @@ class _Tree:
         sizes = [1]
         while -(-len(order) // sizes[-1]) > TOP:
             sizes.append(sizes[-1] * CHILDREN)
-        return cls(order, tuple(_Boxes.of(corners, normals, order, size) for size in reversed(sizes)))
+        widths = [CHILDREN] * (len(sizes) - 1) + [-(-len(order) // sizes[-1])]
+        levels = [_Boxes.of(corners, normals, order, *shape) for shape in zip(sizes, widths, strict=True)]
+        return cls(order, tuple(reversed(levels)))
 
 
 def _on_plane(normal: Array, height: Array, facing: Array, inward: Array) -> tuple[Array, Array]:
@@ -229,25 +248,27 @@ def _on_plane(normal: Array, height: Array, facing: Array, inward: Array) -> tup
     return radius, finite[:, None] * np.where(beside[:, None], rim, inward + normal)
 
 
-def _smallest(corners: Array, inward: Array, normal: Array, touching: Array, touch: Array) -> Array:
-    """(n,): radii of the smallest spheres at the origin that touch triangles (n, 3, 3) within the cone; inf where none.
-
-    Those of radii `touching` (n,) touch the planes, at points (n, 3).
+def _smallest(corners: Array, inward: Array) -> Array:
+    """(n,): radii of the smallest spheres at the origin that touch edges of triangles (n, 3, 3) within the cone; inf
+    where none.
     """
-    found = np.where(_inside(corners, normal, touch), touching, np.inf)
-    edges = np.flatnonzero(np.isinf(found))
-    corners, inward = corners[edges], inward[edges]
-    least = np.full(len(edges), np.inf)
+    least = np.full(len(corners), np.inf)
     for i in range(3):
-        least = np.minimum(least, _on_edge(corners[:, i], corners[:, (i + 1) % 3] - corners[:, i], inward))
-    found[edges] = least
-    return found
+        np.minimum(least, _on_edge(corners[:, i], corners[:, (i + 1) % 3] - corners[:, i], inward), out=least)
+    return least
 
 
-def _inside(corners: Array, normal: Array, point: Array) -> Mask:
+def _inside(sides: Array, point: Array) -> Mask:
     """(n,): whether points of the planes of triangles are inside them."""
-    sides = [_dot(np.cross(corners[:, (i + 1) % 3] - corners[:, i], point - corners[:, i]), normal) for i in range(3)]
-    return ((sides[0] >= 0) & (sides[1] >= 0) & (sides[2] >= 0)) | ((sides[0] <= 0) & (sides[1] <= 0) & (sides[2] <= 0))
+    a, b, c = (_dot(sides[:, i], point) > sides[:, i, 3] for i in range(3))
+    return a & b & c
+
+
+def _sides(corners: Array, normals: Array) -> Array:
+    """(m, 3, 4): normals and offsets of the planes through the sides of triangles, which look inwards."""
+    along = np.roll(corners, -1, axis=1) - corners
+    inward = np.cross(normals[:, None], along)
+    return np.concatenate([inward, (inward * corners).sum(axis=2, keepdims=True)], axis=2)
 
 
 def _on_edge(start: Array, along: Array, inward: Array) -> Array:

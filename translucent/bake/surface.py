@@ -11,6 +11,7 @@ from translucent.errors import InputError
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import smooth_normals
+from translucent.geometry.winding import one_volume
 
 #: Smallest distance of a ray's start from the edges of its triangle, as a share of its height: a ray that runs down an
 #: adjacent wall would otherwise run in it.
@@ -85,7 +86,8 @@ class Surface:
             If embreex cannot be imported.
         """
         mesh.require_finite()
-        if mesh.diagnosis.inverted:
+        # All faces of a mesh without a negative volume cannot look inwards, and to examine it takes longer.
+        if one_volume(mesh.vertices, mesh.faces) < 0 and mesh.diagnosis.inverted:
             raise InputError(
                 f"mesh {mesh.name!r}", "all its faces look inwards", "turn it (tl.load_mesh does), or export it again"
             )

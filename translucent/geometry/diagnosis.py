@@ -16,7 +16,7 @@ from translucent.arrays import Array, Mask
 from translucent.geometry.grouping import CHUNK, SortedSides, connected, equal_rows, extent, sorted_sides, use_mask
 from translucent.geometry.repair import spread_winding
 from translucent.geometry.sample_lines import winds_negatively
-from translucent.geometry.winding import inside_out_parts, part_volumes
+from translucent.geometry.winding import inside_out_parts, one_volume
 
 #: Deepest dent of a convex body, as a share of its size.
 CONVEX_TOLERANCE = 1e-6
@@ -154,7 +154,7 @@ def diagnose(vertices: Array, faces: npt.NDArray[np.int32], one_closed_part: boo
     filled = vertices if finite.all() else np.where(finite[:, None], vertices, 0.0)
     shared = faces if one_closed_part else _at_positions(vertices, faces)
     edges = None if one_closed_part else _Edges(shared)
-    volume = float(part_volumes(filled, faces, np.zeros(len(faces), dtype=np.int64), 1)[0])
+    volume = one_volume(filled, faces)
     none = Finding(0)
     open_edges = none if edges is None else edges.found(edges.sizes % 2 == 1)
     mixed_edges = none if edges is None else edges.found((edges.sizes % 2 == 0) & (edges.net != 0))

@@ -93,11 +93,22 @@ def part_volumes(
             a, b, c = x.take(corners), y.take(corners), z.take(corners)
             if count > 1:
                 a, b, c = a - origins[of, 0], b - origins[of, 1], c - origins[of, 2]
-            triple = a[0] * (b[1] * c[2] - c[1] * b[2])
-            triple += b[0] * (c[1] * a[2] - a[1] * c[2])
-            triple += c[0] * (a[1] * b[2] - b[1] * a[2])
+            triple = triple_products(a, b, c)
             volume += np.bincount(of, weights=triple, minlength=count) if count > 1 else triple.sum()
     return volume / 6.0
+
+
+def one_volume(vertices: Array, faces: npt.NDArray[np.integer]) -> float:
+    """Signed volume of a mesh in cubic metres; meaningful for closed ones."""
+    return float(part_volumes(vertices, faces, np.zeros(len(faces), dtype=np.int64), 1)[0])
+
+
+def triple_products(x: Array, y: Array, z: Array) -> Array:
+    """(m,): six times the signed volume between the origin and each triangle, of coordinates (3 corners, m)."""
+    triple: Array = x[0] * (y[1] * z[2] - z[1] * y[2])
+    triple += y[0] * (z[1] * x[2] - x[1] * z[2])
+    triple += z[0] * (x[1] * y[2] - y[1] * x[2])
+    return triple
 
 
 def _is_cavity(corners: Array, part: npt.NDArray[np.signedinteger[Any]], low: Array, high: Array, p: int) -> bool:

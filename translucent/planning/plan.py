@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from translucent.errors import InputError
+from translucent.geometry.together import diagnose_together
 from translucent.media.given_back import DiffusedVolume
 from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
@@ -73,6 +74,7 @@ def plan(
     check_scene(scene)
     check_caustics(caustics)
     check_shadows(shadows)
+    diagnose_together(body.mesh for body in scene.bodies if body.sheet_thickness is None)
     chosen = _plan(scene, method, capabilities, interfaces, scattering, caustics)
     if caustics is not None:
         chosen = with_caustics(chosen, scene, caustics, method, capabilities or Capabilities())

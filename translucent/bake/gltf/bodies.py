@@ -72,6 +72,7 @@ class Bodies:
 
     def __init__(self, file: GltfFile, metres: float) -> None:
         self._file, self._metres = file, metres
+        self._triangles = tuple(triangle_primitives(file))
         self._outlines: dict[PrimitiveKey, Mesh] = {}
         self._joined: dict[int, tuple[Mesh, dict[PrimitiveKey, int]] | None] = {}
 
@@ -87,6 +88,8 @@ class Bodies:
 
     def joined(self, key: PrimitiveKey) -> tuple[Mesh, int] | None:
         """Body `around` an open primitive, and where its faces begin there; None of what stands alone."""
+        if len(self._primitives(key[0])) == 1:  # the usual mesh, which need not be read and examined for that
+            return None
         if self._outline(key).diagnosis.closed or (joined := self._join(key[0])) is None:
             return None
         return joined[0], joined[1][key]
@@ -107,11 +110,13 @@ class Bodies:
                 self._outlines[key] = read_primitive(self._file, key, self._metres)
         return self._outlines[key]
 
+    def _primitives(self, index: int) -> list[PrimitiveKey]:
+        return [key for key in self._triangles if key[0] == index]
+
     def _join(self, index: int) -> tuple[Mesh, dict[PrimitiveKey, int]] | None:
         """All open primitives of a mesh as one, and where the faces of each begin; None if that closes no edge."""
         if index not in self._joined:
-            keys = [key for key in triangle_primitives(self._file) if key[0] == index]
-            parts = {key: self._outline(key) for key in keys}
+            parts = {key: self._outline(key) for key in self._primitives(index)}
             parts = {key: part for key, part in parts.items() if not part.diagnosis.closed}
             self._joined[index] = None
             if len(parts) > 1:
