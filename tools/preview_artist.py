@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from preview_hand import Artist, Waiting, require
 import translucent as tl
 from translucent.preview.orbiting import camera_of
 from translucent.preview.panels.viewport import on_screen, probe_lines
-from translucent.preview.picturing import ball_key, model_key
+from translucent.preview.picturing import ball_key, model_key, panorama_key
 
 
 def open_model(a: Artist, name: str) -> Waiting:
@@ -219,6 +220,32 @@ def turn_environment(a: Artist) -> Waiting:
     yield from a.until(lambda: a.document.look.rotation != before, "it turns")
 
 
+def many_environments(a: Artist) -> Waiting:
+    names = [f"sky{i:03d}.hdr" for i in range(500)]
+    folder = a.folder / "skies"
+    folder.mkdir(exist_ok=True)
+    for name in names:
+        shutil.copy(a.folder / "sky.hdr", folder / name)
+    yield from a.panel("Environments")
+    yield from a.click("##folder", "Environments")
+    yield from a.enter(str(folder))
+    yield from a.until(lambda: len(a.desk.environments.files()) == len(names), "all are listed")
+
+    def seen() -> list[str]:
+        found = {path: a.places.find(f"##card{path}") for path in a.desk.environments.files()}
+        return [path for path, place in found.items() if place]
+
+    def pictured() -> bool:
+        return bool(shown := seen()) and all(panorama_key(path) in a.desk._textures for path in shown)
+
+    yield from a.hand.move(a.at("##card", "Environments").middle)
+    for _ in range(20):
+        yield from a.hand.wheel(-10)
+    yield from a.until(lambda: seen() and names[50] < Path(seen()[0]).name, "the wheel scrolls")
+    yield from a.until(pictured, "those in view have pictures")
+    require(len(a.desk._textures) < len(names), "no others were made")
+
+
 def load_hdr(a: Artist) -> Waiting:
     yield from a.panel("Environments")
     yield from a.click("Open ...", "Environments")
@@ -283,6 +310,7 @@ TASKS: dict[str, Callable[[Artist], Waiting]] = {
     "hide and show": hide_and_show,
     "save .glb": save_glb,
     "turn environment": turn_environment,
+    "500 environments": many_environments,
     "load .hdr": load_hdr,
     "find a key": find_key,
     "copy for blender": copy_blender,

@@ -16,8 +16,8 @@ uniform sampler2D trust_b;
 uniform sampler2D false_colors;
 uniform int shift_a;         // the stride as a power of 2
 uniform int shift_b;
-uniform int known_a[64];     // which of the smaller frames stands in for each one: column + stride * row
-uniform int known_b[64];
+uniform ivec4 known_a[64];   // which of the smaller frames stands in for each one: column + stride * row, in fours
+uniform ivec4 known_b[64];
 uniform float split;         // pixels from the left
 uniform float thickest;      // thickness of the last false color, in m
 uniform float worst;         // largest difference of thickness with a color of its own, in m
@@ -77,13 +77,15 @@ int within(ivec2 pixel, int shift) {
 void main() {
     ivec2 size = textureSize(light_a, 0);
     ivec2 pixel = ivec2(gl_FragCoord.x, float(size.y) - gl_FragCoord.y);
-    ivec2 here = kept(pixel, size, shift_a, known_a[within(pixel, shift_a)]);
+    int phase = within(pixel, shift_a);
+    ivec2 here = kept(pixel, size, shift_a, known_a[phase >> 2][phase & 3]);
     vec4 depths = texelFetch(depths_a, here, 0), trust = texelFetch(trust_a, here, 0);
 #if RIGHT != 0
     if (gl_FragCoord.x > split) {
         ivec2 other_size = textureSize(light_b, 0);
         ivec2 there = ivec2((vec2(pixel) + 0.5) / vec2(size) * vec2(other_size));
-        there = kept(there, other_size, shift_b, known_b[within(there, shift_b)]);
+        int other_phase = within(there, shift_b);
+        there = kept(there, other_size, shift_b, known_b[other_phase >> 2][other_phase & 3]);
         vec4 other = texelFetch(depths_b, there, 0), other_trust = texelFetch(trust_b, there, 0);
 #if RIGHT == 2
         encoded = vec4(difference(depths, trust, other, other_trust), 1.0);

@@ -113,6 +113,17 @@ assert not found, found
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_the_window_opens_without_scipy_and_the_reference() -> None:
+    code = """
+import sys
+import translucent.preview.app
+found = {"scipy", "trimesh", "translucent.reference", "translucent.diffusion.cache"} & set(sys.modules)
+assert not found, found
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="module 'translucent' has no attribute 'Rendrer'"):
         _ = tl.Rendrer

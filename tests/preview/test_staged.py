@@ -15,8 +15,7 @@ from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.cli import main
 from translucent.gpu.ledger import PostponedError
 from translucent.gpu.passes import shadow_maps
-from translucent.preview import preferences
-from translucent.preview import stage as stages
+from translucent.preview import preferences, timing
 from translucent.preview.actions import Change, ChoosePreset, Turn
 from translucent.preview.document import AUTO, Document, Look, Model
 from translucent.preview.orbiting import framed, orbit_of
@@ -116,7 +115,7 @@ def test_auto_is_what_render_takes(staged: Workspace) -> None:
 
 
 def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stages, "STRIDES", (1, 1))  # parts of a picture see the ground's texture more blurred
+    monkeypatch.setattr(timing, "STRIDES", (1, 1, 1))  # parts of a picture see the ground's texture more blurred
     stage = Stage()
     staged.do(Change("display.antialias", False))
     finish(stage, staged)

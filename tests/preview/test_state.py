@@ -12,7 +12,6 @@ import pytest
 import translucent as tl
 from translucent.cli import main
 from translucent.geometry.solids import Box
-from translucent.gpu.strides import STRIDES
 from translucent.planning.plan import plan
 from translucent.preview import numbers, orbiting
 from translucent.preview.actions import Change, ChoosePreset, Open, Pan, SetOrbit, Turn, Zoom, apply
@@ -265,7 +264,8 @@ def test_what_nobody_has_timed_yet_is_drawn_coarsely_and_traced_rays_most_of_all
     for name, ior in (("clear", 1.0), ("glass", 1.5)):
         scene = showcase(Box().tessellate(), tl.Medium(5.0, ior=ior), stage="none")
         pace, found = Pace(), plan(scene)
-        factors[name] = [pace.factor(found, STRIDES, 0.045)]
-        pace.note(found, 0.01)
-        factors[name].append(pace.factor(found, STRIDES, 0.045))
-    assert factors == {"clear": [4, 1], "glass": [8, 1]}
+        factors[name] = [pace.stride(found, 0.045)]
+        for seconds in (5.0, 4.0, 0.01):  # steps of 8 x 8 take 78 ms, 62 ms
+            pace.note(found, seconds)
+            factors[name].append(pace.stride(found, 0.045))
+    assert factors == {"clear": [4, 16, 8, 1], "glass": [8, 16, 8, 1]}

@@ -12,8 +12,9 @@ import pytest
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere
 from translucent.media.medium import Medium
+from translucent.planning.limits import SHEET_ON_OPAQUE
 from translucent.planning.methods import ThinLayer
-from translucent.reference import SHEET_ON_OPAQUE, hit_counts, render
+from translucent.reference import hit_counts, render
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.diffusion.cache import diffusion_key
 from translucent.diffusion.field import DiffusingBody, lit_body
+from translucent.diffusion.keys import diffusion_key
 from translucent.diffusion.volume import _mean_shares
 from translucent.formulas.lights import ALL_AROUND, cone_attenuation, light_cone
 from translucent.geometry.solids import Box, Sphere

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from threading import Lock
 from typing import TypeVar
 
-import numpy as np
-import numpy.typing as npt
-
-from translucent.diffusion.dimming import may_dim
 from translucent.diffusion.entering import opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
+from translucent.diffusion.keys import (
+    coefficients_of,
+    diffusion_key,
+    marked_media,
+    media_lit_by_photons,
+    place_of,
+    roughness_of,
+)
 from translucent.diffusion.photon_fluence import EnteringPhotons, FineCells, bent_light
 from translucent.diffusion.volume import DiffusingVolume, PhotonLight, VolumeField, VolumeGrid
 from translucent.geometry.embree import EmbreeMesh
 from translucent.media.given_back import DiffusedMedium, DiffusedVolume
 from translucent.media.medium import Medium
-from translucent.planning.caustic_plan import lit_by_photons, opaque_to_shadows
+from translucent.planning.caustic_plan import opaque_to_shadows
 from translucent.planning.caustics import Caustics
 from translucent.planning.scattering import Diffusion
 from translucent.scene.scene import Object, Scene
@@ -68,14 +72,14 @@ class FieldCache:
 
         With `caustics`, photons carry what interfaces of other bodies bend into them.
         """
-        if not _marked(scene):
+        if not marked_media(scene):
             return NO_FIELDS
         key = diffusion_key(scene, diffusion, caustics)
         if (known := self._scenes.get(key)) is not None:
             return known  # nobody waits for other light that a thread looks for
 
         def make() -> Fields:
-            places = tuple(_place(item) for item in scene.opaque)
+            places = tuple(place_of(item) for item in scene.opaque)
             opaque = _kept(self._opaque, places, lambda: opaque_surfaces(scene.opaque), 1)
             surfaces, volumes = {}, {}
             bent = self._bent(scene, diffusion, caustics)
@@ -111,14 +115,14 @@ class FieldCache:
     def _body(
         self, body: Object, medium: Medium, places: Hashable, opaque: EmbreeMesh | None, diffusion: Diffusion
     ) -> DiffusingBody:
-        step, roughness = diffusion.cell_size(body), _roughness(body)
-        place = _place(body), body.density, places, step
+        step, roughness = diffusion.cell_size(body), roughness_of(body)
+        place = place_of(body), body.density, places, step
         lit = _kept(self._bodies, place, lambda: lit_body(body, opaque, step), KEPT_BODIES)
         key = (place, medium, roughness)
         return _kept(self._diffusing, key, lambda: DiffusingBody(lit, medium, roughness), KEPT_BODIES)
 
     def _volume(self, body: Object, medium: Medium, diffusion: Diffusion) -> DiffusingVolume:
-        grid, key = self._grid(body, diffusion), (_density_place(body, diffusion), _coefficients(medium))
+        grid, key = self._grid(body, diffusion), (_density_place(body, diffusion), coefficients_of(medium))
         return _kept(self._volumes, key, lambda: DiffusingVolume(grid, medium), KEPT_BODIES)
 
     def _grid(self, body: Object, diffusion: Diffusion) -> VolumeGrid:
@@ -127,7 +131,7 @@ class FieldCache:
 
     def _bent(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None) -> _Bent:
         """Light that photons carry into bodies."""
-        if caustics is None or not (lit := _lit(scene)):
+        if caustics is None or not (lit := media_lit_by_photons(scene)):
             return _Bent({}, {}, {})
         fogs = [i for i in lit if isinstance(scene.objects[i].medium, DiffusedVolume)]
         grids = {i: self._grid(scene.objects[i], diffusion).grid for i in fogs}
@@ -147,76 +151,6 @@ class _Bent:
     stops: dict[int, EmbreeMesh | None]
 
 
-def _lit(scene: Scene) -> tuple[int, ...]:
-    """Numbers of the bodies into which photons carry light."""
-    return lit_by_photons(scene, sorted(_marked(scene)))
-
-
-def diffusion_key(scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> Hashable:
-    """Everything that the diffused light of a scene depends on; the camera is no part of it."""
-    followed = caustics is not None and _lit(scene)
-    bending = (caustics.in_media, caustics.seed, _bending(scene)) if caustics is not None and followed else ()
-    bodies = tuple(
-        (
-            i,
-            type(scene.objects[i].medium),
-            _place(body := scene.objects[i]),
-            body.density,
-            _coefficients(medium),
-            _roughness(body),
-        )
-        for i, medium in _marked(scene).items()
-    )
-    opaque = tuple(_place(item) for item in scene.opaque)
-    around = scene.environment  # what is seen behind everything lights nothing
-    lighting = (
-        around.kind,
-        around.first.tobytes(),
-        around.second.tobytes(),
-        around.map,
-        around.rotation,
-        around.exposure,
-    )
-    lights = tuple((type(light), *map(_bytes, astuple(light))) for light in scene.lights)
-    dimming = tuple(
-        (i, _place(item), np.asarray(item.medium.extinction).tobytes(), np.asarray(item.medium.absorption).tobytes())
-        for i, item in enumerate(scene.objects)
-        if item.medium is not None and may_dim(item)
-    )
-    return (diffusion, bodies, opaque, lighting, lights, dimming, bending)
-
-
-def _bending(scene: Scene) -> Hashable:
-    """Everything that the ways of photons depend on beside the lights."""
-    objects = tuple(
-        (
-            _place(item),
-            item.priority,
-            item.sheet_thickness,
-            item.surface,
-            item.medium,
-        )
-        for item in scene.objects
-    )
-    return scene.overlap, objects
-
-
-def _bytes(value: npt.ArrayLike) -> bytes:
-    return np.asarray(value, np.float64).tobytes()
-
-
-def _marked(scene: Scene) -> dict[int, Medium]:
-    return {
-        i: body.medium.original if isinstance(body.medium, DiffusedMedium) else body.medium
-        for i, body in enumerate(scene.objects)
-        if isinstance(body.medium, DiffusedMedium | DiffusedVolume)
-    }
-
-
-def _coefficients(medium: Medium) -> Hashable:
-    return tuple(map(_bytes, astuple(medium)))
-
-
 def _kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T], most: int) -> _T:
     """Entry of a store, made if it is missing; beyond `most`, that which was used longest ago is dropped."""
     if key not in store:
@@ -227,13 +161,5 @@ def _kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T
     return store[key]
 
 
-def _place(item: Object) -> tuple[object, bytes]:
-    return item.mesh, item.matrix.tobytes()
-
-
 def _density_place(body: Object, diffusion: Diffusion) -> Hashable:
-    return _place(body), body.density, diffusion.cell_size(body)
-
-
-def _roughness(item: Object) -> float:
-    return 0.0 if item.surface is None else item.surface.roughness
+    return place_of(body), body.density, diffusion.cell_size(body)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from translucent.arrays import Array, Mask
+from translucent.diffusion.keys import may_dim
 from translucent.formulas import optics
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
@@ -28,12 +29,6 @@ def embree_mesh(mesh: Mesh) -> EmbreeMesh:
 def dimming_bodies(scene: Scene, body: int) -> list[Object]:
     """Other bodies that take of the light on its way to one: those that may, and are closed."""
     return [item for i, item in enumerate(scene.objects) if i != body and may_dim(item) and item.mesh.diagnosis.solid]
-
-
-def may_dim(item: Object) -> bool:
-    """True for a body of one density, neither a layer nor a sheet, that takes of light if it is closed."""
-    plain = item.density is None and item.sheet_thickness is None and not item.covers
-    return plain and item.medium is not None and bool(np.any(item.medium.extinction))
 
 
 def light_passed(bodies: Sequence[Object], points: Array, directions: Array, distance: Array) -> Array:

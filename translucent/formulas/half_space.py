@@ -10,7 +10,6 @@ sharper than the quadrature; Henyey and Greenstein 1941.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import eigh
 
 from translucent.arrays import Array
 
@@ -37,6 +36,8 @@ def bare_half_space(albedo: float, anisotropy: float, cosine: Array, weight: Arr
         Legendre moments of the phase function, as many as the quadrature can tell apart: twice the nodes of a part of
         it. The forward peak beyond them counts as unscattered.
     """
+    from scipy.linalg import eigh  # late: a window opens without it
+
     peak = anisotropy**moments
     albedo = albedo * (1.0 - peak) / (1.0 - albedo * peak)
     order = np.arange(moments)

@@ -15,7 +15,7 @@ from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import BODY
 from translucent.gpu.placement import NEAR_SURFACE, PlacedScene, SampleView
 from translucent.media.medium import Medium
-from translucent.reference.sheets import SHEET_ON_OPAQUE
+from translucent.planning.limits import SHEET_ON_OPAQUE
 
 #: A medium denser than this over the scene's diagonal is opaque anyway; the limit keeps float32 products finite.
 MAX_SCENE_OPTICAL_DEPTH = 1e30

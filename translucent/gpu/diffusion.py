@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from threading import Lock
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.diffusion.cache import FieldCache, Fields
+from translucent.diffusion.keys import marked_media
 from translucent.gpu.textures import unlike_powers
 from translucent.planning.caustics import Caustics
 from translucent.planning.scattering import Diffusion
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from translucent.diffusion.cache import FieldCache, Fields
 
 
 class DiffusedLight:
@@ -86,12 +91,13 @@ class DiffusionCache:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
-        self._fields = FieldCache()
+        self._fields: FieldCache | None = None
+        self._lock = Lock()
         self._last: DiffusedLight | None = None
 
     def of(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> DiffusedLight | None:
         """Diffused light of a scene whose media are marked, None where there is none."""
-        if not (fields := self._fields.of(scene, diffusion, caustics)):
+        if not marked_media(scene) or not (fields := self._solver.of(scene, diffusion, caustics)):
             return None
         if self._last is None or self._last.fields is not fields:
             self._release_last()
@@ -100,16 +106,27 @@ class DiffusionCache:
 
     def has(self, key: Hashable) -> bool:
         """True if the light of this `diffusion_key` is known."""
-        return self._fields.has(key)
+        return self._fields is not None and self._fields.has(key)
 
     def solve(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> None:
         """Find the light of a scene whose media are marked, to be drawn later. Needs no context: a thread may do it."""
-        self._fields.of(scene, diffusion, caustics)
+        self._solver.of(scene, diffusion, caustics)
 
     def release(self) -> None:
         """Free the texture."""
         self._release_last()
-        self._fields.clear()
+        if self._fields is not None:
+            self._fields.clear()
+
+    @property
+    def _solver(self) -> FieldCache:
+        """Solver, with the parts of SciPy that it needs: half a second of loading for the first scene that needs it."""
+        from translucent.diffusion.cache import FieldCache
+
+        with self._lock:  # threads share it
+            if self._fields is None:
+                self._fields = FieldCache()
+            return self._fields
 
     def _release_last(self) -> None:
         if self._last is not None:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from translucent.formulas.sampling import sample_shifts
 
 #: Strides of steps; the sides of pictures are multiples of the largest.
-STRIDES = (1, 2, 4, 8)
+STRIDES = (1, 2, 4, 8, 16)
 
 
 @lru_cache(maxsize=4)
@@ -19,7 +19,7 @@ def shifts(samples: int) -> npt.NDArray[np.float64]:
     return sample_shifts(samples)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=len(STRIDES))
 def phases(stride: int) -> list[tuple[tuple[int, int], int]]:
     """Phases: pixels within stride x stride pixels, in drawing order, and the side of the square that each fills."""
     order: list[tuple[tuple[int, int], int]] = [((0, 0), stride)]

@@ -26,15 +26,16 @@ class Side:
             raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
         self.step, self.stride = 0, 1
 
-    def known(self) -> list[int]:
-        """Drawn phase, of the stride x stride ones, that stands in for each phase; 0 for the rest."""
+    def known(self) -> list[tuple[int, ...]]:
+        """Drawn phase, of the stride x stride ones, that stands in for each phase; 0 for the rest. In fours."""
         order = phases(self.stride)
         found = [0] * STRIDES[-1] ** 2
         for (x, y), block in order[: max(self.step, 1)]:
             for i in range(x, x + block):
                 for j in range(y, y + block):
                     found[i + self.stride * j] = x + self.stride * y
-        return found
+        # Whole registers: of small ones, OpenGL 3.3 need not have room for those of two frames.
+        return [tuple(found[i : i + 4]) for i in range(0, len(found), 4)]
 
     def kept(self, x: int, y: int) -> Size:
         """Position at which pixel (x, y) is kept, once all of them are drawn."""

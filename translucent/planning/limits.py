@@ -25,6 +25,9 @@ DENSE = 1e5
 #: Smallest number of steps through an interval of varying density, unless told otherwise.
 LEAST_STEPS = 64
 
+#: Share of the scene's diagonal by which a visible sheet may lie behind an opaque surface.
+SHEET_ON_OPAQUE = 1e-6
+
 #: Gauss-Legendre points through an interval of fog of one density.
 FOG_POINTS = 16
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -32,6 +33,9 @@ NARROW, RIGHT, LEFT = 1280, 0.27, 0.25
 
 #: Frames per second of a window that has nothing to do.
 IDLE_FPS = 9.0
+
+#: Seconds between frames of a window that has nothing to show yet: the thread that reads the model needs the time more.
+READING = 0.03
 
 
 def require_display() -> None:
@@ -307,6 +311,8 @@ class _Window:
         if self.desk is None:
             return
         take_answers(self.desk)
+        if self.work.loaded is None:
+            time.sleep(READING)
         idling = hello_imgui.get_runner_params().fps_idling
         idling.enable_idling = not self.desk.more and self.script is None
         if self.script is not None and self.script.step(self.desk):

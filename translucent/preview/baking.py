@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from translucent.bake.thickness_map import ThicknessMap
 from translucent.formulas.color import srgb_to_linear
 from translucent.frames.aovs import EMPTY, false_colors
 from translucent.geometry.mesh import Mesh
@@ -23,6 +22,9 @@ from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Texture
+
+if TYPE_CHECKING:
+    from translucent.bake.thickness_map import ThicknessMap
 
 
 @dataclass(eq=False)

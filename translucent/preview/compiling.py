@@ -41,7 +41,7 @@ from translucent.scene.texture import Texture
 
 #: Size of the frames that are drawn to have their shaders compiled. No power of two: drivers compile another code for
 #: pictures whose sides are, and those of windows seldom are.
-FRAME = (72, 40)
+FRAME = (80, 48)
 
 #: Sides of small pictures in place of large ones, by whether those are powers of two.
 SIDES = {True: 64, False: 60}

@@ -186,7 +186,8 @@ class Desk:
         self.work.update()
         more = self.stage.draw(self.work, pixels)
         self.drawn = not more
-        self.work.shelf.begin_frame(idle=not more)
+        # All pixels are there; edges may become smooth later.
+        self.work.shelf.begin_frame(idle=not more or self.stage.state.startswith("full"))
         if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:
             self._keep_picture()
         scene = self.work.scene()

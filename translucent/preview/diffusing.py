@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from translucent.diffusion.cache import diffusion_key
+from translucent.diffusion.keys import diffusion_key
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.planning.scattering import Scattering, ScatteringLayer, SingleScattering
 from translucent.planning.scattering.choice import GivenBack, shown

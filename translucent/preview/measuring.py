@@ -11,7 +11,6 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from translucent import reference
 from translucent.assets import newest_shader
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frames.appearance import thickness_samples
@@ -21,7 +20,6 @@ from translucent.planning.methods import Method
 from translucent.preview.numbers import Seen
 from translucent.preview.painting import shows_paint, with_paint
 from translucent.preview.tasks import Report
-from translucent.reference.hits import camera_hits
 from translucent.renderer import Renderer
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
@@ -177,6 +175,8 @@ def _only_alpha(texture: Texture) -> Texture:
 
 def _reference(scene: Scene, size: Size, method: Method | None = None) -> Frame:
     """Reference of a scene, which follows rays through interfaces; straight on where sheets have holes."""
+    from translucent import reference  # late: a window opens without it
+
     holes = any(item.has_holes for item in scene.objects)
     return reference.render(scene, size, method, refraction=False if holes else None)
 
@@ -204,6 +204,8 @@ def truth_frame(report: Report, scene: Scene, method: Method | None, size: Size)
 
 def crossing(report: Report, scene: Scene, size: Size, pixel: Size) -> Crossing:
     """Trace the ray through a pixel's center in the reference."""
+    from translucent.reference.hits import camera_hits
+
     camera = pixel_camera(scene.camera, size, pixel)
     one = dataclasses.replace(straight(scene), camera=camera)
     frame = _reference(one, (1, 1))
@@ -225,6 +227,8 @@ def crossing(report: Report, scene: Scene, size: Size, pixel: Size) -> Crossing:
 
 def first_object(scene: Scene, size: Size, pixel: Size) -> int | None:
     """Number of the first object on the ray through a pixel's center; None if there is none."""
+    from translucent.reference.hits import camera_hits
+
     camera = pixel_camera(scene.camera, size, pixel)
     nearest, found = math.inf, None
     for i, item in enumerate(scene.objects):

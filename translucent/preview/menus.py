@@ -90,8 +90,7 @@ def status(desk: Desk) -> None:
     if task is None:
         return
     imgui.same_line()
-    share = "" if task.share is None else f"{task.share:.0%} "
-    imgui.text(f"|  {task.name} {task.detail} {share}{task.seconds:.0f} s")
+    imgui.text(f"|  {task.told}")
     imgui.same_line()
     if imgui.small_button("cancel"):
         task.cancel()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from functools import partial
 
-from translucent.diffusion.cache import diffusion_key
+from translucent.diffusion.keys import diffusion_key
 from translucent.errors import InputError
 from translucent.gpu.photon_light import PhotonLight
 from translucent.gpu.viewport import Viewport

@@ -12,7 +12,6 @@ from translucent.errors import TranslucentError
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.context import open_context
 from translucent.gpu.ledger import PostponedError, ProgramName
-from translucent.gpu.strides import STRIDES
 from translucent.gpu.viewport import Probe, Viewport
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
@@ -39,6 +38,9 @@ FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 
 #: Largest such factor for traced interfaces: beyond it, those of the screen show more of what moves.
 COARSEST_TRACED = 3.0
+
+#: Picture that stays on show while the wanted one is prepared.
+LAST = "the last picture, until the new one is prepared"
 
 #: Seconds between checks of the shader files.
 WATCH = 0.5
@@ -166,7 +168,7 @@ class Stage:
             self._shown = wanted
             self.viewport.restart()
             self._presenting.truth = None
-            self._strides = [self._pace.factor(plan, STRIDES, BUDGET) for plan in self.plans]
+            self._strides = [self._pace.stride(plan, BUDGET) for plan in self.plans]
             self._moving, self.simpler = None, ""
             if self._compiler is not None and self._compiler.lacks_normals(scene, self._drawn_plans):
                 self._postpone(workspace, wanted)
@@ -256,12 +258,12 @@ class Stage:
         scattering = self.ways.scattering
         if not photons.ready(scene, self.renderer, self.viewport, method, scattering, lane, BUDGET, expected):
             if (plan := photons.show_media(self.viewport)) is not None:
-                self.plans[0], self._strides[0] = plan, self._pace.factor(plan, STRIDES, BUDGET)
+                self.plans[0], self._strides[0] = plan, self._pace.stride(plan, BUDGET)
             return False, False
         if not photons.drawing or photons.plan is None or photons.light is None:
             return True, False
         if photons.side == 1 and not self.viewport.steps(1):
-            self._strides[1] = self._pace.factor(photons.plan, STRIDES, BUDGET)
+            self._strides[1] = self._pace.stride(photons.plan, BUDGET)
         stride, begun = self._strides[photons.side], time.perf_counter()
         samples = self._samples(stride, antialias)
         self.viewport.step(photons.side, scene, photons.plan, stride, max(samples, 1), photons=photons.light.texture)
@@ -317,6 +319,7 @@ class Stage:
         assert compiler is not None
         assert scene is not None
         self._postponed, self._shown = wanted, ()
+        self.state = LAST
         if self._asked is not None and self._asked.cancelled:
             # The user does not wait, so that the window does the work.
             self._asked = None

@@ -63,6 +63,13 @@ class Task:
         """Seconds since the task was requested."""
         return time.monotonic() - self.started
 
+    @property
+    def told(self) -> str:
+        """Progress of the task, in words."""
+        share = "" if self.share is None else f"{self.share:.0%}"
+        parts = " ".join(filter(None, (self.detail, share, f"{self.seconds:.0f} s")))
+        return f"{self.name}: {parts}"
+
     def cancel(self) -> None:
         """Cancel the task: the work ends at its next report, or does not start."""
         self._cancelled.set()

@@ -6,10 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+from translucent.gpu.strides import STRIDES
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 
 Factor = TypeVar("Factor", int, float)
+
+#: Budgets that a step of the largest stride but one may take: a whole picture of the largest takes twice as long, since
+#: each step costs the window a frame.
+OVERDRAWN = 1.5
 
 
 @dataclass
@@ -54,3 +59,9 @@ class Pace:
             slow = plan is not None and (plan.has(PassName.SHADOW_MAPS) or plan.has(PassName.TRACED))
             return factors[0] if plan is None else factors[-1] if slow else factors[-2]
         return next((factor for factor in factors if known / factor**2 <= budget), factors[-1])
+
+    def stride(self, plan: RenderPlan | None, budget: float) -> int:
+        """Stride of a progressive picture whose steps are expected to take so many seconds."""
+        *usual, largest = STRIDES
+        slow = plan is not None and self.known(plan) / usual[-1] ** 2 > OVERDRAWN * budget
+        return largest if slow else self.factor(plan, usual, budget)

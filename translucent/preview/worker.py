@@ -317,7 +317,7 @@ class _Worker:
 def _run(pipe: Connection, niceness: int) -> None:
     """Main loop of the worker process, until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window answers Ctrl-C, and ends this process
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # not at once: files are removed that are half written
+    signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_follow_parent, daemon=True).start()
     channel = Channel(pipe, os.getppid())
     warnings.showwarning = lambda message, *_, **__: channel.send("warning", 0, Parcel.of(str(message)))
@@ -328,6 +328,7 @@ def _run(pipe: Connection, niceness: int) -> None:
         try:
             kind, number, parcel = channel.receive()
         except (EOFError, OSError):
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
             return
         if kind == "keep":
             kept[number] = parcel.open()
@@ -335,6 +336,12 @@ def _run(pipe: Connection, niceness: int) -> None:
             del kept[number]
         elif kind == "work":
             _work(channel, kept, number, parcel)
+
+
+def _end(*_: object) -> None:
+    """End, but not at once: files are removed that are half written; and only once, as that takes a while."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    sys.exit(1)
 
 
 def _follow_parent() -> None:

@@ -9,11 +9,10 @@ from translucent.reference.photons import LandedPhotons, photon_irradiance, trac
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.refraction import refracted_light
 from translucent.reference.render import hit_counts, opaque_counts, render, shade_hits
-from translucent.reference.sheets import SHEET_ON_OPAQUE, sheet_thicknesses
+from translucent.reference.sheets import sheet_thicknesses
 from translucent.reference.surface_light import light_transmittance
 
 __all__ = [
-    "SHEET_ON_OPAQUE",
     "Hits",
     "Intervals",
     "LandedPhotons",

@@ -14,6 +14,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import optics
+from translucent.planning.limits import SHEET_ON_OPAQUE
 from translucent.reference.boxes import Lines
 from translucent.reference.compositing import _layers, composite
 from translucent.reference.emission import emission_of_mixtures
@@ -27,7 +28,7 @@ from translucent.reference.phase import scattered_directions
 from translucent.reference.ray_ends import RayEnds
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
-from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
+from translucent.reference.sheets import scene_crossings
 from translucent.reference.straight_light import StraightLight
 from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import Volume, _weights, points_on, volume_segments

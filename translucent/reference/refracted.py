@@ -17,6 +17,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import optics
+from translucent.planning.limits import SHEET_ON_OPAQUE
 from translucent.reference.boxes import Lines
 from translucent.reference.compositing import composite
 from translucent.reference.emission import emission_of_mixtures
@@ -29,7 +30,7 @@ from translucent.reference.opaque import nearest_opaque
 from translucent.reference.ray_ends import RayEnds
 from translucent.reference.rays import Rays
 from translucent.reference.scattering import scattered_once
-from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
+from translucent.reference.sheets import scene_crossings
 from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import volume_segments
 

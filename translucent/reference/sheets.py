@@ -10,15 +10,13 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 from translucent.formulas import optics
+from translucent.planning.limits import SHEET_ON_OPAQUE
 from translucent.planning.methods import Method
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.layers import layer_depth, layer_radiance, without_holes
 from translucent.reference.opaque import Irradiance
 from translucent.reference.rays import Rays
 from translucent.scene.scene import Object, Scene
-
-#: Share of the scene's diagonal by which a visible sheet may lie behind an opaque surface.
-SHEET_ON_OPAQUE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,9 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
+from translucent.planning.limits import SHEET_ON_OPAQUE
 from translucent.reference.light_paths import PATHS, LightPaths, way_of
-from translucent.reference.sheets import SHEET_ON_OPAQUE, sheet_thicknesses
+from translucent.reference.sheets import sheet_thicknesses
 from translucent.scene.scene import Light, Scene
 from translucent.scene.shadow_directions import shadow_directions
 

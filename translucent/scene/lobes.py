@@ -10,7 +10,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import scipy.fft
 
 from translucent.arrays import Array
 from translucent.scene.environment_map import EnvironmentMap, row_solid_angles
@@ -56,6 +55,8 @@ def cosines_between(height: int, width: int) -> Array:
 
 def convolved(pixels: Array, lobe: Array) -> Array:
     """(h, w, 3): mean of the pixels around each, weighted by a lobe (h, h, w / 2 + 1) of rows and columns on."""
+    import scipy.fft  # late: a window opens without it
+
     height, width = pixels.shape[:2]
     # A lobe is even in longitude: its Fourier transform is a cosine transform, and real.
     spectrum = scipy.fft.dct(lobe, type=1, axis=2)

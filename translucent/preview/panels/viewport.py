@@ -25,6 +25,9 @@ DEGREES, WHEEL = 270.0, 1.15
 #: sRGB colors of the largest differences, as in ``present/compare.frag``.
 THINNER, THICKER = (0.13, 0.40, 0.80), (0.80, 0.15, 0.18)
 
+#: Pixels of a side below which nothing is drawn.
+SMALLEST = 32
+
 WHITE, BLACK, SHADE = 0xFFFFFFFF, 0xFF000000, 0xB0181818
 
 
@@ -32,7 +35,9 @@ def viewport_panel(desk: Desk) -> None:
     """Draw the picture in the whole window, and its overlays."""
     corner, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
     scale = imgui.get_io().display_framebuffer_scale
-    pixels = max(int(room.x * scale.x), 8), max(int(room.y * scale.y), 8)
+    pixels = int(room.x * scale.x), int(room.y * scale.y)
+    if min(pixels) < SMALLEST:
+        return  # panels have no places yet: a model would be framed for a viewport that nobody sees
     desk.more = desk.draw(pixels)
     if imgui.is_window_docked():
         # Behind all panels, of which this one is transparent: on a software rasterizer imgui takes long for pictures.
@@ -320,7 +325,7 @@ def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) ->
     known = stage.simpler, *stage.ways.told, stage.converging.told, stage.photons.told
     lines = [text for text in (stage.problem, stage.shader_problem, *known) if text]
     slow = [task for task in desk.work.busy if task.name and task.seconds > 1.0]
-    lines += [f"{task.name} {task.detail} {task.seconds:.0f} s" for task in slow]
+    lines += [task.told for task in slow]
     for text in lines:
         for line in folded(text, room.x - em(2.0)):
             _label(over, ImVec2(corner.x + em(0.6), y), line)

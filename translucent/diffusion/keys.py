@@ -1,0 +1,104 @@
+"""Keys of the light that diffuses in bodies: everything that it depends on, without what solves for it."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import astuple
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.media.given_back import DiffusedMedium, DiffusedVolume
+from translucent.media.medium import Medium
+from translucent.planning.caustic_plan import lit_by_photons
+from translucent.planning.caustics import Caustics
+from translucent.planning.scattering import Diffusion
+from translucent.scene.scene import Object, Scene
+
+
+def diffusion_key(scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> Hashable:
+    """Everything that the diffused light of a scene depends on; the camera is no part of it."""
+    followed = caustics is not None and media_lit_by_photons(scene)
+    bending = (caustics.in_media, caustics.seed, _bending(scene)) if caustics is not None and followed else ()
+    bodies = tuple(
+        (
+            i,
+            type(scene.objects[i].medium),
+            place_of(body := scene.objects[i]),
+            body.density,
+            coefficients_of(medium),
+            roughness_of(body),
+        )
+        for i, medium in marked_media(scene).items()
+    )
+    opaque = tuple(place_of(item) for item in scene.opaque)
+    around = scene.environment  # what is seen behind everything lights nothing
+    lighting = (
+        around.kind,
+        around.first.tobytes(),
+        around.second.tobytes(),
+        around.map,
+        around.rotation,
+        around.exposure,
+    )
+    lights = tuple((type(light), *map(_bytes, astuple(light))) for light in scene.lights)
+    dimming = tuple(
+        (i, place_of(item), np.asarray(item.medium.extinction).tobytes(), np.asarray(item.medium.absorption).tobytes())
+        for i, item in enumerate(scene.objects)
+        if item.medium is not None and may_dim(item)
+    )
+    return (diffusion, bodies, opaque, lighting, lights, dimming, bending)
+
+
+def may_dim(item: Object) -> bool:
+    """True for a body of one density, neither a layer nor a sheet, that takes of light if it is closed."""
+    plain = item.density is None and item.sheet_thickness is None and not item.covers
+    return plain and item.medium is not None and bool(np.any(item.medium.extinction))
+
+
+def media_lit_by_photons(scene: Scene) -> tuple[int, ...]:
+    """Numbers of the bodies into which photons carry light."""
+    return lit_by_photons(scene, sorted(marked_media(scene)))
+
+
+def marked_media(scene: Scene) -> dict[int, Medium]:
+    """Media, by the number of the object, whose diffused light is looked for."""
+    return {
+        i: body.medium.original if isinstance(body.medium, DiffusedMedium) else body.medium
+        for i, body in enumerate(scene.objects)
+        if isinstance(body.medium, DiffusedMedium | DiffusedVolume)
+    }
+
+
+def place_of(item: Object) -> tuple[object, bytes]:
+    """Mesh of an object, and where it is."""
+    return item.mesh, item.matrix.tobytes()
+
+
+def coefficients_of(medium: Medium) -> Hashable:
+    """Fields of a medium, as a key."""
+    return tuple(map(_bytes, astuple(medium)))
+
+
+def roughness_of(item: Object) -> float:
+    """Roughness of the surface of an object, 0 where it has none."""
+    return 0.0 if item.surface is None else item.surface.roughness
+
+
+def _bending(scene: Scene) -> Hashable:
+    """Everything that the ways of photons depend on beside the lights."""
+    objects = tuple(
+        (
+            place_of(item),
+            item.priority,
+            item.sheet_thickness,
+            item.surface,
+            item.medium,
+        )
+        for item in scene.objects
+    )
+    return scene.overlap, objects
+
+
+def _bytes(value: npt.ArrayLike) -> bytes:
+    return np.asarray(value, np.float64).tobytes()
