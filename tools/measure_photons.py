@@ -42,7 +42,7 @@ def picture(path: Path) -> None:
     )
     with tl.Renderer() as renderer:
         shown = [
-            renderer.render(one, (360, 360), samples=4, scattering=tl.Diffusion(40), caustics=tl.Caustics(1_000_000))
+            renderer.render(one, (360, 360), samples=4, scattering=tl.Diffusion(96), caustics=tl.Caustics(1_000_000))
             for one in scenes
         ]
     Image.fromarray(np.hstack([frame.to_srgb8() for frame in shown])).save(path)

@@ -5,7 +5,8 @@
 ``--drawn`` pictures alone are made anew, and compared with the truths that it holds. Each is rendered on the toolkit's
 ball (4 cm) in the environments of three stages, without their ground and their lights. The truth is `PathTraced`, with
 as many paths as it takes until the standard error of the mean color of each channel is at most a fiftieth of it, or for
-half a minute. Both see the ball at the same points, the centers of the pixels.
+half a minute. Both see the ball at the same points, the centers of the pixels; but the picture sees the environment
+averaged over their footprints, as far as it is mirrored or refracted.
 """
 
 from __future__ import annotations
