@@ -196,7 +196,8 @@ def test_a_body_adds_its_glow_where_it_is_entered(renderer: tl.Renderer, sheet: 
     off, on = render(renderer, dark, samples=samples), render(renderer, lamp, samples=samples)
     assert on.radiance[MIDDLE] == pytest.approx(off.radiance[MIDDLE] + glow, abs=1e-6)
     assert on.radiance[0, 0].tolist() == off.radiance[0, 0].tolist()
-    np.testing.assert_array_equal(on.transmittance, off.transmittance)
+    # By NumPy where nothing glows, else by the shader.
+    np.testing.assert_allclose(on.transmittance, off.transmittance, rtol=2 * np.finfo(np.float32).eps)
     behind = render(renderer, lamp, layer(0.25, RED, 1.0), samples=samples)
     assert behind.radiance[MIDDLE] == pytest.approx(0.25 * RED + 0.75 * on.radiance[MIDDLE], abs=1e-6)
     hidden = render(renderer, lamp, tl.Object(BLOCK, None, at(1.0), color=(0.5, 0.5, 0.5)), samples=samples)

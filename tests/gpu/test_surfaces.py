@@ -262,8 +262,11 @@ def test_straight_quantities_do_not_bend(renderer: tl.Renderer) -> None:
     """Thickness, optical depth and transmittance stay those of the view ray."""
     straight = renderer.render(shown(BALL, tl.Medium(absorption=1.0), SKY), SIZE)
     bent = renderer.render(shown(BALL, tl.Medium(absorption=1.0, ior=1.5), SKY, surface=tl.Surface(0.3)), SIZE)
-    for name in ("thickness", "optical_depth", "transmittance", "coverage", "valid"):
+    for name in ("coverage", "valid"):
         np.testing.assert_array_equal(getattr(straight, name), getattr(bent, name))
+    for name in ("thickness", "optical_depth", "transmittance"):
+        # Frames without interfaces hold the thickness alone: NumPy finds the others, and both round a few times.
+        np.testing.assert_allclose(getattr(straight, name), getattr(bent, name), rtol=4 * np.finfo(np.float32).eps)
     assert np.abs(straight.radiance - bent.radiance).max() > 0.1
 
 

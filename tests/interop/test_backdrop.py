@@ -91,7 +91,8 @@ def test_without_depth_the_picture_is_behind_everything(renderer: tl.Renderer) -
     frame, alone = renderer.render(scene, SIZE, backdrop=backdrop), renderer.render(scene, SIZE)
     np.testing.assert_array_equal(frame.thickness, alone.thickness)
     # Row 0 is the top row: a picture upside down would not be this one.
-    np.testing.assert_allclose(frame.radiance, radiance.astype(np.float32) * frame.transmittance, rtol=2 * EPS)
+    # The shader's transmittance and that of NumPy are two roundings apart, and so are their products.
+    np.testing.assert_allclose(frame.radiance, radiance.astype(np.float32) * frame.transmittance, rtol=4 * EPS)
 
 
 def test_where_a_picture_has_no_coverage_the_environment_is_seen(renderer: tl.Renderer) -> None:
