@@ -33,6 +33,14 @@ def dented() -> np.ndarray:
     return vertices
 
 
+def sliver() -> tl.Mesh:
+    """The cube with one of its triangles in two, and a face of no area between these and the next one."""
+    u, v, w = CUBE.faces[0].tolist()
+    middle = len(CUBE.vertices)
+    vertices = np.concatenate([CUBE.vertices, [0.5 * (CUBE.vertices[u] + CUBE.vertices[v])]])
+    return tl.Mesh(vertices, np.concatenate([CUBE.faces[1:], [[u, middle, w], [middle, v, w], [u, v, middle]]]))
+
+
 def broken() -> dict[str, tl.Mesh]:
     """Meshes that are no convex bodies, or have a defect."""
     ball, faces = BALL.vertices, BALL.faces
@@ -54,6 +62,8 @@ def broken() -> dict[str, tl.Mesh]:
         "two parts": tl.Mesh(*pair),
         "two parts that touch": tl.Mesh(*touching),
         "a face of no area": tl.Mesh(away, np.concatenate([faces, [[0, 0, len(ball)]]])),
+        "a copy of a vertex unused": tl.Mesh(np.concatenate([ball, ball[:1]]), faces),
+        "a sliver along an edge": sliver(),
         "flat": tl.Mesh(ball * (1.0, 1.0, 0.0), faces),
         "two faces": tl.Mesh(ball, [[0, 1, 2], [0, 2, 1]]),
     }
