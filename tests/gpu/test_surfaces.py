@@ -265,8 +265,9 @@ def test_straight_quantities_do_not_bend(renderer: tl.Renderer) -> None:
     for name in ("coverage", "valid"):
         np.testing.assert_array_equal(getattr(straight, name), getattr(bent, name))
     for name in ("thickness", "optical_depth", "transmittance"):
-        # Frames without interfaces hold the thickness alone: NumPy finds the others, and both round a few times.
-        np.testing.assert_allclose(getattr(straight, name), getattr(bent, name), rtol=4 * np.finfo(np.float32).eps)
+        # Frames without interfaces hold the thickness alone, and NumPy finds the others: two roundings of a depth up to
+        # 2, which are the relative error of the transmittance, and two of its own.
+        np.testing.assert_allclose(getattr(straight, name), getattr(bent, name), rtol=6 * np.finfo(np.float32).eps)
     assert np.abs(straight.radiance - bent.radiance).max() > 0.1
 
 
