@@ -30,7 +30,11 @@ void main() {
     nothing.object = AIR;
     nothing.point = origin;
     nothing.normal = normal;
-    Sum sum = follow(Ray(origin, 0.0, way, vec3(1.0), uvec4(0u), 1, 0, true, blur, 1, -normal), nothing, NOTHING, 1);
+    Sum sum = follow(Ray(origin, 0.0, way, vec3(1.0), uvec4(0u), 1, 0, true, blur, 1, -normal
+#if FOOTPRINTS
+        , Footprint(mat2x3(0.0), mat2x3(0.0))
+#endif
+    ), nothing, NOTHING, 1);
     vec2 table = textureLod(reflectance_table, reflectance_coordinate(cosine, mirror_finish.x), 0.0).rg;
     float step = (mirror_finish.y - 1.0) / (mirror_finish.y + 1.0);
     vec3 share = layer_of(vec3(step * step), table).mirrored * texelFetch(straight_transmittance, ivec2(gl_FragCoord.xy), 0).rgb;

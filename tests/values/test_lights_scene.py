@@ -341,7 +341,10 @@ def test_the_showcase_frames_the_mesh_in_a_medium_of_its_size() -> None:
         scene = tl.showcase(mesh, stage="none")
         medium = scene.objects[0].medium
         assert medium is not None
-        assert medium.transmittance(0.15 * mesh.diagonal) == pytest.approx((0.18, 0.62, 0.35), rel=1e-14)
+        sides = mesh.bounds[1] - mesh.bounds[0]
+        chord = 2.0 / (1.0 / sides).sum()  # 4 V / S
+        assert chord > 0.15 * mesh.diagonal
+        assert medium.transmittance(chord) == pytest.approx((0.18, 0.62, 0.35), rel=1e-13)
         assert scene.camera.forward == pytest.approx(tl.showcase(BOX, stage="none").camera.forward, abs=1e-12)
     assert tl.showcase(BOX, GLASS, stage="none").objects[0].medium is GLASS
 
