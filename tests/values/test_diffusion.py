@@ -3,87 +3,41 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from scipy import sparse
 
 import translucent as tl
+from tests.values.diffusing import (
+    BALL,
+    WHITE,
+    Array,
+    ball_grid,
+    beamed,
+    entering_of,
+    grid_of,
+    lit,
+    seen_field,
+)
 from translucent.bench.shapes import joined
-from translucent.diffusion.cache import diffusion_key
 from translucent.diffusion.cells import TOLERANCE
 from translucent.diffusion.densities import even_densities
-from translucent.diffusion.entering import Casters, from_light, opaque_surfaces
-from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
+from translucent.diffusion.entering import from_light
+from translucent.diffusion.field import DiffusionField, lit_body
 from translucent.diffusion.first_events import (
     DEEP_EVENTS,
     EVENTS,
-    Beam,
     diffuse_ways,
     first_ways,
     half_space_excess,
     tails,
 )
-from translucent.diffusion.grid import BodyGrid, body_grid, box_points, other_plane_points, plane_points
-from translucent.diffusion.solution import BodySystem, SurfaceLight, _Channel
-from translucent.formulas import optics
+from translucent.diffusion.grid import BodyGrid, box_points
+from translucent.diffusion.solution import _Channel
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient
-from translucent.formulas.diffusion import HAZE_MIRRORED, haze_shares
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.scattering import Diffusion
 from translucent.reference import slabs
-
-Array = npt.NDArray[np.float64]
-
-CAMERA = tl.Camera.look_at((0, 0, 5), (0, 0, 0))
-BLACK, WHITE = tl.Environment.constant((0, 0, 0)), tl.Environment.constant((1, 1, 1))
-BALL = Sphere().tessellate(64)
-
-
-@lru_cache(maxsize=8)
-def ball_grid(resolution: int) -> BodyGrid:
-    return grid_of(BALL, resolution)
-
-
-def grid_of(mesh: tl.Mesh, resolution: int) -> BodyGrid:
-    body = tl.Object(mesh, tl.Medium(scattering=1.0))
-    return body_grid(body, Diffusion(resolution).cell_size(body))
-
-
-def lit(grid: BodyGrid, medium: tl.Medium, entering: npt.ArrayLike = 1.0, inside: Array | None = None) -> SurfaceLight:
-    """Light of a body on which none of its light falls again."""
-    flux = np.broadcast_to(np.asarray(entering, np.float64), (len(grid.points), 3)).copy()
-    nothing = sparse.csr_array((len(flux), len(flux)))
-    return BodySystem(grid, medium, 0.0).solved(flux, nothing, np.zeros((grid.count, 3)) if inside is None else inside)
-
-
-def beamed(grid: BodyGrid, medium: tl.Medium, beam: Beam) -> SurfaceLight:
-    """Light of a body in a beam, on which none of its light falls again."""
-    dark, nothing = np.zeros((len(grid.points), 3)), sparse.csr_array((len(grid.points),) * 2)
-    return BodySystem(grid, medium, 0.0).solved(dark, nothing, np.zeros((grid.count, 3)), [beam])
-
-
-def entering_of(grid: BodyGrid, beam: Beam) -> Array:
-    """Flux (s, 3) that a beam brings in."""
-    flux = np.zeros((len(grid.points), 3))
-    flux[beam.samples] = beam.entering
-    return flux
-
-
-def seen_field(
-    body: tl.Object,
-    *lights: tl.PointLight | tl.DirectionalLight,
-    environment: tl.Environment = BLACK,
-    resolution: int = 16,
-) -> DiffusionField:
-    scene = tl.Scene([body], CAMERA, lights, environment)
-    assert body.medium is not None
-    geometry = lit_body(body, None, Diffusion(resolution).cell_size(body))
-    return DiffusingBody(geometry, body.medium, 0.0).field(scene, 0)
-
 
 # A ball, by series
 
@@ -406,201 +360,3 @@ def test_a_turned_body_in_turned_light_is_the_same() -> None:
     # Sample by sample, of which those at edges have other cells to read; measured 5 %.
     spread = (found[1][1] - found[0][1]).std() / found[0][1].mean()
     assert spread < 0.1
-
-
-# What enters
-
-
-def test_first_events_have_nothing_to_do_with_the_places_of_samples() -> None:
-    """Or all light that enters at one end of a large triangle would go one way."""
-    places, others = plane_points(4000), other_plane_points(4000)
-    for x in places.T:
-        for y in others.T:
-            joint = np.histogram2d(x, y, bins=8, range=((0, 1), (0, 1)))[0]
-            # 62 points in each of 64 boxes, and never as far off as by chance, by 4 of sqrt(62).
-            assert np.abs(joint - 4000 / 64).max() < 4 * math.sqrt(4000 / 64)
-
-
-def sunlit_ball(extinction: float, albedo: float, photons: int, zones: int, rng: np.random.Generator) -> Array:
-    """Flux that has been scattered out of a ball without an interface, of radius 1, in zones from the back to the sun.
-
-    Analog photons of a sun of 1 W/m^2, which isotropic events scatter.
-    """
-    across, turn = np.sqrt(rng.random(photons)), 2 * np.pi * rng.random(photons)
-    place = np.stack([across * np.cos(turn), across * np.sin(turn), np.sqrt(1 - across**2)], axis=1)
-    way, weight, left = np.tile([0.0, 0.0, -1.0], (photons, 1)), np.ones(photons), np.zeros(zones)
-    for event in range(400):
-        place = place + rng.exponential(1 / extinction, (len(place), 1)) * way
-        inside = (place**2).sum(axis=1) < 1
-        if event:
-            back = (place * way).sum(axis=1) - np.sqrt(
-                np.maximum((place * way).sum(axis=1) ** 2 - (place**2).sum(axis=1) + 1, 0.0)
-            )
-            height = (place - back[:, None] * way)[:, 2]
-            left += np.histogram(height[~inside], zones, (-1, 1), weights=weight[~inside])[0]
-        place, weight = place[inside], weight[inside] * albedo
-        way = rng.normal(size=place.shape)
-        way /= np.linalg.norm(way, axis=1, keepdims=True)
-    return left * np.pi / photons / (4 * np.pi / zones)
-
-
-def test_light_of_a_sun_goes_on_as_it_falls(rng: np.random.Generator) -> None:
-    """Flux out of a ball, in zones from the back to the sun, is that of photons; not of one that enters as uniform."""
-    medium, grid = tl.Medium(absorption=0.5, scattering=4.5), ball_grid(20)
-    exact = sunlit_ball(5.0, 0.9, 12000, 6, rng)
-    ball, sun = tl.Object(BALL, medium), tl.DirectionalLight((0, 0, -1), (1, 1, 1))
-    beam = from_light(grid, Casters(ball), sun, 1.0, diffuse_interface(1.0))
-    np.testing.assert_allclose(beam.directions, np.broadcast_to([0, 0, -1.0], beam.directions.shape), atol=1e-12)
-    zone = np.minimum((3 * (grid.points[:, 2] + 1)).astype(int), 5)
-    off = []
-    for found in (beamed(grid, medium, beam), lit(grid, medium, entering_of(grid, beam))):
-        flux = diffuse_interface(1.0).exit_share * found.fluence[:, 0]
-        rest = np.bincount(zone, flux) / np.bincount(zone) - exact
-        off.append(math.sqrt(float((rest**2).mean())) / exact.mean())
-    print(off)
-    # Photons err by 1 %. Diffusion errs most in the twilight, where the light that comes in at a slant leaves soon.
-    assert off[0] < 0.13 < 0.2 < off[1]
-
-
-def test_bodies_on_the_way_absorb_light_of_the_environment() -> None:
-    """Beer's law for the mean way through a lid over all of the sky; media that scatter alone take nothing."""
-    ball = tl.Object(BALL, tl.Medium(scattering=5.0, ior=1.5))
-    geometry = lit_body(ball, None, Diffusion(10).cell_size(ball))
-    free, lidded, white = (
-        DiffusingBody(geometry, ball.medium, 0.0)
-        .field(tl.Scene([ball, *lids], CAMERA, (), tl.Environment.gradient((0, 0, 0), (1, 1, 1))), 0)
-        .entering
-        for lids in (
-            (),
-            (tl.Object(Box((-90, 1.5, -90), (90, 2.0, 90)).tessellate(), tl.Medium(absorption=(0.0, 1.0, 4.0))),),
-            (tl.Object(Box((-90, 1.5, -90), (90, 2.0, 90)).tessellate(), tl.Medium(scattering=9.0)),),
-        )
-    )
-    np.testing.assert_array_equal(white, free)
-    np.testing.assert_array_equal(lidded[..., 0], free[..., 0])
-    top = np.unravel_index(free[..., 0].argmax(), free.shape[:3])
-    cosine, weight = np.polynomial.legendre.leggauss(64)
-    cosine = 0.5 * (cosine + 1)
-    sky = weight * cosine * (1 - optics.fresnel_dielectric(cosine, 1.5)) * (0.5 + 0.5 * cosine)
-    for channel, absorption in ((1, 1.0), (2, 4.0)):
-        share = float((sky * optics.transmittance(0.5 * absorption / cosine)).sum() / sky.sum())
-        assert lidded[(*top, channel)] / free[(*top, channel)] == pytest.approx(share, rel=0.05)
-
-
-def test_nothing_of_the_environment_passes_what_is_black() -> None:
-    """Next to the edges of a box as well, where samples stand for those of other sides."""
-    box, lid = Box().tessellate(), Sphere(radius=2.0).tessellate(8)
-    body, black = tl.Object(box, tl.Medium(scattering=5.0)), tl.Object(lid, tl.Medium(absorption=1e9))
-    scene, geometry = tl.Scene([body, black], CAMERA), lit_body(body, None, Diffusion(8).cell_size(body))
-    assert body.medium is not None
-    assert DiffusingBody(geometry, body.medium, 0.0).field(scene, 0).entering.max() < 1e-9
-    keys = {
-        diffusion_key(replace(scene, objects=[body, lid]), Diffusion())
-        for lid in (black, replace(black, sheet_thickness=0.1))
-    }
-    assert len(keys) == 2  # sheets take nothing on the way
-
-
-def test_opaque_objects_shadow_a_directional_light() -> None:
-    """Below a plate nothing enters, beside it what Fresnel lets through; and the side away from the light is dark."""
-    ball, light = tl.Object(BALL, tl.Medium(scattering=5.0, ior=1.5)), tl.DirectionalLight((0, -1, 0), (2, 2, 2))
-    plate = tl.Object(Box((-0.5, 2, -3), (3, 2.1, 3)).tessellate(), None)
-    grid = ball_grid(16)
-    free, shadowed = (
-        entering_of(grid, from_light(grid, Casters(ball, opaque_surfaces(opaque)), light, 1.5, diffuse_interface(1.5)))
-        for opaque in ((), (plate,))
-    )
-    beside = grid.points[:, 0] < -0.5
-    np.testing.assert_array_equal(shadowed[beside], free[beside])
-    assert not shadowed[~beside].any()
-    assert not free[grid.points[:, 1] < 0].any()
-    cosine = np.maximum(grid.normals[:, 1], 0.0)
-    # What a disc of 1 m^2 pi receives, less what is mirrored: 4 % at the middle, more at its edge.
-    received = 2 * math.pi * float(np.mean(free[:, 0] / 2)) * 2
-    assert received == pytest.approx(math.pi * diffuse_interface(1.5).entering, rel=0.01)
-    assert (free[:, 0] <= 2 * cosine + 1e-12).all()
-
-
-def test_uniform_light_enters_everywhere_alike() -> None:
-    found = seen_field(tl.Object(BALL, tl.Medium(scattering=5.0, ior=1.5)), environment=WHITE)
-    surface = np.floor((BALL.vertices - found.low) / found.step).astype(int)
-    entering = found.entering[tuple(surface.T)]
-    np.testing.assert_allclose(entering, math.pi * diffuse_interface(1.5).entering, rtol=1e-5)
-
-
-def test_a_lamp_just_outside_is_not_inside() -> None:
-    """In a cell that the surface crosses: it lights the surface, and makes no light in the body of itself."""
-    body = tl.Object(BALL, tl.Medium(absorption=1.0, scattering=20.0, ior=1.5))
-    step = Diffusion(16).cell_size(body)
-    above, below = (
-        seen_field(body, tl.PointLight((0, 1 + side * 0.2 * step, 0), (1, 1, 1))).entering.max() for side in (1, -1)
-    )
-    assert above > 1
-    assert below == 0
-
-
-@pytest.mark.parametrize("inside", [False, True])
-def test_other_bodies_dim_lights_on_their_way_in(inside: bool) -> None:
-    """Behind a slab, or in the middle of a block, the light of a sun is less by its transmittance, and so is all."""
-    ball = tl.Object(Sphere(radius=0.5).tessellate(16), tl.scattering_medium((0.8, 0.6, 0.4), 0.05))
-    absorption = np.array([0.2, 1.0, 3.0])
-    box = tl.Object(
-        Box((-2, -2, -2 if inside else 1), (2, 2, 2 if inside else 1.3)).tessellate(), tl.Medium(absorption)
-    )
-    sun = tl.DirectionalLight((0, 0, -1), (2, 2, 2))
-    assert ball.medium is not None
-    lit_ball = DiffusingBody(lit_body(ball, None, Diffusion(12).cell_size(ball)), ball.medium, 0.0)
-
-    def light(objects: list[tl.Object]) -> Array:
-        return lit_ball.field(tl.Scene(objects, CAMERA, [sun], BLACK), 0).fluence
-
-    alone, dimmed = light([ball]), light([ball, box])
-    seen = alone > 1e-3 * alone.max()
-    if inside:
-        # Each point has another way through the block: from 1.5 m, above, to 2 m, at the rim.
-        share = (dimmed / np.maximum(alone, 1e-12))[seen.all(axis=-1)]
-        assert (share <= np.exp(-1.5 * absorption) * 1.001).all()
-        assert (share >= np.exp(-2.0 * absorption) * 0.999).all()
-    else:
-        np.testing.assert_allclose(dimmed[seen], (alone * np.exp(-0.3 * absorption))[seen], rtol=1e-5)
-
-
-# Light that is scattered ahead
-
-
-@pytest.mark.parametrize("passed", [1.0, 0.6, 0.0])
-def test_haze_is_mirrored_until_it_leaves(passed: float) -> None:
-    """The closed form against its sum, mirror by mirror; nothing is lost where nothing is absorbed."""
-    far, near = haze_shares(0.6, passed)
-    inside, out = HAZE_MIRRORED * 0.6, [1.0 - HAZE_MIRRORED * 0.6, 0.0]
-    for bounce in range(1, 200):
-        out[bounce % 2] += inside * passed * 0.4
-        inside *= passed * 0.6
-    np.testing.assert_allclose((far, near), out, rtol=1e-12)
-    if passed == 1.0:
-        assert far + near == pytest.approx(1.0, abs=1e-12)
-
-
-def test_haze_is_mirrored_less_than_diffuse_light() -> None:
-    """By the mean cosine c of what is scattered by Henyey and Greenstein on its way across.
-
-    Of that, similarity takes the share 1 - c for isotropic, which interfaces mirror as they do diffuse light, and c for
-    unscattered: r - (r - m(c)) / c of which is mirrored, if they mirror m(c) of all. Between 0.28 and 0.6 of r.
-    """
-    interface, (mu, weight) = diffuse_interface(1.5), slabs.cosines(1.5)
-    entering = mu * weight * (1.0 - optics.fresnel_dielectric(mu, 1 / 1.5))
-    inside = (np.arange(200) + 0.5) / 200
-    mirror, around = optics.fresnel_dielectric(inside, 1 / 1.5), np.cos((np.arange(64) + 0.5) / 64 * np.pi)
-    level = np.sqrt(1 - mu**2)[:, None] * np.sqrt(1 - inside**2)
-    turn = (mu[:, None] * inside)[..., None] + level[..., None] * around
-    found = []
-    for depth in (0.5, 4.0, 16.0):
-        scattered = 1.2 * depth  # along the mean of the ways across
-        c = (math.exp(-0.1 * scattered) - math.exp(-scattered)) / (1 - math.exp(-scattered))
-        flux = ((1 - c * c) / (1 + c * c - 2 * c * turn) ** 1.5).mean(axis=-1) * inside
-        mirrored = float((flux @ mirror / flux.sum(axis=1)) @ entering / entering.sum())
-        r = interface.reflected
-        found.append((r - (r - mirrored) / c) / r)
-    assert found == sorted(found)
-    assert found[0] == pytest.approx(0.28, abs=0.01)
-    assert found[0] < HAZE_MIRRORED < found[-1] < 0.6
