@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from translucent.bench.claims import check_claims
-from translucent.bench.comparison import compare_reports, machines_differ
+from translucent.bench.comparison import Agreement, agreement, compare_reports, machines_differ
 from translucent.bench.frontier import beats, mark_frontier
 from translucent.bench.hard.measure import CASES
-from translucent.bench.record import CaseRecord, HardCase, Report
+from translucent.bench.record import CaseRecord, HardCase, Report, ScalePoint, Series
 from translucent.bench.row import Errors, Ratio, Row, Timing
-from translucent.bench.timing import MOST, MOST_REPEATED, Sample, interleaved, ratio, timing
+from translucent.bench.shadows.record import ShadowCase, ShadowRow, Shadows
+from translucent.bench.timing import FEWEST, FEWEST_UNSURE, MOST, MOST_REPEATED, Sample, interleaved, ratio, timing
 
 from .test_record import PROVENANCE
 
@@ -78,6 +79,26 @@ def case(*rows: Row, name: str = "knot", **more: object) -> CaseRecord:
 
 def report(*cases: CaseRecord, hard: tuple[HardCase, ...] = ()) -> Report:
     return Report(PROVENANCE, cases, (), hard)
+
+
+def test_ratios_agree_within_their_share_whichever_report_is_the_old_one() -> None:
+    """1.15 and 1 / 1.15; of what both have at one size, without the floor, in every part that has ratios."""
+
+    def made(*times: float, size: tuple[int, int] = (64, 64)) -> Report:
+        rows = [row(name, time, 1e-4) for name, time in zip("abc", times, strict=False)]
+        floor = row("depth only", times[0], 0.0, kind="floor")
+        points = (ScalePoint(2, ratio=Ratio(times[0], 0.0, 0.0)),)
+        scaling = tuple(Series("layers", name, name, "", points) for name in ("a", "depth only"))
+        shadow = ShadowRow("a", "method", 512, "", ratio=Ratio(times[0], 0.0, 0.0))
+        shadows = Shadows((ShadowCase("bear", "", "", rows=(shadow,)),))
+        return dataclasses.replace(report(case(floor, *rows, size=size)), scaling=scaling, shadows=shadows)
+
+    one, other = made(1.0, 2.0, 3.0), made(1.14, 2.0 * 1.16, 3.0 / 1.16)
+    for found in (agreement(one, other), agreement(other, one)):
+        assert (found.ratios, found.within) == (5, 3)
+    assert agreement(one, made(1.0, 9.0)) == Agreement(4, 3, "knot / b, 2.00 and 9.00")
+    assert agreement(one, made(2.0, size=(32, 32))) == Agreement(2, 0, "layers 2 / a, 1.00 and 2.00")
+    assert "no ratio" in str(agreement(one, report()))
 
 
 def test_the_same_report_has_not_changed() -> None:
@@ -259,6 +280,14 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
     found = interleaved(steady(0.01), drawings, 0.23, lambda *_: None, patience=4.0)
     assert len(found["sure"].wall) == 5
     assert 19 <= len(found["unsure"].wall) <= 21
+    # In haste: three rounds, more only of what is unsure and cheap.
+    drawings = {"sure": steady(0.008), "unsure": unsteady(0.008), "dear": unsteady(0.1)}
+    hasty = interleaved(steady(0.01), drawings, 0.0, lambda *_: None)
+    assert {name: len(one.wall) for name, one in hasty.items()} == {
+        "sure": FEWEST,
+        "unsure": FEWEST_UNSURE,
+        "dear": FEWEST,
+    }
     # Sixteen drawings make a sample, whose mean is steady; all of them count as spent.
     tiny = interleaved(steady(2.5e-4), {"tiny": unsteady(1e-4)}, 0.1, lambda *_: None)["tiny"]
     assert tiny.times == tiny.floor_times == MOST_REPEATED

@@ -72,6 +72,7 @@ def test_json_is_one_object(run: Run, new: Path, tmp_path: Path) -> None:
     ]
     assert sorted(Path(path).name for path in found["files"]) == FILES
     assert found["changes"] is None
+    assert found["agreement"] is None
 
 
 def test_changes_are_told(run: Run, new: Path, tmp_path: Path) -> None:
@@ -86,8 +87,10 @@ def test_changes_are_told(run: Run, new: Path, tmp_path: Path) -> None:
     same = run("--from", new, "--compare", new)
     assert same.code == 0
     assert "nothing got slower" in same.out
-    changes = json.loads(run("--from", new, "--compare", old, "--json").out)["changes"]
-    assert [change["kind"] for change in changes] == ["slower"]
+    assert "1 of 1 ratios to the floor (100.0%) agree within 15%" in same.out
+    found = json.loads(run("--from", new, "--compare", old, "--json").out)
+    assert [change["kind"] for change in found["changes"]] == ["slower"]
+    assert found["agreement"] == {"ratios": 1, "within": 0, "farthest": "knot / SignedDepth, 0.60 and 1.10"}
 
 
 def test_times_of_two_machines_are_no_comparison(run: Run, new: Path, tmp_path: Path) -> None:

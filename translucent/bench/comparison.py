@@ -48,6 +48,44 @@ class Change:
         return f"{self.kind}: {self.where}: {self.text}"
 
 
+@dataclass(frozen=True)
+class Agreement:
+    """Agreement of the ratios to the floor in two reports.
+
+    Attributes
+    ----------
+    ratios : int
+        Number of ratios that both have, of scenes at the same size, scaling and shadows.
+    within : int
+        Number of those whose larger one exceeds the smaller one by no more than `TIME_SHARE` of it.
+    farthest : str
+        Case and method of those that are farthest apart, with both ratios; empty without ratios.
+    """
+
+    ratios: int
+    within: int
+    farthest: str
+
+    def __str__(self) -> str:
+        if not self.ratios:
+            return "no ratio to the floor is in both"
+        share = f"{self.within} of {self.ratios} ratios to the floor ({self.within / self.ratios:.1%})"
+        return f"{share} agree within {TIME_SHARE:.0%}; farthest apart: {self.farthest}"
+
+
+def agreement(old: Report, new: Report) -> Agreement:
+    """Agreement of the ratios in two reports: of two runs of one version on one machine, their reproducibility."""
+    before, after = _ratios(old), _ratios(new)
+    # On a logarithmic scale, so that neither report is the one in the denominator.
+    apart = {key: abs(math.log(after[key] / ratio)) for key, ratio in before.items() if key in after}
+    within = sum(distance <= math.log1p(TIME_SHARE) for distance in apart.values())
+    farthest = ""
+    if apart:
+        key = max(apart, key=lambda one: apart[one])
+        farthest = f"{key[0]}, {before[key]:.2f} and {after[key]:.2f}"
+    return Agreement(len(apart), within, farthest)
+
+
 def compare_reports(old: Report, new: Report) -> tuple[Change, ...]:
     """Changes between two reports, those for the worse first. What only the new report has is no change."""
     changes = list(_changes(old, new))
@@ -63,6 +101,26 @@ def machines_differ(old: Report, new: Report) -> str | None:
     }
     wrong = [f"{name} {a!r}, now {b!r}" for name, (a, b) in pairs.items() if a != b]
     return "; ".join(wrong) or None
+
+
+def _ratios(report: Report) -> dict[tuple[str, tuple[int, int]], float]:
+    """Ratios to the floor by case and method, and the size of the picture, where it is not the case's own."""
+    found = {
+        (f"{case.name} / {row.method}", case.size): row.ratio
+        for case in report.cases
+        for row in case.rows
+        if row.kind != "floor"
+    }
+    found |= {
+        (f"{series.axis} {point.x} / {series.method}", (0, 0)): point.ratio
+        for series in report.scaling
+        for point in series.points
+        if series.family != "depth only"
+    }
+    found |= {
+        (f"shadow, {case.name} / {row.method}", (0, 0)): row.ratio for case in report.shadows.cases for row in case.rows
+    }
+    return {key: ratio.median for key, ratio in found.items() if ratio is not None}
 
 
 def _changes(old: Report, new: Report) -> Iterator[Change]:

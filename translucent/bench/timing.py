@@ -26,6 +26,10 @@ FEWEST, MOST = 3, 60
 FEWEST_LONG, LONG = 2, 0.3
 FEWEST_LONGEST, LONGEST = 1, 2.0
 
+#: What differs much between rounds takes part in so many at least, while it and its floors have taken fewer seconds: of
+#: three rounds, one hiccup in a floor and one in a drawing are most.
+FEWEST_UNSURE, CHEAP = 9, 0.2
+
 #: Seconds of a sample, below which a drawing is repeated in it, and the largest number of repetitions.
 SHORTEST, MOST_REPEATED = 4e-3, 16
 
@@ -191,6 +195,8 @@ def _enough(samples: Samples, share: float, patience: float) -> bool:
     fewest = FEWEST_LONGEST if first > LONGEST else FEWEST_LONG if first > LONG else FEWEST
     if rounds >= MOST * patience or rounds < fewest or samples.spent < share:
         return rounds >= MOST * patience
+    if rounds < FEWEST_UNSURE and samples.spent < CHEAP and _unsure(samples):
+        return False
     return samples.spent >= patience * share or not _unsure(samples)
 
 

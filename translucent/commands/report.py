@@ -27,6 +27,7 @@ from translucent.commands.model import read_scene, require_translucent
 from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
+    from translucent.bench.comparison import Agreement
     from translucent.bench.record import CaseRecord, Part, Report
     from translucent.bench.shadows.record import ShadowCase
     from translucent.media.medium import Medium
@@ -87,7 +88,7 @@ def report(
     whether anybody would see there what a method gets wrong. Opaque parts are staging. Interrupted with Ctrl-C, the
     finished scenes are written. Without -o and --compare, all numbers are printed, and nothing is kept.
     """
-    from translucent.bench.comparison import compare_reports, machines_differ
+    from translucent.bench.comparison import agreement, compare_reports, machines_differ
     from translucent.bench.files import read_report
     from translucent.bench.output import checked_folder, write_outputs
     from translucent.bench.table import table
@@ -114,12 +115,13 @@ def report(
             made = _measured(models, medium, output, quick, size, methods, parts, made, unit, backend, allow_outside)
         files = [] if output is None else write_outputs(made, output)
     changes = None if before is None else compare_reports(before, made)
+    agreed = None if before is None else agreement(before, made)
     if before is not None and (difference := machines_differ(before, made)) is not None:
         echo(f"warning: times of two machines are compared: {difference}", err=True)
     if as_json:
-        echo(json.dumps(_summary(made, files, changes)))
+        echo(json.dumps(_summary(made, files, changes, agreed)))
     else:
-        _tell(made, files, changes)
+        _tell(made, files, changes, agreed)
     if output is None and old is None and not as_json:
         echo(table(made))
     if not made.complete and (source is None or parts):
@@ -210,7 +212,7 @@ def _command(given: dict[str, Any]) -> str:
     return shlex.join([*words, "--quick"] if given["quick"] else words)
 
 
-def _summary(made: Report, files: list[Path], changes: Any) -> dict[str, Any]:
+def _summary(made: Report, files: list[Path], changes: Any, agreed: Agreement | None) -> dict[str, Any]:
     """Summary of a report as values that JSON can hold; ``report.json`` has all of it."""
     return {
         "files": [str(path) for path in files],
@@ -222,6 +224,7 @@ def _summary(made: Report, files: list[Path], changes: Any) -> dict[str, Any]:
         "claims": {claim.text: claim.held for claim in made.claims},
         "failures": list(made.failures),
         "changes": None if changes is None else [dataclasses.asdict(change) for change in changes],
+        "agreement": None if agreed is None else dataclasses.asdict(agreed),
     }
 
 
@@ -262,7 +265,7 @@ def _tell_seen(answer: dict[str, Any]) -> None:
         echo(f"  with {answer['cheaper']}, which is cheaper, {answer['cheaper_seen']}")
 
 
-def _tell(made: Report, files: list[Path], changes: Any) -> None:
+def _tell(made: Report, files: list[Path], changes: Any, agreed: Agreement | None) -> None:
     echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
     if made.cases:
         echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10} {'p99.9':>8}")
@@ -288,5 +291,6 @@ def _tell(made: Report, files: list[Path], changes: Any) -> None:
             echo(str(change))
         if not changes:
             echo("nothing got slower or less accurate, beyond noise")
+        echo(str(agreed))
     for path in files:
         echo(str(path))
