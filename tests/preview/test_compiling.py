@@ -178,7 +178,6 @@ def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> 
 def test_the_last_picture_stays_until_the_next_one_is_compiled(
     stage: Stage, work: Workspace, near: threading.Event
 ) -> None:
-    work.do(Change("display.antialias", False))
     near.set()
     finish(stage, work)
     wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
@@ -204,7 +203,6 @@ def test_the_last_picture_stays_until_the_next_one_is_compiled(
 def test_a_frame_that_takes_too_long_goes_on_in_the_next_one(
     stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    work.do(Change("display.antialias", False))
     near.set()
     finish(stage, work)
     wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
@@ -268,7 +266,6 @@ def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierar
     stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tracing, "PACKED_AT_ONCE", 10)
-    work.do(Change("display.antialias", False))
     near.set()
     finish(stage, work)
     wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)

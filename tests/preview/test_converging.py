@@ -27,7 +27,6 @@ def test_a_still_picture_converges_until_something_changes(
 ) -> None:
     monkeypatch.setattr(convergence, "MOST_PATHS", 16)
     work.do(Change("material.ior", 1.5))
-    work.do(Change("display.antialias", False))
     finish(stage, work)
     interactive = pixels(stage)
     assert stage.converging.told == ""

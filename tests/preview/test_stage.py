@@ -38,7 +38,6 @@ def test_the_picture_is_the_one_that_render_makes(
 ) -> None:
     """At once, and from the smallest steps: these differ by float32 rounding at silhouettes only."""
     monkeypatch.setattr(stages, "BUDGET", budget)
-    work.do(Change("display.antialias", False))
     finish(stage, work)
     work.do(Turn(20.0, 10.0))  # by now the stage knows what a step takes
     finish(stage, work)
@@ -64,7 +63,6 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch, slow: bool
 ) -> None:
     work.do(Change("material.ior", 1.5))
-    work.do(Change("display.antialias", False))
     finish(stage, work)
     assert stage.plans[0] is not None
     usual = stage.plans[0].interfaces
@@ -95,7 +93,6 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
 def test_light_diffuses_as_soon_as_it_is_solved_for(stage: Stage, work: Workspace) -> None:
     """Until then, and in every picture for which it is not known, bodies are layers; a camera may move."""
     work.do(ChoosePreset("whole_milk"))
-    work.do(Change("display.antialias", False))
     assert stage.draw(work, SIZE)
     assert "until its diffusion is solved for" in stage.ways.told[1]
     assert stage.plans[0] is not None
@@ -135,6 +132,7 @@ def test_light_that_cannot_be_solved_for_is_told_once(
 
 
 def test_smooth_edges_are_those_of_many_samples(stage: Stage, work: Workspace) -> None:
+    work.do(Change("display.antialias", True))
     finish(stage, work)
     scene = work.scene()
     assert scene is not None
@@ -171,7 +169,6 @@ def test_a_split_shows_another_method_and_then_the_reference(stage: Stage, work:
 def test_a_shader_that_does_not_compile_leaves_the_last_good_one(
     stage: Stage, work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    work.do(Change("display.antialias", False))
     finish(stage, work)
     before = pixels(stage)
     shutil.copytree(data._folder("shaders"), tmp_path / "shaders")
