@@ -281,8 +281,8 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
     assert len(found["sure"].wall) == 5
     assert 19 <= len(found["unsure"].wall) <= 21
     # In haste: three rounds, more only of what is unsure and cheap.
-    drawings = {"sure": steady(0.008), "unsure": unsteady(0.008), "dear": unsteady(0.1)}
-    hasty = interleaved(steady(0.01), drawings, 0.0, lambda *_: None)
+    drawings = {"sure": steady(0.008), "unsure": unsteady(0.007), "dear": unsteady(0.1)}
+    hasty = interleaved(steady(0.005), drawings, 0.0, lambda *_: None)
     assert {name: len(one.wall) for name, one in hasty.items()} == {
         "sure": FEWEST,
         "unsure": FEWEST_UNSURE,

@@ -28,7 +28,7 @@ FEWEST_LONGEST, LONGEST = 1, 2.0
 
 #: What differs much between rounds takes part in so many at least, while it and its floors have taken fewer seconds: of
 #: three rounds, one hiccup in a floor and one in a drawing are most.
-FEWEST_UNSURE, CHEAP = 9, 0.2
+FEWEST_UNSURE, CHEAP = 9, 0.1
 
 #: Seconds of a sample, below which a drawing is repeated in it, and the largest number of repetitions.
 SHORTEST, MOST_REPEATED = 4e-3, 16
