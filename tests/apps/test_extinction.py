@@ -412,7 +412,8 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
         (["--fit", "few.csv"], "no column 'distance'"),
         (["--fit", "good.csv", "--clamp"], "--clamp; a sample made up would bend --fit"),
         ([], "Missing argument 'COLOR'"),
-        (["gray"], "Missing argument 'DISTANCE'"),
+        (["gray"], "Missing argument 'DISTANCE'. A color has a meaning only at a distance"),
+        (["jade"], "For the preset of this name write --preset jade"),
     ],
     ids=lambda v: " ".join(v) if isinstance(v, list) else None,
 )

@@ -169,7 +169,7 @@ def extinction(
         return None if as_json or target is not None else echo(found.report)
     medium = _given_medium(source, preset_name, unit) if td is None else _filament(td, unit, td_transmittance)
     if medium is None and (color is None or (distance is None and model is None)):
-        missing, hint = ("'COLOR'", QUOTE_HINT) if color is None else ("'DISTANCE'", "")
+        missing, hint = ("'COLOR'", QUOTE_HINT) if color is None else ("'DISTANCE'", _distance_hint(color))
         raise click.MissingParameter(hint[:1].upper() + hint[1:], context, param_hint=missing, param_type="argument")
     frame = None if model is None else thickness_on(model, unit, eye, allow_outside)
     told, medium = _convert(medium, color, distance if td is None else td, frame, unit, unit_out, clamp is not False)
@@ -187,6 +187,15 @@ def _check_usage(*groups: dict[str, object]) -> None:
         given = [name for name, value in group.items() if value is not None]
         if len(given) > 1:
             raise InputError(f"{given[1]} with {given[0]}", "each asks for something else", "give one of them")
+
+
+def _distance_hint(color: str) -> str:
+    """What to write instead of a name or a color alone."""
+    from translucent.media.presets import presets
+
+    if color in presets():
+        return f"for the preset of this name write --preset {color}"
+    return f"a color has a meaning only at a distance: translucent extinction '{color}' 1cm"
 
 
 def _given_medium(source: str | None, preset_name: str | None, unit: str) -> Medium | None:
