@@ -36,6 +36,9 @@ TARGETS = (
     "gltf", "openpbr", "standard_surface", "blender", "threejs", "godot", "unreal", "unity", "usd", "css", "json",
 )  # fmt: skip
 
+#: Targets that draw no surface.
+_WITHOUT_SURFACE = ("css", "json")
+
 
 class _Wanted(NamedTuple):
     """Facts to be told of a medium, and their form."""
@@ -179,6 +182,8 @@ def extinction(
         told["warnings"] += doubts_on(told["on"])
         # Without a distance of the user's own, an engine gets the color at the model's thickness.
         stated = stated if distance is not None else told["on"]["mean_thickness"]
+    if ior is None and source is None and preset_name is None and target not in (None, *_WITHOUT_SURFACE):
+        echo("note: its index of refraction is 1, which mirrors and bends nothing; for glass, --ior 1.5", err=True)
     return _tell(told, medium, stated, wanted)
 
 
