@@ -115,14 +115,18 @@ def test_for_an_engine_only_the_block_is_printed(run: Run, monkeypatch: pytest.M
     monkeypatch.setattr("translucent.materials.text_block", text_block)
     code, out, err = run("linear(0.25,0.5,1)", "2cm", "--as", "unreal")
     assert (code, out) == (0, "block for unreal\n")
-    assert err.startswith("warning: blue is 1 (saturated)")
+    assert "warning: blue is 1 (saturated)" in err
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_every_engine_has_a_block(run: Run, target: str) -> None:
+    """Where it has a surface, too, that a color has none is told."""
     code, out, err = run("#7b1e3a", "1cm", "--as", target)
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert ("its index of refraction is 1" in err) == (target not in ("css", "json"))
+    assert err.count("\n") <= 1
     assert len(out) > 20
+    assert run("#7b1e3a", "1cm", "--as", target, "--ior", "1.5").err == ""
 
 
 @pytest.mark.parametrize(("target", "suffix"), [("blender", ".py"), ("threejs", ".js"), ("godot", ".gdshader")])
@@ -412,7 +416,8 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
         (["--fit", "few.csv"], "no column 'distance'"),
         (["--fit", "good.csv", "--clamp"], "--clamp; a sample made up would bend --fit"),
         ([], "Missing argument 'COLOR'"),
-        (["gray"], "Missing argument 'DISTANCE'"),
+        (["gray"], "Missing argument 'DISTANCE'. A color has a meaning only at a distance"),
+        (["jade"], "For the preset of this name write --preset jade"),
     ],
     ids=lambda v: " ".join(v) if isinstance(v, list) else None,
 )

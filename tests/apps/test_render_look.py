@@ -147,3 +147,18 @@ class TestRendering:
         step = np.abs(np.diff(scene.environment.map.pixels, axis=1)).max()
         assert np.abs(found.radiance - truth.radiance)[same].max() <= step / 256 + 1e-3
         assert np.median(np.abs(found.radiance - truth.radiance)) < 1e-4
+
+
+@pytest.mark.parametrize(("stops", "told"), [(0.0, False), (1.5, True)])
+def test_a_white_body_in_bright_light_is_told_with_an_exposure_that_shows_it(
+    tmp_path: Path, run: Run, stops: float, told: bool
+) -> None:
+    """A clear box before an even white of 1, brightened: at once all of it is beyond white, by 1.5 stops."""
+    options = ("--color", "white", "--distance", "1m", "--environment", "white", *SMALL, "--exposure", f"{stops}")
+    path = tmp_path / "box.png"
+    done = run("render", "soap", "-o", str(path), *options)
+    assert done.code == 0
+    assert ("100% of what media cover is brighter than white" in done.err) == told
+    if told:
+        assert "--exposure -0.5" in done.err
+        assert "brighter than white" not in run("render", "soap", "-o", str(path), *options[:-1], "-0.5").err

@@ -200,3 +200,11 @@ def test_throughput() -> None:
     assert min(rates["frame"], rates["all_hits"], rates["first_hit"]) > 0
     assert 1.0 < rates["hits_per_ray"] < 2.0
     assert rates["last_resort"] < 1e-3
+
+
+def test_pictures_that_take_more_memory_than_is_free_are_refused_before() -> None:
+    scene = tl.showcase(Box((0, 0, 0), (1, 1, 1)).tessellate(), tl.Medium(absorption=1.0), stage="none")
+    with tl.Renderer(backend="cpu") as renderer:
+        for render in (renderer.render, tl.reference.render):
+            with pytest.raises(tl.InputError, match=r"frame size 1000000x1000000; 1000000 million pixels take about"):
+                render(scene, (10**6, 10**6))

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import trimesh
 
 import translucent as tl
+from translucent.gpu import timer as timers
 from translucent.gpu.timer import PassTimer
 from translucent.planning.passes import PassName
 
@@ -20,6 +22,7 @@ def test_what_is_drawn_again_in_a_frame_adds_up(renderer: tl.Renderer, monkeypat
         """Whatever is drawn takes a second more than the time before."""
 
         elapsed = 0
+        mglo = SimpleNamespace(begin=lambda: None, end=lambda: None)
 
         def __enter__(self) -> None:
             self.elapsed += 10**9
@@ -38,6 +41,24 @@ def test_what_is_drawn_again_in_a_frame_adds_up(renderer: tl.Renderer, monkeypat
     with timer.measure("depth"):
         pass
     assert timer.seconds() == {"depth": 4.0}
+
+
+def test_what_takes_longer_than_32_bits_of_nanoseconds_is_read_in_64(
+    renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gl = renderer.gpu.context.gl
+    with renderer.gpu.context.current():
+        timer, texture = PassTimer(gl), gl.texture((512, 512), 4)
+        framebuffer = gl.framebuffer([texture])
+        for name in ("one", "other"):
+            with timer.measure(name):
+                framebuffer.clear(0.5)
+        short = timer.seconds()
+        monkeypatch.setattr(timers, "_SATURATED", 0)  # as if moderngl's 32 bits were too few for any of them
+        assert timer.seconds() == short
+        assert 0 < short["one"] != short["other"] > 0
+        framebuffer.release()
+        texture.release()
 
 
 @pytest.mark.parametrize("samples", [1, 3])

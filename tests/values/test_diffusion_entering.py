@@ -18,6 +18,7 @@ from tests.values.diffusing import (
     ball_grid,
     beamed,
     entering_of,
+    grid_of,
     lit,
     seen_field,
 )
@@ -161,6 +162,19 @@ def test_a_lamp_just_outside_is_not_inside() -> None:
     )
     assert above > 1
     assert below == 0
+
+
+@pytest.mark.parametrize("height", [1e-7, 1e-3, 0.03, 0.3])
+def test_all_light_of_a_lamp_however_near_falls_onto_the_face_below_it(height: float) -> None:
+    """Intensity times the solid angle of the face; samples are 0.04 from each other, and so is what is left of it."""
+    mesh = Box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)).tessellate()
+    grid, casters = grid_of(mesh, 24), Casters(tl.Object(mesh, tl.Medium(scattering=1.0)))
+    for x, z in ((0.0, 0.0), (0.013, -0.11), (0.1, 0.071)):
+        beam = from_light(grid, casters, tl.PointLight((x, 0.5 + height, z), (1, 1, 1)), 1.5, diffuse_interface(1.5))
+        flux = float((beam.entering + beam.mirrored)[:, 0].sum() * grid.area)
+        corners = [(0.5 + one * x, 0.5 + other * z) for one in (1, -1) for other in (1, -1)]
+        angle = sum(math.atan(a * b / (height * math.hypot(a, b, height))) for a, b in corners)
+        assert flux == pytest.approx(angle, rel=0.1)
 
 
 @pytest.mark.parametrize("inside", [False, True])

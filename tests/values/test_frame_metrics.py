@@ -146,6 +146,8 @@ def test_a_folder_that_takes_no_files_is_a_run_time_error() -> None:
         pytest.skip("no /proc, the only folder that refuses root, on this system")
     with pytest.raises(tl.RenderError, match=re.escape("output '/proc/a.png'; it cannot be written (")):
         frame().save(folder / "a.png")
+    with pytest.raises(tl.RenderError, match="cannot be written"):  # before anything is drawn
+        check_output(folder / "a.png")
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a", "a.png.bak", ".png"])

@@ -89,3 +89,13 @@ def test_every_preset_has_a_group_and_a_search_finds_it() -> None:
     assert sum(map(len, groups.values())) == len(tl.presets())
     assert set(matching(tl.presets(), "Skin")) >= {"skin1", "skin2"}
     assert matching(tl.presets(), "measured estimated") == {}
+
+
+def test_a_value_is_told_once_with_the_line_of_its_key(folder: Path) -> None:
+    (folder / "a.toml").write_text(
+        '[tea]\nkind = "estimated"\nsource = "me"\ncolor = [0.5, 0.4, 0.3]\ndistance = 0.01\nior = 1.3\n'
+    )
+    (error,) = read_own_presets()[1]
+    told = 'a.toml\', line 5, [tea]; distance = 0.01; give a length with its unit, for example "1cm"'
+    assert str(error).endswith(told)
+    assert str(error).count("a.toml") == 1

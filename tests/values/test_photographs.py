@@ -142,6 +142,14 @@ def test_steps_that_are_named_in_reverse_are_told(ior: float | None) -> None:
         fit_photographs([Photograph(photograph(np.random.default_rng(3)), WHITE, reverse)], ior)
 
 
+def test_steps_in_reverse_are_told_where_a_channel_is_clear() -> None:
+    """Red, of noise alone, neither brightens nor darkens; named the right way round, green and blue are found."""
+    clear = photograph(np.random.default_rng(3), sigma=np.array([0.0, *SIGMA[1:]]))
+    reverse = [(where, float(d)) for (where, _), d in zip(PATCHES, STEPS[::-1], strict=True)]
+    with pytest.raises(tl.InputError, match=r"green and blue are brighter where it is thicker.*no channel is darker"):
+        fit_photographs([Photograph(clear, WHITE, reverse)])
+
+
 def test_patches_are_steps_or_a_wedge() -> None:
     assert parse_patches("1,2,30,4=2mm") == [((1, 2, 30, 4), 0.002)]
     assert parse_patches("0,5,300,20=1mm,2,4mm", "cm") == [

@@ -1,4 +1,4 @@
-"""Explanations of black pictures: a wrong unit of a file, or a medium too dense for it."""
+"""Explanations of black pictures, by a wrong unit of a file or a medium too dense for it, and of white ones."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 #: Below these shares of light, passed straight or scattered back, a picture shows little but black.
 NEARLY_BLACK, HARDLY_LIT = 0.02, 0.05
+
+#: Radiance from which on a picture is white, with what rounding adds, and the share of such pixels that hides a shape.
+WHITE, BURNT_OUT = 1.02, 0.3
 
 #: Range of the share of light that passes in a picture that shows its medium.
 SHOWS_MEDIUM = (0.05, 0.97)
@@ -60,6 +63,22 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
         f"warning: only {passed:.2%} of the light passes: the model is {_extent(high - low)} and {_length(thickness)} "
         f"thick at the median, and this medium leaves a tenth of the light after {_length(tenth)}; "
         + (_other_unit(high - low, depth, unit, own) or _clearer(clearest)),
+        err=True,
+    )
+
+
+def warn_if_white(frame: Frame, exposure: float, tone: str) -> None:
+    """Warn if much of what media cover is beyond the white of a picture that clamps, with what shows it."""
+    seen = frame.coverage & frame.valid
+    if tone != "none" or not seen.any():
+        return
+    bright = frame.radiance[seen].astype(np.float64).min(axis=-1) * 2.0**exposure
+    if (share := float((bright > WHITE).mean())) < BURNT_OUT:
+        return
+    darker = exposure - math.ceil(math.log2(float(np.quantile(bright, 0.95))))
+    echo(
+        f"warning: {share:.0%} of what media cover is brighter than white, and shown as white; "
+        f"--tone neutral keeps its shape, and --exposure {darker:g} its brightness",
         err=True,
     )
 

@@ -36,6 +36,9 @@ TARGETS = (
     "gltf", "openpbr", "standard_surface", "blender", "threejs", "godot", "unreal", "unity", "usd", "css", "json",
 )  # fmt: skip
 
+#: Targets that draw no surface.
+_WITHOUT_SURFACE = ("css", "json")
+
 
 class _Wanted(NamedTuple):
     """Facts to be told of a medium, and their form."""
@@ -169,7 +172,7 @@ def extinction(
         return None if as_json or target is not None else echo(found.report)
     medium = _given_medium(source, preset_name, unit) if td is None else _filament(td, unit, td_transmittance)
     if medium is None and (color is None or (distance is None and model is None)):
-        missing, hint = ("'COLOR'", QUOTE_HINT) if color is None else ("'DISTANCE'", "")
+        missing, hint = ("'COLOR'", QUOTE_HINT) if color is None else ("'DISTANCE'", _distance_hint(color))
         raise click.MissingParameter(hint[:1].upper() + hint[1:], context, param_hint=missing, param_type="argument")
     frame = None if model is None else thickness_on(model, unit, eye, allow_outside)
     told, medium = _convert(medium, color, distance if td is None else td, frame, unit, unit_out, clamp is not False)
@@ -179,6 +182,8 @@ def extinction(
         told["warnings"] += doubts_on(told["on"])
         # Without a distance of the user's own, an engine gets the color at the model's thickness.
         stated = stated if distance is not None else told["on"]["mean_thickness"]
+    if ior is None and source is None and preset_name is None and target not in (None, *_WITHOUT_SURFACE):
+        echo("note: its index of refraction is 1, which mirrors and bends nothing; for glass, --ior 1.5", err=True)
     return _tell(told, medium, stated, wanted)
 
 
@@ -187,6 +192,15 @@ def _check_usage(*groups: dict[str, object]) -> None:
         given = [name for name, value in group.items() if value is not None]
         if len(given) > 1:
             raise InputError(f"{given[1]} with {given[0]}", "each asks for something else", "give one of them")
+
+
+def _distance_hint(color: str) -> str:
+    """What to write instead of a name or a color alone."""
+    from translucent.media.presets import presets
+
+    if color in presets():
+        return f"for the preset of this name write --preset {color}"
+    return f"a color has a meaning only at a distance: translucent extinction '{color}' 1cm"
 
 
 def _given_medium(source: str | None, preset_name: str | None, unit: str) -> Medium | None:

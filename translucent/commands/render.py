@@ -29,7 +29,7 @@ from translucent.commands.common import (
     unit_option,
 )
 from translucent.commands.console import echo
-from translucent.commands.darkness import warn_if_black
+from translucent.commands.darkness import warn_if_black, warn_if_white
 from translucent.commands.method_options import (
     caustics_option,
     method_option,
@@ -234,6 +234,8 @@ def render(
             frame = pictures.write(scene, draw)
             summary = frame.summary()
     warn_if_black(scene, frame, unit, own=is_own(model))
+    if output.suffix.lower() == ".png":
+        warn_if_white(frame, pictures.exposure, pictures.tone)
     media = medium_lines(scene)
     if as_json:
         echo(json.dumps({"output": str(output), "medium": "; ".join(media), **summary}))

@@ -8,9 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from translucent.arrays import Array, Integers
+from translucent.files.memory import require_memory
 from translucent.reference.hits import PictureGrid
 from translucent.reference.rays import Rays
 from translucent.scene.camera import Camera, check_size
+
+#: Bytes of memory that each pixel takes, at least: the arrays of a frame.
+_PIXEL_BYTES = 100
 
 #: Pixels of a band: enough to hide Python's own time, few enough that the working arrays stay below 50 MB.
 BAND = 1 << 15
@@ -61,7 +65,10 @@ class Picture:
     @classmethod
     def of(cls, camera: Camera, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)) -> Picture:
         """Picture of a camera; raises `InputError` if the size is invalid."""
-        centered = PictureGrid.of(camera, check_size(size))
+        width, height = check_size(size)
+        found = f"{width * height / 1e6:.0f} million pixels"
+        require_memory(f"frame size {width}x{height}", found, _PIXEL_BYTES * width * height, "give a smaller size")
+        centered = PictureGrid.of(camera, size)
         return cls(camera, size, offset, PictureGrid(centered.center - offset, centered.scale))
 
     @property

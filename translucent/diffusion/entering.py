@@ -35,6 +35,10 @@ MAP_HEIGHT = 96
 #: Start of shadow rays before the surface, as a share of a cell.
 BEFORE = 1e-4
 
+#: Least height of a lamp above the samples that it lights, in radii of the area of each, and how far to the side that
+#: counts, in such heights. The first is about a cell: the samples then find its light within a tenth (sd 3 %).
+_WIDTH, _REACH = 3.0, 3.0
+
 #: Bounds of the correction by which a quadrature over directions gives the known share of uniform light.
 _CORRECTION = (0.5, 2.0)
 
@@ -202,9 +206,11 @@ def from_light(
         towards = np.asarray(light.position) - grid.points
         distance = np.linalg.norm(towards, axis=1)
         direction = towards / np.maximum(distance, 1e-18)[:, None]
+        depth, gain = _spread(towards, grid)
     else:
         direction = np.broadcast_to(-np.asarray(light.direction), grid.points.shape)
         distance = np.full(len(grid.points), np.inf)
+        depth, gain = np.zeros(len(grid.points)), np.ones(len(grid.points))
     cosine = (direction * grid.normals).sum(axis=1)
     lit = np.flatnonzero((cosine > 0.0) & ((direction * grid.face_normals).sum(axis=1) > 0.0))
     start = grid.points[lit] + BEFORE * grid.cells.step * grid.face_normals[lit]
@@ -214,11 +220,31 @@ def from_light(
     free = nearest >= distance[lit]
     lit, start = lit[free], start[free]
     towards, normals = direction[lit], grid.normals[lit]
-    reflected = optics.fresnel_dielectric(cosine[lit], ior)[:, None]
+    sunk = depth[lit, None] * grid.face_normals[lit]
+    if depth[lit].any():
+        towards = distance[lit, None] * towards + sunk
+        towards /= np.linalg.norm(towards, axis=1)[:, None]
+    reflected = optics.fresnel_dielectric(np.maximum((towards * normals).sum(axis=1), 0.0), ior)[:, None]
     # What a rough interface loses, of any light as of uniform light.
     share = interface.entering / diffuse_interface(ior).entering
-    flux = np.asarray(light.irradiance_on(grid.points[lit], normals), np.float64)
+    flux = np.asarray(light.irradiance_on(grid.points[lit] - sunk, normals), np.float64) * gain[lit, None]
     if dimming:
         flux = flux * light_passed(dimming, start, towards, distance[lit])
     ways = refracted_direction(-towards, normals, np.full(len(lit), ior))
     return Beam(lit, ways, (1.0 - reflected) * share * flux, reflected * flux)
+
+
+def _spread(towards: Array, grid: BodyGrid) -> tuple[Array, Array]:
+    """How deep below its place each sample looks at a lamp, and what is made of the light there, (s,) each.
+
+    A lamp that is nearer to the surface than its samples are to each other shines on a spot between them. On a plane
+    the irradiance h / (r^2 + h^2)^(3/2) of a lamp at height h has the same integral 2 pi for every h: as seen from
+    samples that lie deeper, the spot is as wide as they are apart, and has the light of the narrow one within `_REACH`.
+    """
+    width = _WIDTH * np.sqrt(grid.area / np.pi)
+    height = (towards * grid.face_normals).sum(axis=1)
+    across = np.linalg.norm(towards - height[:, None] * grid.face_normals, axis=1)
+    near = (height > 0.0) & (height < width) & (across < _REACH * width)
+    within = 1.0 - height / np.hypot(height, _REACH * width)
+    gain = within / (1.0 - 1.0 / np.hypot(1.0, _REACH))
+    return np.where(near, width - height, 0.0), np.where(near, gain, 1.0)

@@ -55,6 +55,8 @@ def require_output(path: Path, asked: str) -> None:
     ------
     InputError
         If there is no folder for it, or a folder has the name.
+    RenderError
+        If no file can be made in that folder.
     """
     folder = path.parent
     if os.path.lexists(folder) and not os.path.isdir(folder):
@@ -63,6 +65,12 @@ def require_output(path: Path, asked: str) -> None:
         raise InputError(asked, f"no folder {str(folder)!r}", "make the folder first")
     if os.path.isdir(path):
         raise InputError(asked, "a folder of that name is there", "choose another name")
+    try:  # rights do not tell: disks may be read-only, and full
+        temporary, held = _temporary_file(Path(os.path.realpath(path)))
+    except OSError as error:
+        raise RenderError(asked, f"it cannot be written ({error.strerror})", "check the folder") from error
+    held.close()
+    temporary.unlink(missing_ok=True)
 
 
 def require_folder(path: Path, asked: str) -> None:

@@ -1,7 +1,8 @@
 """Poses of animated nodes: translation, rotation and scale at a time.
 
 Source: glTF 2.0, section 3.11 and appendix C (interpolation): STEP, LINEAR (spherical for rotations, along the shorter
-way) and CUBICSPLINE. Before the first key of a sampler its first value holds, after the last its last.
+way) and CUBICSPLINE. Before the first key of a sampler its first value holds, after the last its last. A time after all
+keys is told.
 
 All animations of a file play at once, since exporters write one for each object as well as one for each take; where two
 move the same property of a node, the first does, and the other is told.
@@ -11,12 +12,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Iterator
 
 import numpy as np
 
 from translucent.arrays import Array
-from translucent.errors import InputError
+from translucent.errors import InputError, TranslucentWarning
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.fields import label, refused
 from translucent.gltf.file import GltfFile, Json
@@ -51,6 +53,7 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
     if not animations:
         raise InputError(f"time {seconds:g} of {str(file.path)!r}", "it has no animations", "leave the time out")
     accessors, moved = Accessors(file), [dict(node) for node in file.items("nodes")]
+    ends: list[float] = []
     taken: set[tuple[int, str]] = set()
     for number, animation in enumerate(animations):
         name = label(animations, number)
@@ -66,7 +69,12 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
                 left_out.add(f"animations that move what another does ({path})", name)
                 continue
             taken.add((node, path))
-            moved[node][path] = _value(file, accessors, animation, channel, path, seconds, name).tolist()
+            value, end = _value(file, accessors, animation, channel, path, seconds, name)
+            moved[node][path] = value.tolist()
+            ends.append(end)
+    if ends and seconds > max(ends):
+        text = f"its animations end after {max(ends):g} s; at {seconds:g} s all stays as it is then"
+        warnings.warn(f"scene {file.path.name!r}: {text}", TranslucentWarning, stacklevel=3)
     return dataclasses.replace(file, tree={**file.tree, "nodes": moved})
 
 
@@ -84,7 +92,8 @@ def _channels(file: GltfFile, animation: Json, name: str) -> Iterator[tuple[Json
 
 def _value(
     file: GltfFile, accessors: Accessors, animation: Json, channel: Json, path: str, seconds: float, name: str
-) -> Array:
+) -> tuple[Array, float]:
+    """Value of a channel, and the time of its last key."""
     samplers, index = animation.get("samplers", []), channel.get("sampler")
     if not isinstance(samplers, list) or not isinstance(index, int) or not 0 <= index < len(samplers):
         raise refused(file, f"animation {name}: sampler {index!r} is not one of its samplers")
@@ -99,12 +108,13 @@ def _value(
     if (np.diff(times) <= 0).any():
         raise refused(file, f"animation {name}: its keys are not in the order of time")
     found = sample(times, values.reshape(len(times), per_key, -1), seconds, mode, arc=path == "rotation")
+    end = float(times[-1])
     if path != "rotation":
-        return found
+        return found, end
     length = float(np.linalg.norm(found))
     if not length > 0:
         raise refused(file, f"animation {name}: a rotation of length 0")
-    return found / length
+    return found / length, end
 
 
 def sample(times: Array, values: Array, seconds: float, mode: str, *, arc: bool) -> Array:

@@ -165,6 +165,8 @@ class _Entry:
         try:
             medium = self._medium(anisotropy)
         except InputError as error:
+            if str(error).startswith(self.where):
+                raise
             raise InputError(self.where, str(error)) from None
         return Preset(
             self.name,
@@ -196,8 +198,14 @@ class _Entry:
         """sigma_a in 1/m."""
         if "color" not in self.entry:
             return self._per_metre("absorption")
-        clear = Medium.from_color(self._triple("color"), parse_length(self._text("distance")))
+        clear = Medium.from_color(self._triple("color"), self._distance())
         return np.asarray(clear.absorption, dtype=np.float64)
+
+    def _distance(self) -> float:
+        """Metres."""
+        if not isinstance(self.entry["distance"], str):
+            raise self._wrong("distance", 'a length with its unit, for example "1cm"')
+        return parse_length(self._text("distance"))
 
     def _per_metre(self, key: str) -> Array:
         """Coefficients in 1/m; infinite beyond the numbers there are."""

@@ -162,13 +162,18 @@ def fit_steps(photographs: Sequence[Steps], ior: float | None = None) -> StepFit
     Raises
     ------
     InputError
-        If no sample of a channel is left, or the index is none, or all channels brighten with thickness.
+        If no sample of a channel is left, or the index is none, or some channel brightens with thickness and none
+        darkens.
     """
     index = Medium(ior=1.0 if ior is None else ior).ior  # one that is none is refused before it is calculated with
     channels = [_channel(photographs, channel, ior) for channel in range(3)]
-    if all(map(_brightens, channels)):
+    slopes = [_slope(samples) for samples in channels]
+    if min(slopes) < 0 and max(slopes) <= 0:
+        which = [name for name, slope in zip(CHANNELS, slopes, strict=True) if slope < 0]
+        who = "every channel is" if len(which) == 3 else f"{' and '.join(which)} {'is' if len(which) == 1 else 'are'}"
+        rest = "" if len(which) == 3 else ", and no channel is darker"
         do = "give thicknesses in their order from the left of a patch, or from its top where that is the longer side"
-        raise InputError("fit to photographs", "every channel is brighter where it is thicker, as no plate is", do)
+        raise InputError("fit to photographs", f"{who} brighter where it is thicker, as no plate is{rest}", do)
     found = [_fit_channel(photographs, samples, number, ior) for number, samples in enumerate(channels)]
     sigma, error, interval, loss, chi2, samples = (np.array(row) for row in list(zip(*found, strict=True))[:6])
     warnings = [line for one in found for line in one[6]]
@@ -182,13 +187,14 @@ def fit_steps(photographs: Sequence[Steps], ior: float | None = None) -> StepFit
     return StepFit(medium, error, interval, loss, chi2, samples, distance, tuple(dict.fromkeys(warnings)))
 
 
-def _brightens(samples: _Channel) -> bool:
-    """True where light clearly grows with thickness, whatever the faces keep back."""
+def _slope(samples: _Channel) -> int:
+    """-1 where light clearly grows with thickness, whatever the faces keep back, 1 where it clearly falls, else 0."""
     if len(np.unique(samples.thickness)) < 2:
-        return False
+        return 0
     line = samples.line(1, fixed=False)
-    gain = -line.best[0]
-    return bool(gain > _CLEAR * line.errors[0] and gain * np.ptp(samples.thickness) > _BRIGHTER)
+    loss = line.best[0]
+    clear = abs(loss) > _CLEAR * line.errors[0] and abs(loss) * np.ptp(samples.thickness) > _BRIGHTER
+    return int(np.sign(loss)) if clear else 0
 
 
 def _fit_channel(

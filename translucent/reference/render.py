@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.files.memory import require_memory
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
 from translucent.planning.choices import RenderChoices
@@ -42,6 +43,9 @@ CHUNK = 1 << 24
 
 #: Capabilities of the reference for the planner: rays are traced, and light is followed into media.
 TRACED = Capabilities(shader_storage=False, opengl=False)
+
+#: Bytes of memory that each pixel takes, at least: its ray, and what is found on it, in float64.
+_PIXEL_BYTES = 200
 
 #: Default relative error of scattered light.
 TOLERANCE = 1e-6
@@ -102,7 +106,8 @@ def render(
     Raises
     ------
     InputError
-        If the size is not one, a number not in its range, an interface has textures, or the planner refuses the scene.
+        If the size is not one or takes more memory than is free, a number is not in its range, an interface has
+        textures, or the planner refuses the scene.
     """
     start = time.perf_counter()
     check_scene(scene)
@@ -295,6 +300,9 @@ def opaque_counts(scene: Scene, size: tuple[int, int]) -> tuple[npt.NDArray[np.i
 
 def scene_hits(scene: Scene, size: tuple[int, int]) -> list[Hits]:
     """All surfaces of each object on the pixel rays, as `line_hits` gives them."""
+    width, height = check_size(size)
+    found = f"{width * height / 1e6:.0f} million pixels"
+    require_memory(f"frame size {width}x{height}", found, _PIXEL_BYTES * width * height, "give a smaller size")
     return [line_hits(body.mesh, body.matrix, scene.camera, size) for body in scene.objects]
 
 
