@@ -10,12 +10,13 @@
 #endif
 
 in float axial;
+flat in vec4 counting;
 
 layout(location = 0) out vec2 path_and_count;  // or the paths in two media: of other slots it has none
 
 void main() {
     float side = gl_FrontFacing ? -1.0 : 1.0;
-    float reached = max(axial, axial_start);
+    float reached = max(axial, counting.z);
 #if PROJECTED_DEPTH
     path_and_count = side * vec2(reached * axial_depth_scale + axial_depth_start, 1.0);
 #else
