@@ -37,9 +37,7 @@ flat in vec4 seen_first;
 flat in vec4 seen_second;
 flat in vec4 seen_other;
 #define seen_tiles seen_first.w
-#if SEEN_MAP
 #define seen_turn seen_second.w
-#endif
 #define seen_scale seen_other.x
 // What the environment is like, where that is known beforehand, and 0 where not.
 #if SEEN_KIND

@@ -4,19 +4,18 @@
 // lookup ends it at the surface: the sum of min(reached, end) is the sum of reached where that is less, less the end for
 // each entry that is counted and no exit. So counted lengths are from the center, and not from each body's anchor.
 
-#include <Body>
+#include "geometry/of_body.glsl"
 #if OPAQUE && !PROJECTED_DEPTH
 #include "intervals/last_axial.glsl"
 #endif
 
 in float axial;
-flat in vec4 counting;
 
 layout(location = 0) out vec2 path_and_count;  // or the paths in two media: of other slots it has none
 
 void main() {
     float side = gl_FrontFacing ? -1.0 : 1.0;
-    float reached = max(axial, counting.z);
+    float reached = max(axial, axial_start);
 #if PROJECTED_DEPTH
     path_and_count = side * vec2(reached * axial_depth_scale + axial_depth_start, 1.0);
 #else
@@ -24,7 +23,7 @@ void main() {
     reached = min(reached, last_axial());
 #endif
 #if TWO_MEDIA
-    path_and_count = side * reached * vec2(equal(ivec2(slot), ivec2(0, 1)));
+    path_and_count = side * reached * vec2(equal(ivec2(slot_of_body), ivec2(0, 1)));
 #else
     path_and_count = vec2(side * reached, 0.0);
 #endif

@@ -30,7 +30,10 @@ STAGES = {
     "body": ("geometry/body.vert", BODY),
     "sum": ("thickness/signed_depth.frag", SUM),
     "full": ("geometry/fullscreen.vert", {}),
-    "picture": ("shade/transmittance.vert", {key: RESOLVE[key] for key in ("MAP", "SEEN_KIND", "SPECTRAL", "SURFACES")}),
+    "picture": (
+        "shade/transmittance.vert",
+        {key: RESOLVE[key] for key in ("MAP", "SEEN_KIND", "SPECTRAL", "SURFACES")},
+    ),
     "metres": ("thickness/signed_thickness.frag", {"SPECTRAL": 0}),
     "resolve": ("shade/transmittance.frag", RESOLVE),
 }

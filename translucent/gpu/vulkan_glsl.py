@@ -23,7 +23,8 @@ _OF_BODIES = (
     "vertex_color",
     "irradiance",
     "counting",
-    "added_extinction",
+    "to_axial_depth",
+    "medium_of_body",
 )
 _OF_PICTURES = (
     "frame_size",
