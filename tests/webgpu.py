@@ -121,7 +121,7 @@ def draw(
     work = encoder.begin_render_pass(color_attachments=[target(one) for one in targets])
     work.set_pipeline(resolved)
     blocks = {0: block("View"), 2: block("Shade"), 16: sums.create_view()}
-    if "seen_kind" in stages["resolve"]:
+    if "seen_kind" in stages["full"]:
         blocks[5] = block("Environment")
     work.set_bind_group(0, bound(resolved, blocks))
     work.draw(3)

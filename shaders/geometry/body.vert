@@ -16,12 +16,20 @@ out vec3 from_center;  // of the media
 // length is this, times a factor of the pixel: one interpolated number carries the whole distance.
 out float axial;
 
+// What is alike for all of a body: see of_body.glsl.
+flat out vec4 counting;
+flat out vec4 to_axial_depth;
+flat out vec4 medium_of_body;
+
 // Neighboring faces must agree on their shared vertices to the last bit, or pixels between them would leak.
 invariant gl_Position;
 
 void main() {
     gl_Position = clip_from_offset * vec4(offset, 1.0);
     axial = dot(axis.xyz, offset) + axis.w;
+    counting = vec4(count_weight, count_offset, axial_start, snapping_share);
+    to_axial_depth = vec4(axial_depth_scale, axial_depth_start, subpixel, float(slot));
+    medium_of_body = vec4(extinction.rgb, float(starts_unknown));
 #if WITH_NORMAL
     world_normal = mat3(world_from_normal) * normal;
 #endif

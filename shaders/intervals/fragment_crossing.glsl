@@ -1,6 +1,6 @@
 // The fragment at hand as a crossing: its axial depth, and its word. Needs the inputs of geometry/body.vert.
 
-#include <Body>
+#include "geometry/of_body.glsl"
 #include "intervals/crossing.glsl"
 #include "thickness/snapping.glsl"
 
@@ -31,6 +31,6 @@ float last_axial_depth() {
 
 uint fragment_word(float axial_depth) {
     // A choice between words: where the side itself becomes a number, softpipe takes every face for a back face.
-    uint word = pack_crossing(axial_depth, slot, false);
+    uint word = pack_crossing(axial_depth, slot_of_body, false);
     return gl_FrontFacing ? word : word + 1u;
 }

@@ -1,4 +1,4 @@
-// Where an opaque surface ends this pixel's ray, counted as a fragment's own `axial`. Needs <Body>.
+// Where an opaque surface ends this pixel's ray, counted as a fragment's own `axial`. Needs of_body.glsl or <Body>.
 
 uniform sampler2D opaque_axial_depth;
 

@@ -4,16 +4,46 @@
 // COMPACT: one output has radiance and thickness, whose sign bit marks what is not valid. All else follows from these, but for
 // optical depths in several media.
 
-#include <View>
-#include <Shade>
-#include <Environment>
+// What is alike for all pixels, from uniform blocks: see transmittance.vert.
+flat in vec4 frame_size;
+flat in vec4 ray_right;
+flat in vec4 ray_up;
+flat in vec4 ray_forward;
+flat in vec4 extinction;
+flat in vec4 emission;
+flat in vec4 balance;
+#define coverage_floor extinction.w
+#define rounding emission.w
+#define expected_count balance.xy
+#define count_share balance.z
+#if SPECTRAL > 1
+flat in vec3 first_extinction;
+flat in vec3 second_extinction;
+flat in vec3 third_extinction;
+#endif
+#if SEEN_KIND
+flat in vec4 span;
+#endif
+#if MAP
+flat in vec4 corner_and_ahead;
+#endif
+
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
 #include "thickness/balance.glsl"
 #if !SURFACES && !MAP
+flat in vec4 beyond;
+flat in vec4 seen_first;
+flat in vec4 seen_second;
+flat in vec4 seen_other;
+#define seen_tiles seen_first.w
+#define seen_turn seen_second.w
+#define seen_scale seen_other.x
 // What the environment is like, where that is known beforehand, and 0 where not.
 #if SEEN_KIND
 #define seen_kind (SEEN_KIND - 1)
+#else
+#define seen_kind int(seen_other.y)
 #endif
 #include "shade/background.glsl"
 #endif
@@ -43,19 +73,11 @@ uniform sampler2D unlit_path;
 #endif
 #if SPECTRAL > 1
 uniform sampler2D accumulated_second;
-uniform mat3 media_extinction;  // a column for each medium, in 1/m
 #if SPECTRAL == 3
 uniform sampler2D accumulated_third;
 #endif
 #endif
-#if SEEN_KIND
-// Of a ray, to the right and down from the camera's axis at distance 1, per pixel and at the corner of the picture.
-uniform vec4 view_span;
-#endif
-
 #if MAP
-// For a map of shadows: its corner, and metres ahead of the center at axial depth 0, and from there to 1.
-uniform vec4 map_place;
 #if OPAQUE
 uniform sampler2D opaque_axial_depth;
 #endif
@@ -94,7 +116,8 @@ Path path_of(vec2 first, ivec2 texel, float advance) {
     const vec2 third = vec2(0.0);
 #endif
     vec3 lengths = vec3(first.r, second.r, third.r) * advance;
-    return Path(lengths.r + lengths.g + lengths.b, media_extinction * lengths, first.g + second.g + third.g);
+    vec3 depth = first_extinction * lengths.r + second_extinction * lengths.g + third_extinction * lengths.b;
+    return Path(lengths.r + lengths.g + lengths.b, depth, first.g + second.g + third.g);
 }
 #elif SPECTRAL == 1
 #define PATH_OF(sums, lengths) path_of(texelFetch(sums, texel, 0), texelFetch(lengths, texel, 0).r, advance)
@@ -111,7 +134,7 @@ Path path_of(vec2 sum, float advance) {
 
 void main() {
 #if MAP
-    vec2 place = gl_FragCoord.xy - map_place.xy;
+    vec2 place = gl_FragCoord.xy - corner_and_ahead.xy;
     vec2 pixel = vec2(place.x, frame_size.y - place.y);
     ivec2 texel = ivec2(place);
 #else
@@ -120,7 +143,7 @@ void main() {
 #endif
     vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
 #if SEEN_KIND
-    vec2 across = gl_FragCoord.xy * view_span.xy + view_span.zw;
+    vec2 across = gl_FragCoord.xy * span.xy + span.zw;
     float advance = sqrt(1.0 + dot(across, across));
 #else
     float advance = length(ray);
@@ -165,7 +188,7 @@ void main() {
     const float end = NOTHING;
 #endif
     out_sums = vec4(path.optical_depth / advance, 0.0);
-    out_end = end < NOTHING ? map_place.z + end * map_place.w : NOTHING;
+    out_end = end < NOTHING ? corner_and_ahead.z + end * corner_and_ahead.w : NOTHING;
 #else
     vec3 through = transmittance(path.optical_depth);
 #if EMISSION

@@ -2,7 +2,7 @@
 // misplace a face; alpha counts the faces.
 
 #include <constants>
-#include <Body>
+#include "geometry/of_body.glsl"
 #include "thickness/snapping.glsl"
 #if OPAQUE
 #include "intervals/last_axial.glsl"

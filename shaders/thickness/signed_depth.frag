@@ -1,7 +1,7 @@
 // Signed depth (Baker & Boyd 2001): exits count up, entries count down, in any order, added up by blending.
 // The sum is the path inside the body; a count that does not balance betrays a hole or a flipped face.
 
-#include <Body>
+#include "geometry/of_body.glsl"
 #include "thickness/snapping.glsl"
 #if OPAQUE
 #include "intervals/last_axial.glsl"

@@ -4,7 +4,7 @@
 // lookup ends it at the surface: the sum of min(reached, end) is the sum of reached where that is less, less the end for
 // each entry that is counted and no exit. So counted lengths are from the center, and not from each body's anchor.
 
-#include <Body>
+#include "geometry/of_body.glsl"
 #if OPAQUE && !PROJECTED_DEPTH
 #include "intervals/last_axial.glsl"
 #endif
@@ -23,7 +23,7 @@ void main() {
     reached = min(reached, last_axial());
 #endif
 #if TWO_MEDIA
-    path_and_count = side * reached * vec2(equal(ivec2(slot), ivec2(0, 1)));
+    path_and_count = side * reached * vec2(equal(ivec2(slot_of_body), ivec2(0, 1)));
 #else
     path_and_count = vec2(side * reached, 0.0);
 #endif

@@ -10,11 +10,16 @@ float snapping(float along, float step_of_grid) {
     return fwidth(along) * step_of_grid;
 }
 
+// The square root, or up to 1.061 times that: half the exponent, and a chord of the root over each of its steps.
+float root_or_more(float x) {
+    return uintBitsToFloat((floatBitsToUint(x) >> 1u) + 0x1fc00000u);
+}
+
 // A count with a share of the scene's size in its fraction. Fractions add up to less than 1 where fewer than 64 faces of a
 // pixel are as steep as can be; square roots, since shares go from 1e-7 to 1. The root of a sum is less than the sum of
 // the roots, so that what comes back is not too small.
 float count_with_share(float count, float share) {
-    return count + sqrt(min(share, 1.0)) / 64.0;
+    return count + root_or_more(min(share, 1.0)) / 64.0;
 }
 
 // The count alone. A little is added, since sums of many counts round their fraction.

@@ -30,6 +30,10 @@ STAGES = {
     "body": ("geometry/body.vert", BODY),
     "sum": ("thickness/signed_depth.frag", SUM),
     "full": ("geometry/fullscreen.vert", {}),
+    "picture": (
+        "shade/transmittance.vert",
+        {key: RESOLVE[key] for key in ("MAP", "SEEN_KIND", "SPECTRAL", "SURFACES")},
+    ),
     "metres": ("thickness/signed_thickness.frag", {"SPECTRAL": 0}),
     "resolve": ("shade/transmittance.frag", RESOLVE),
 }
@@ -97,7 +101,8 @@ def test_thickness_in_wgsl_equals_the_reference(device: Any) -> None:
     thickness, count, valid, covered = np.moveaxis(metres, 2, 0)
     assert (count == 0).all()
     host.check(thickness, covered + 2 * valid)
-    *_, thickness, flags = webgpu.draw(device, host, texts, webgpu.APART, upside_down=True)
+    picture = {**texts, "full": texts["picture"]}
+    *_, thickness, flags = webgpu.draw(device, host, picture, webgpu.APART, upside_down=True)
     host.check(thickness[..., 0], flags[..., 0])
 
 
@@ -184,22 +189,21 @@ def test_a_library_has_all_its_functions_and_nothing_else(language: Language, re
 def test_what_a_stage_takes_and_gives_has_the_same_name_and_place_in_every_language(naga: None) -> None:
     """No compiler for Metal runs here: its text is held against the interface of the others."""
     glslang()
-    vulkan = lift(*STAGES["sum"], "vulkan").text
-    members = re.findall(r"^    (?:float|int|vec4|mat4) (\w+);", vulkan, re.MULTILINE)
+    members = re.findall(r"^    (?:float|int|vec4|mat4) (\w+);", lift(*STAGES["body"], "vulkan").text, re.MULTILINE)
     assert {"axis", "axial_start", "count_weight", "snapping_share"} <= set(members)
-    hlsl, msl, wgsl = (text_of("sum", language) for language in ("hlsl", "msl", "wgsl"))
+    hlsl, msl, wgsl = (text_of("body", language) for language in ("hlsl", "msl", "wgsl"))
     assert re.findall(r" body_(\w+) : packoffset", hlsl) == members
     assert re.findall(r"^    (?:float|int|float4|float4x4) (\w+);", msl.split("};")[0], re.MULTILINE) == members
     assert re.findall(r"^    (\w+): ", wgsl.split("}")[0], re.MULTILINE) == members
-    place = "layout(location = 0) in float axial;"
-    assert place in vulkan
+    assert "constant Body& body [[buffer(0)]]" in msl
+    hlsl, msl, wgsl = (text_of("sum", language) for language in ("hlsl", "msl", "wgsl"))
+    assert "layout(location = 0) in float axial;" in lift(*STAGES["sum"], "vulkan").text
     assert "float axial : TEXCOORD0;" in hlsl
     assert "float axial [[user(locn0)]];" in msl
     assert "@location(0) axial: f32" in wgsl
     assert "float2 path_and_count : SV_Target0;" in hlsl
     assert "float2 path_and_count [[color(0)]];" in msl
     assert "@location(0) path_and_count: vec2<f32>" in wgsl
-    assert "constant Body& body [[buffer(0)]]" in msl
     hlsl, msl, wgsl = (text_of("body", language) for language in ("hlsl", "msl", "wgsl"))
     assert "precise float4 gl_Position : SV_Position;" in hlsl
     assert "float4 gl_Position [[position, invariant]];" in msl

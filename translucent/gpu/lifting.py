@@ -26,6 +26,7 @@ _NAME = re.compile(r"[A-Za-z_]\w*")
 _COMMENT = re.compile(r"//.*")
 _FUNCTION = re.compile(r"[\w\s\[\]]*?\b(\w+)\s*\([^;{]*\)\s*\{")
 #: GLSL keywords and types, which no declaration can have as its name.
+_MACRO = re.compile(r"\s*#define (\w+)")
 _WORDS = re.compile(
     r"[iub]?vec[234]|mat[234](x[234])?|float|u?int|bool|void|[iu]?sampler\w+|const|uniform|buffer|struct|layout|std140|"
     r"std430|row_major|binding|location|define|if|else|for|while|return|in|out|inout|flat|\d\w*"
@@ -85,7 +86,9 @@ class _Part:
 
     @property
     def declares(self) -> set[str]:
-        """Names that other parts may need from it: the name of a function, or any name in the part."""
+        """Names that other parts may need from it: that of a function or macro, or any name in the part."""
+        if macro := _MACRO.match(self.code):
+            return {macro[1]}
         return self.names if self.function is None else {self.function}
 
 

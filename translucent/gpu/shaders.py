@@ -139,11 +139,12 @@ def _text(name: str, parents: tuple[str, ...]) -> str:
         return "\n".join(f"#define {key} {value}" for key, value in CONSTANTS.items())
     if name.startswith("<"):
         generated: dict[str, UniformBlock | PackedTable] = {**BLOCKS, **TABLES}
-        if (found := generated.get(name[1:-1])) is None:
+        of_block, _, instance = name[1:-1].partition(" as ")
+        if (found := generated.get(of_block)) is None:
             raise RenderError(
                 f"shader {parents[-1]!r}", f"includes {name}", f"use one of {', '.join(generated)}, constants"
             )
-        return found.glsl
+        return found.named(instance) if instance and isinstance(found, UniformBlock) else found.glsl
     return shader_path(name).read_text(encoding="utf-8")
 
 

@@ -30,7 +30,8 @@ class UniformBlock:
     Parameters
     ----------
     name : str
-        Name of the block in GLSL, and of its generated include, ``#include <name>``.
+        Name of the block in GLSL, and of its generated include, ``#include <name>``; after ``#include <name as other>``
+        its fields are ``other.field``.
     binding : int
         Binding point, the same in every program.
     fields : tuple of (name, base, shape)
@@ -50,11 +51,15 @@ class UniformBlock:
     @property
     def glsl(self) -> str:
         """Declaration for a shader."""
+        return self.named("")
+
+    def named(self, instance: str) -> str:
+        """Declaration for a shader that calls the block so; without a name its fields are global."""
         members = "".join(
             f"    vec4 {name}[{shape[0]}];\n" if _is_array(shape) else f"    {_TYPES[base[0], shape][0]} {name};\n"
             for name, base, shape in self.fields
         )
-        return f"layout(std140, row_major) uniform {self.name} {{\n{members}}};\n"
+        return f"layout(std140, row_major) uniform {self.name} {{\n{members}}}{f' {instance}' if instance else ''};\n"
 
     def pack(self, **values: npt.ArrayLike) -> bytes:
         """Bytes of the block with these values; every field must be given."""

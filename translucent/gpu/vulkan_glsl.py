@@ -13,8 +13,38 @@ from collections.abc import Iterable, Iterator
 
 from translucent.gpu.layout import BLOCKS
 
-#: What vertex shaders hand on, by location.
-VARYINGS = ("axial", "world_normal", "from_eye", "from_center", "surface_uv", "vertex_color", "irradiance")
+#: What the vertex shaders of bodies hand on, and that of the pass over pixels, each by location.
+_OF_BODIES = (
+    "axial",
+    "world_normal",
+    "from_eye",
+    "from_center",
+    "surface_uv",
+    "vertex_color",
+    "irradiance",
+    "counting",
+    "to_axial_depth",
+    "medium_of_body",
+)
+_OF_PICTURES = (
+    "frame_size",
+    "ray_right",
+    "ray_up",
+    "ray_forward",
+    "extinction",
+    "emission",
+    "balance",
+    "beyond",
+    "seen_first",
+    "seen_second",
+    "seen_other",
+    "first_extinction",
+    "second_extinction",
+    "third_extinction",
+    "span",
+    "corner_and_ahead",
+)
+VARYINGS = {name: place for names in (_OF_BODIES, _OF_PICTURES) for place, name in enumerate(names)}
 
 #: Bindings of the loose uniforms of a stage, and of the first of its textures. Blocks are below.
 LOOSE = {"frag": 14, "vert": 15}
@@ -78,7 +108,7 @@ class _Places:
             place = self.attributes
             self.attributes += 1
         else:
-            place = VARYINGS.index(name)
+            place = VARYINGS[name]
         return f"layout(location = {place}) {flat or ''}{way} {kind} {name};"
 
     def texture(self, match: re.Match[str]) -> str:

@@ -177,8 +177,7 @@ export class ExactThicknessPass {
         uniforms.opaque_axial_depth.value = this.ends?.texture ?? null;
         setExtinction(one, diagonal);
         const blocked = this.ends !== null;
-        const whole = weight === 1 && uniforms.axial_start.value === -NOTHING;
-        const switches = { spectral, opaque: blocked, instanced: one.instanced !== null, whole, subpixel };
+        const switches = { spectral, opaque: blocked, instanced: one.instanced !== null, subpixel };
         return one.use(`sum ${Object.values(switches)}`, () => summing(uniforms, switches));
       });
       this.draw(this.sums!, meshes, [0, 0, 0, 0]);

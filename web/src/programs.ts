@@ -39,9 +39,8 @@ uniform vec2 anchor_slope;
 uniform vec2 anchor_rest;
 uniform vec2 across_start;
 uniform vec2 anchor_pixel;
-uniform float snapping_share;
 out vec2 across;
-flat out vec3 of_body;
+flat out vec2 anchor;
 #ifdef USE_INSTANCING
 flat out float mirrored;
 #endif
@@ -60,7 +59,7 @@ void main() {
   offset = transformed - center;
   place_vertex();
   vec2 apart = (clip_from_offset * vec4(offset, 0.0)).xy + across_start - anchor_slope * axial_shown;
-  of_body = vec3(anchor_pixel, snapping_share);
+  anchor = anchor_pixel;
   across = half_size * apart + anchor_rest * gl_Position.w;
 }
 `;
@@ -78,18 +77,17 @@ flat in float mirrored;
 #endif
 `;
 
-// Place of the interpolated point in the picture, and from that where the ray of the pixel meets its face. Software
-// rasterizers check the bounds of each uniform that a fragment reads: what is the same for a body comes with its vertices.
+// Place of the interpolated point in the picture, and from that where the ray of the pixel meets its face.
 const RECENTERED = `
 in float axial_shown;
 in vec2 across;
-flat in vec3 of_body;
+flat in vec2 anchor;
 float axial;
 ${generated.recentered}
 `;
 
 const findAxial = (subpixel: number): string => `
-  vec2 missing = (gl_FragCoord.xy - of_body.xy) - across * gl_FragCoord.w;
+  vec2 missing = (gl_FragCoord.xy - anchor) - across * gl_FragCoord.w;
   vec2 on_ray = recentered(axial_shown, missing, ${constant(subpixel)});
   axial = on_ray.x;
 `;
@@ -157,18 +155,8 @@ function recentering(fragment: string, subpixel: number): string {
   return fragment
     .replace("gl_FrontFacing", "FRONT_FACING")
     .replace("in float axial;\n", "")
-    .replace("uniform float snapping_share;\n", "")
-    .replace("snapping(axial, snapping_share)", "on_ray.y * of_body.z")
+    .replace("snapping(axial, snapping_share)", "on_ray.y * snapping_share")
     .replace("void main() {", `void main() {${findAxial(subpixel)}`);
-}
-
-/** Uniforms of a closed body that has no rays beginning in it, as constants. */
-function ofWholeBody(fragment: string): string {
-  const kept = { count_weight: 1, count_offset: 0, axial_start: -generated.NOTHING };
-  return Object.entries(kept).reduce(
-    (text, [name, value]) => text.replace(`uniform float ${name};`, `const float ${name} = ${constant(value)};`),
-    fragment,
-  );
 }
 
 function drawn(fragment: string, equation: BlendingEquation, uniforms: BodyUniforms, instanced: boolean): ShaderMaterial {
@@ -197,18 +185,15 @@ export interface Summing {
   /** Opaque objects end rays. */
   opaque: boolean;
   instanced: boolean;
-  /** Closed, and no ray begins in it: what follows from that is not read from uniforms. */
-  whole: boolean;
   /** Step of the grid onto which the rasterizer moves vertices, in pixels. */
   subpixel: number;
 }
 
 /** Adds up signed paths and counts. */
-export function summing(uniforms: BodyUniforms, { spectral, opaque, instanced, whole, subpixel }: Summing): ShaderMaterial {
+export function summing(uniforms: BodyUniforms, { spectral, opaque, instanced, subpixel }: Summing): ShaderMaterial {
   const path = opaque ? generated.signedDepthBeforeOpaque : generated.signedDepth;
   const paths = opaque ? generated.spectralDepthBeforeOpaque : generated.spectralDepth;
-  const fragment = recentering(spectral ? paths : path, subpixel);
-  return drawn(whole ? ofWholeBody(fragment) : fragment, AddEquation, uniforms, instanced);
+  return drawn(recentering(spectral ? paths : path, subpixel), AddEquation, uniforms, instanced);
 }
 
 /** Keeps the nearest opaque surface, as a share of the depth of the media; without a depth buffer, which would round it. */

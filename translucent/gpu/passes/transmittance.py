@@ -43,7 +43,7 @@ class TransmittancePass:
 
     def __init__(self, gl: moderngl.Context) -> None:
         units = {name: unit for unit, name in enumerate(_SAMPLERS)}
-        self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/transmittance.frag", **units)
+        self._variants = Variants(gl, "shade/transmittance.vert", "shade/transmittance.frag", **units)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Shade the frame from its accumulated paths; for a job of several samples, add a sample's radiance and
