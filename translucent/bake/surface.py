@@ -91,14 +91,14 @@ class Surface:
             raise InputError(
                 f"mesh {mesh.name!r}", "all its faces look inwards", "turn it (tl.load_mesh does), or export it again"
             )
-        corners = (mesh.vertices[mesh.faces] - mesh.center) / (0.5 * mesh.diagonal)
+        corners = ((mesh.vertices - mesh.center) / (0.5 * mesh.diagonal)).take(mesh.faces, axis=0)
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        twice_area = np.linalg.norm(cross, axis=1)
+        twice_area = np.sqrt(_dot(cross, cross))
         faces = np.flatnonzero(twice_area > NO_AREA)
         if not faces.size:
             raise InputError(f"mesh {mesh.name!r}", "no face has an area", "give a triangle mesh")
         corners, normals = corners[faces], cross[faces] / twice_area[faces, None]
-        offset = (normals * corners.mean(axis=1)).sum(axis=1)
+        offset = _dot(normals, (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0)
         with_area = Mesh(mesh.vertices, mesh.faces[faces], name=mesh.name)
         return cls(
             EmbreeMesh(with_area),

@@ -50,16 +50,17 @@ def _fill(found: npt.NDArray[np.floating], vertices: Array, faces: npt.NDArray[n
     group = _smooth_groups(equal_rows(vertices).of.astype(np.int32)[faces], normals)
     sums = np.zeros((3, int(group.max()) + 1))
     for block in _blocks(len(faces)):
-        weighted = normals[block, None] * corner_angles(vertices[faces[block]])[..., None]
+        angles = corner_angles(vertices.take(faces[block], axis=0))
         for axis in range(3):
-            np.add.at(sums[axis], group[block].ravel(), weighted[..., axis].ravel())
+            np.add.at(sums[axis], group[block].ravel(), (normals[block, axis, None] * angles).ravel())
     with np.errstate(under="ignore"):
         for block in _blocks(len(faces)):
-            smooth = np.moveaxis(sums[:, group[block]], 0, -1)
-            length = np.linalg.norm(smooth, axis=2, keepdims=True)
-            found[block] = np.where(
-                length > 1e-12, smooth / np.where(length > 1e-12, length, 1.0), normals[block, None]
-            )
+            x, y, z = smooth = sums.take(group[block], axis=1)
+            length = np.sqrt(x * x + y * y + z * z)
+            usable = length > 1e-12
+            divisor = np.where(usable, length, 1.0)
+            for axis in range(3):
+                found[block, :, axis] = np.where(usable, smooth[axis] / divisor, normals[block, axis, None])
 
 
 def _blocks(count: int) -> Iterator[slice]:
