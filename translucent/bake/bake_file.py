@@ -13,9 +13,7 @@ from translucent.bake.writing import save_map, save_vertices
 from translucent.mesh_files import load_mesh
 
 
-def bake_file(
-    job: Job, progress: Progress | None = None, content: str | None = None
-) -> tuple[Record, Results]:
+def bake_file(job: Job, progress: Progress | None = None, content: str | None = None) -> tuple[Record, Results]:
     """Run a bake job and write its files.
 
     Parameters
