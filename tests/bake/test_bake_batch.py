@@ -96,6 +96,21 @@ def test_what_a_killed_process_left_is_removed(make_jobs: Any) -> None:
     }
 
 
+def test_a_job_of_a_batch_reads_its_model_for_the_hash_once(make_jobs: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    (job,) = make_jobs(1)
+    asked: list[Job] = []
+
+    def counted(job: Job) -> str:
+        asked.append(job)
+        return content_hash(job)
+
+    for module in ("batch", "bake_file"):
+        monkeypatch.setattr(f"translucent.bake.{module}.content_hash", counted)
+    assert run_job(job)["status"] == "baked"
+    assert asked == [job]
+    assert (read_record(Path(job["output"])) or {})["hash"] == content_hash(job)
+
+
 def test_a_job_is_done_and_done_once(make_jobs: Any) -> None:
     (job,) = make_jobs(1)
     first = run_job(job)

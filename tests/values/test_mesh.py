@@ -27,6 +27,7 @@ from tests.values.handmade import (
     moebius,
 )
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh
+from translucent.geometry.normals import corner_angles
 
 # Volume
 
@@ -67,6 +68,14 @@ def test_bounds_center_and_diagonal_ignore_unreferenced_vertices() -> None:
     assert mesh.bounds.tolist() == [[0, 0, 0], [1, 2, 3]]
     assert mesh.center.tolist() == [0.5, 1, 1.5]
     assert mesh.diagonal == pytest.approx(math.sqrt(14), rel=2 * EPS)
+
+
+def test_angles_at_the_corners_of_triangles() -> None:
+    places = np.random.default_rng(1).normal(size=(200, 3, 3))
+    # Roundings of two edges, their cross product and the angle, at each of three corners.
+    assert corner_angles(places).sum(axis=1) == pytest.approx(math.pi, abs=12 * EPS)
+    right = corner_angles(np.array([[[0.0, 0.0, 5.0], [4.0, 0.0, 5.0], [0.0, 3.0, 5.0]]]))
+    assert right[0] == pytest.approx([math.pi / 2, math.atan2(3, 4), math.atan2(4, 3)], abs=4 * EPS)
 
 
 def test_vertex_normals_of_a_ball_point_outwards() -> None:

@@ -13,7 +13,7 @@ from translucent.bake.writing import save_map, save_vertices
 from translucent.mesh_files import load_mesh
 
 
-def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Results]:
+def bake_file(job: Job, progress: Progress | None = None, content: str | None = None) -> tuple[Record, Results]:
     """Run a bake job and write its files.
 
     Parameters
@@ -21,6 +21,8 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
     job : dict
         See `translucent.bake.jobs`.
     progress : callable, optional
+    content : str, optional
+        The `content_hash` of the job, where it is known.
 
     Returns
     -------
@@ -39,7 +41,7 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
     """
     check_job(job)
     output = Path(job["output"])
-    about = {"hash": content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
+    about = {"hash": content or content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
     if has_parts(job):
         return bake_gltf(job, about, progress)
     mesh = load_mesh(job["model"], unit=job.get("unit", "m"), allow_outside=bool(job.get("outside")))

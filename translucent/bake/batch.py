@@ -179,7 +179,7 @@ def run_job(job: Job, version: str | None = None) -> Record:
         if is_done(job, content):
             doubts = _doubts(job, read_record(Path(job["output"])) or {})
             return _judged(job, "skipped", time.perf_counter() - started, doubts)
-        record, results = bake_file(job)
+        record, results = bake_file(job, content=content)
     except TranslucentError as error:
         return _entry(job, "failed", time.perf_counter() - started, error=str(error))
     except Exception as error:  # noqa: BLE001 - a defect of ours, or a full memory: the others go on

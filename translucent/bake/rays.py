@@ -32,7 +32,7 @@ BEHIND = 1e-10
 
 
 #: Number of rays whose distances are computed at a time: their arrays stay in the cache of a processor.
-CACHED_RAYS = 1 << 13
+CACHED_RAYS = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)

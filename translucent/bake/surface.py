@@ -91,14 +91,14 @@ class Surface:
             raise InputError(
                 f"mesh {mesh.name!r}", "all its faces look inwards", "turn it (tl.load_mesh does), or export it again"
             )
-        corners = (mesh.vertices[mesh.faces] - mesh.center) / (0.5 * mesh.diagonal)
+        corners = ((mesh.vertices - mesh.center) / (0.5 * mesh.diagonal)).take(mesh.faces, axis=0)
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        twice_area = np.linalg.norm(cross, axis=1)
+        twice_area = np.sqrt(_dot(cross, cross))
         faces = np.flatnonzero(twice_area > NO_AREA)
         if not faces.size:
             raise InputError(f"mesh {mesh.name!r}", "no face has an area", "give a triangle mesh")
         corners, normals = corners[faces], cross[faces] / twice_area[faces, None]
-        offset = (normals * corners.mean(axis=1)).sum(axis=1)
+        offset = _dot(normals, (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0)
         with_area = Mesh(mesh.vertices, mesh.faces[faces], name=mesh.name)
         return cls(
             EmbreeMesh(with_area),
@@ -115,21 +115,29 @@ class Surface:
 
     def points(self, face: Integers, barycentric: Array) -> Points:
         """Points of faces (k,) with barycentric weights (k, 3)."""
-        inset = INSET + (1.0 - 3.0 * INSET) * barycentric
-        corners = self.corners[face]
-        return Points(
-            face,
-            blend(corners, barycentric),
-            blend(corners, np.where((barycentric < INSET).any(axis=1, keepdims=True), inset, barycentric)),
-            self.smooth_normals(face, barycentric),
-        )
+        corners = np.take(self.corners, face, axis=0)
+        exact = blend(corners, barycentric)
+        start = exact.copy()
+        least = np.minimum(np.minimum(barycentric[:, 0], barycentric[:, 1]), barycentric[:, 2])
+        near = np.flatnonzero(least < INSET)
+        start[near] = blend(corners[near], INSET + (1.0 - 3.0 * INSET) * barycentric[near])
+        return Points(face, exact, start, self.smooth_normals(face, barycentric))
 
     def smooth_normals(self, face: Integers, barycentric: Array) -> Array:
         """(k, 3): unit normals; the face's own where the smooth one does not look to its outside."""
-        smooth, own = blend(self.normals[face], barycentric), self.planes[face, :3]
-        length = np.linalg.norm(smooth, axis=1, keepdims=True)
-        usable = (smooth * own).sum(axis=1, keepdims=True) > 1e-3 * length
-        return np.where(usable, smooth / np.where(usable, length, 1.0), own)
+        smooth = blend(np.take(self.normals, face, axis=0), barycentric)
+        own = np.take(self.planes, face, axis=0)[:, :3]
+        # Much faster than reductions along an axis of three.
+        length = np.sqrt(_dot(smooth, smooth))
+        usable = _dot(smooth, own) > 1e-3 * length
+        smooth /= np.where(usable, length, 1.0)[:, None]
+        np.copyto(smooth, own, where=~usable[:, None])
+        return smooth
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """(k,): dot products of the rows of (k, 3) and (k, 3)."""
+    return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])
 
 
 def blend(corners: Array, barycentric: Array) -> Array:

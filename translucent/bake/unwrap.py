@@ -98,7 +98,9 @@ def _check(mesh: Mesh, uv: Array) -> None:
     if bad := int((~np.isfinite(uv)).any(axis=1).sum()):
         raise InputError(f"mesh {mesh.name!r}", f"{bad} texture coordinates are not finite", ANEW)
     corners = uv[mesh.faces]
-    span = corners.max(axis=1) - corners.min(axis=1)
+    # Much faster than reductions along an axis of three.
+    one, two, three = corners.transpose(1, 0, 2)
+    span = np.maximum(np.maximum(one, two), three) - np.minimum(np.minimum(one, two), three)
     if float(span.max()) > MOST_TILES:
         face = int(span.max(axis=1).argmax())
         raise InputError(
@@ -106,7 +108,7 @@ def _check(mesh: Mesh, uv: Array) -> None:
             f"face {face} covers {span.max():.3g} tiles in UV: a texture repeats on it",
             ANEW,
         )
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    a, b = two - one, three - one
     with np.errstate(under="ignore"):
         if not (a[:, 0] * b[:, 1] != a[:, 1] * b[:, 0]).any():
             raise InputError(f"mesh {mesh.name!r}", "no face has an area in UV", ANEW)

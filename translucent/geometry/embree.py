@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -108,6 +109,7 @@ def starts(origins: Array, directions: Array) -> Array:
     return np.asarray(-np.einsum("ki,ki->k", origins, directions) - BEFORE)
 
 
+@cache  # to make a device and to look for a package's metadata takes milliseconds, and each record of a batch asks
 def embree_versions() -> dict[str, str]:
     """Versions of embreex, and of the Embree in it; raises `RenderError` if it cannot be imported."""
     _import_embreex()
