@@ -175,7 +175,10 @@ class Truth:
         """Root mean square error in radiance: noise of the two halves is not correlated, so their product has none."""
         used = self.compared & frame.coverage & frame.valid
         shown = np.asarray(frame.radiance, np.float64)
-        return math.sqrt(max(float(np.mean(((shown - one) * (shown - other))[used])), 0.0))
+        products = ((shown - one) * (shown - other))[used].mean(axis=1)
+        # Over pixels the error may be less than noise can tell: then the standard error of its square is told.
+        least = float(products.std()) * max(len(products), 1) ** -0.5 if self.rays > 1 else 0.0
+        return math.sqrt(max(float(products.mean()), least))
 
     def light_errors(self, frame: Frame, solve_seconds: float | None) -> LightErrors | None:
         """Errors of a frame as shares of the mean of a path traced truth; None if there is no such truth."""
