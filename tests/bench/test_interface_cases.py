@@ -9,6 +9,7 @@ import pytest
 
 import translucent as tl
 from tests.bench.measuring import case_of, measured, named
+from translucent.bench import measure
 from translucent.bench import truth as truths
 from translucent.bench.cases import CASES
 from translucent.bench.contenders import contenders
@@ -19,11 +20,16 @@ from translucent.geometry.solids import Sphere
 from translucent.gpu.passes import traced_interfaces
 
 
-def test_a_deeper_tree_is_nearer_to_all_light_and_what_is_drawn_is_not(
-    studio: Studio, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Along the ray of each pixel's center, which the reference follows: pictures show means over half a pixel."""
+@pytest.fixture
+def along_centers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures and truths along the rays of pixels' centers: errors are what a way of finding interfaces leaves out."""
     monkeypatch.setattr(traced_interfaces, "FOOTPRINT_STEP", 0.0)
+    monkeypatch.setattr(Truth, "over_pixels", Truth.of)
+    monkeypatch.setattr(measure, "SAMPLES", 1)
+
+
+@pytest.mark.usefixtures("along_centers")
+def test_a_deeper_tree_is_nearer_to_all_light_and_what_is_drawn_is_not(studio: Studio) -> None:
     names = ("constant-thickness", "straight rays", "FrontInterface", "ScreenInterfaces", "TracedInterfaces")
     made = measured(studio, named("glass"), *names, size=(64, 64))
     rows = {row.method: row for row in made.rows}
@@ -54,6 +60,7 @@ def test_a_deeper_tree_is_nearer_to_all_light_and_what_is_drawn_is_not(
     assert advice.constant is constant
 
 
+@pytest.mark.usefixtures("along_centers")
 def test_a_thin_wall_mirrors_and_does_not_bend(studio: Studio) -> None:
     made = measured(studio, named("thin wall"), "ScreenInterfaces", "FrontInterface", "straight rays", size=(192, 192))
     rows = {row.method: row for row in made.rows}
@@ -80,6 +87,17 @@ def test_media_within_each_other_have_a_method_that_finds_their_order(studio: St
     assert row.radiance is not None
 
 
+def test_pictures_are_held_against_the_mean_over_pixels_with_one_sample_and_with_many(studio: Studio) -> None:
+    made = measured(studio, named("glass"), "traced-interfaces-depth-12-2-forks", "constant-thickness", size=(48, 48))
+    _, constant, row = made.rows
+    assert made.truth_rays == 2 * truths.RAYS
+    assert 0.0 < made.truth_spread < 0.1
+    assert row.radiance is not None
+    assert row.sampled is not None
+    assert row.sampled.rms < 0.7 * row.radiance.rms, "sixteen samples are nearer to what a camera takes"
+    assert constant.sampled is None
+
+
 def test_the_reference_follows_rays_until_they_come_out() -> None:
     """In a knot light goes around for a hundred reflections: twelve leave most of some pixels open."""
     frame = Truth.of(named("glass knot").scene((16, 16)), (16, 16), 1e-3).frame
@@ -96,12 +114,18 @@ def test_noise_of_the_reference_is_no_error(rng: np.random.Generator) -> None:
     found = noisy.errors(shown, "radiance")
     assert found is not None
     assert found[0].rms * noisy.scale("radiance") == pytest.approx(0.1, rel=0.1)
+    # What noise hides is no zero: with halves of 0.3, the square's standard error over pixels is told at least.
+    unseen = dataclasses.replace(noisy, rays=8).errors(truth.frame, "radiance")
+    least = np.sqrt(0.3**2 / np.sqrt(3 * truth.compared.sum()))
+    assert unseen is not None
+    assert 0.9 * least < unseen[0].rms * noisy.scale("radiance") < 2.0 * least
 
 
 def test_frosted_glass_has_two_references(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(truths, "PATHS", 2)
-    truth = Truth.of(named("frosted").scene((8, 8)), (8, 8), 1e-3)
+    truth = Truth.over_pixels(named("frosted").scene((8, 8)), (8, 8), 1e-3)
     assert truth.halves is not None
+    assert truth.rays == 4
     one, other = truth.halves
     assert (one != other).any()
     np.testing.assert_allclose(truth.frame.radiance, 0.5 * (one + other))

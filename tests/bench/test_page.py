@@ -257,6 +257,29 @@ def test_slabs_and_scattered_light_have_tables() -> None:
     assert 'class="bad planned"' in page
 
 
+def test_errors_of_many_samples_stand_beside_those_of_one() -> None:
+    known = case()
+    sampled = dataclasses.replace(known.rows[1], sampled=Errors(0.0123, 0.0045, 0.067, 0.0912, 0.34, -0.056))
+    record = dataclasses.replace(
+        known, rows=(known.rows[0], sampled, *known.rows[2:]), truth_rays=8, truth_spread=0.0712
+    )
+    page = build_page(report(cases=(record,)))
+    found = cells(page)
+    for text in (
+        "radiance, 16 samples",
+        "0.012",
+        "4.5e-3",
+        "0.067",
+        "0.091",
+        "0.34",
+        numbers.signed_error_text(-0.056),
+    ):
+        assert found[text], text
+    assert found["0.012"] > 1, "beside the plot, too"
+    assert "mean of 8 rays spread over each, which is uncertain by 7.12 %" in " ".join(page.split())
+    assert "16 samples" not in build_page(report())
+
+
 def test_banners() -> None:
     def of(**more: Any) -> str:
         changed = dataclasses.replace(PROVENANCE, **{k: v for k, v in more.items() if hasattr(PROVENANCE, k)})

@@ -37,6 +37,7 @@ def full_report() -> Report:
         passes=1,
         bytes_per_pixel=61,
         thickness=errors,
+        sampled=dataclasses.replace(errors, rms=7e-4),
         light=LightErrors(0.02, 0.01, (0.1, -0.2, 0.3), 0.4),
         invalid=0.0,
         coverage_mismatch=0.0,

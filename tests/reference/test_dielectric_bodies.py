@@ -12,12 +12,13 @@ from tests.reference.dielectrics import BLACK, GLASS, UP_AND_DOWN, WHITE, box, o
 from translucent.frames.frame import Frame
 from translucent.geometry.solids import Sphere
 from translucent.media.medium import Medium
-from translucent.reference import refracted_light, render
+from translucent.reference import light_over_pixels, refracted_light, render
 from translucent.reference.refracted import FAINTEST
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Object, Scene
+from translucent.scene.showcase import framing
 
 # What rays are in
 
@@ -112,3 +113,27 @@ def test_all_but_the_radiance_is_that_of_straight_rays() -> None:
     for name in ("thickness", "optical_depth", "transmittance", "coverage"):
         np.testing.assert_array_equal(getattr(bent, name), getattr(straight, name))
     assert np.abs(bent.radiance - straight.radiance).max() > 0.1
+
+
+def test_light_over_pixels_is_that_of_a_box_filter() -> None:
+    """The mean over seeds is that of 8 x 8 rays on a grid in each pixel, within its own standard error."""
+    size, fine, seeds = (12, 12), 8, 16
+    glass = Object(Sphere().tessellate(32), Medium(ior=1.5))
+    scene = Scene([glass], framing([glass], size), environment=Environment.studio())
+    inner = np.zeros(size[::-1], dtype=bool)
+    inner[4:8, 4:8] = True
+    found = np.stack([light_over_pixels(scene, size, inner, 2, seed=seed)[0] for seed in range(seeds)])
+    grid, along = (
+        refracted_light(scene, (k * size[0], k * size[1]))[0].radiance.reshape(size[1], k, size[0], k, 3)
+        for k in (fine, 1)
+    )
+    truth, centers = (rays.mean(axis=(1, 3))[inner] for rays in (grid, along))
+    off, error = (
+        np.sqrt(np.mean((found.mean(axis=0) - truth) ** 2)),
+        np.sqrt(np.mean(found.var(axis=0, ddof=1) / seeds)),
+    )
+    assert off < 1.3 * error
+    assert 2.0 * error < np.sqrt(np.mean((centers - truth) ** 2))
+    errors = found - truth
+    shared = (errors[::2] * errors[1::2]).mean()
+    assert abs(shared) < 0.3 * (errors**2).mean(), "errors of two seeds have nothing to do with each other"

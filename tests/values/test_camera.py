@@ -60,6 +60,11 @@ def test_an_offset_moves_right_and_down_in_pixels() -> None:
     assert coarse[1, 1] == pytest.approx(unit(2 * 0.25 / 3, -2 * 0.75 / 3, -1), abs=4 * EPS)
     # An eighth of a pixel from its center is the center of the next of 4 x 4 finer pixels.
     assert FRONT.rays((3, 3), offset=(1 / 8, 1 / 8))[1][1, 1] == pytest.approx(fine[6, 6], abs=4 * EPS)
+    each = np.arange(9).reshape(3, 3) / 9 - 0.5, np.arange(9).reshape(3, 3) / 18
+    own = FRONT.rays((3, 3), each)[1]
+    for row, column in ((0, 2), (2, 1)):
+        shift = each[0][row, column], each[1][row, column]
+        np.testing.assert_array_equal(own[row, column], FRONT.rays((3, 3), shift)[1][row, column])
 
 
 def test_orthographic_rays_are_parallel_and_start_beside_the_eye() -> None:

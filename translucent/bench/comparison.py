@@ -148,7 +148,8 @@ def _row_changes(before: CaseRecord, after: CaseRecord, old: Row, new: Row) -> I
         yield Change("fails" if new.failure else "gone", where, str(new.failure or new.refusal))
     if before.size == after.size and old.kind != "floor":
         yield from _time_change(where, old, new)
-    if before.compared_size == after.compared_size:
+    # Of one ray through each pixel or of several, the truth is another.
+    if before.compared_size == after.compared_size and before.truth_rays == after.truth_rays:
         yield from _error_change(where, before, old, new)
 
 

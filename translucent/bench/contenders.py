@@ -99,6 +99,11 @@ class Contender:
         """True if its thickness, in solids, is chosen to fit the truth best."""
         return self.technique in ("constant", "ball") or self.method.makes_sheets
 
+    @property
+    def samplable(self) -> bool:
+        """True if several samples of a pixel are another picture, which `Renderer.render` draws."""
+        return self.technique in ("plan", "cpu") and not isinstance(self.method, PathTraced)
+
     def refusal(self, scene: Scene) -> str | None:
         """Reason why it is not measured on a scene, though the planner would run it."""
         if self.technique in ("constant", "ball", "unmarked", "half") and scene.opaque:

@@ -19,7 +19,7 @@ _LARGEST = 1 << 28
 #: Fields of a row that are dataclasses, one column for each of their fields.
 _GROUPS = (
     *("wall", "gpu", "frame", "ratio", "frame_ratio"),
-    *("thickness", "transmittance", "radiance", "color_difference", "light"),
+    *("thickness", "transmittance", "radiance", "sampled", "color_difference", "light"),
 )
 
 

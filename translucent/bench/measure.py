@@ -15,7 +15,7 @@ from translucent.bench.fitting import fitted
 from translucent.bench.frontier import mark_frontier
 from translucent.bench.promise import promise_of
 from translucent.bench.record import CaseRecord
-from translucent.bench.row import Quantity, Row
+from translucent.bench.row import Errors, Quantity, Row
 from translucent.bench.staging import drawing, plan_of, seen_by
 from translucent.bench.timing import Samples, interleaved, ratio, timing
 from translucent.bench.truth import Truth
@@ -23,8 +23,12 @@ from translucent.errors import InputError, TranslucentError, TranslucentWarning
 from translucent.frames.frame import Frame
 from translucent.gpu.targets import Targets
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering import SingleScattering
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
+
+#: Samples of each pixel of the pictures that tell what more of them gain on interfaces.
+SAMPLES = 16
 
 #: Quantity by which the methods of a case are ranked.
 QUANTITY: dict[str, Quantity] = {
@@ -87,7 +91,7 @@ class CaseRun:
         try:
             scene = case.scene(self.size)
             small = scaled(self.size, round(case.compared * self.compared))
-            truth = Truth.stored(case.name, scene) if case.stored else Truth.of(scene, small, case.tolerance)
+            truth = self._truth(scene, small)
             small = truth.frame.size
         except Exception as error:  # noqa: BLE001 - a scene that cannot be traced leaves the other cases alone
             return dataclasses.replace(blank, failure=one_line(error))
@@ -103,6 +107,13 @@ class CaseRun:
             self._entries.append(entry)
         rows = mark_frontier(self._timed(scene), blank.quantity)
         return dataclasses.replace(blank, rows=rows, pictures=tuple(pictures))
+
+    def _truth(self, scene: Scene, size: Size) -> Truth:
+        case = self.case
+        if case.stored:
+            return Truth.stored(case.name, scene)
+        trace = Truth.over_pixels if case.effect == "interfaces" else Truth.of
+        return trace(scene, size, case.tolerance)
 
     def _compared(self, contender: Contender, scene: Scene, truth: Truth, size: Size, case: CaseRecord) -> _Entry:
         """Draw the contender once, small, and compare it with the reference."""
@@ -125,6 +136,8 @@ class CaseRun:
                     drawn.draw()
                     entry.frame = drawn.read()
                 entry.row = _against(row, entry, drawn, truth, case, plan)
+                if self.case.effect == "interfaces" and contender.samplable:
+                    entry.row = dataclasses.replace(entry.row, sampled=self._sampled(contender, seen, truth, size))
             finally:
                 drawn.release()
         except InputError as error:  # the planner's answer
@@ -134,6 +147,19 @@ class CaseRun:
         finally:
             targets.release()
         return entry
+
+    def _sampled(self, contender: Contender, scene: Scene, truth: Truth, size: Size) -> Errors | None:
+        """Errors in radiance with `SAMPLES` samples of each pixel."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", TranslucentWarning)
+            if contender.technique == "cpu":
+                assert self.cpu is not None, "it has drawn before"
+                frame = self.cpu.render(scene, size, samples=SAMPLES, scattering=SingleScattering())
+            else:
+                renderer = self.studio.renderer
+                frame = renderer.render(scene, size, samples=SAMPLES, interfaces=contender.interfaces)
+        found = truth.errors(frame, "radiance")
+        return None if found is None else found[0]
 
     def _timed(self, scene: Scene) -> list[Row]:
         """The rows with their times, the floor first."""
@@ -208,6 +234,8 @@ def _described(blank: CaseRecord, scene: Scene, truth: Truth, small: Size) -> Ca
         compared_pixels=int(truth.compared.sum()),
         reference_seconds=truth.seconds,
         truth_noise=truth.noise,
+        truth_rays=truth.rays,
+        truth_spread=truth.spread if truth.rays > 1 else 0.0,
     )
 
 

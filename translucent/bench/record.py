@@ -85,6 +85,10 @@ class CaseRecord:
         That the reference took; of a stored truth, when it was made.
     truth_noise : float, optional
         Root mean square of the standard error of a path traced truth, as a share of its mean.
+    truth_rays : int
+        Rays of the reference through each pixel, spread over it, whose mean its radiance is; 1 along its center.
+    truth_spread : float
+        Root mean square of the standard error of that mean, as a share of that of the radiance.
     rows : tuple of Row
         The floor first.
     pictures : tuple of Picture
@@ -109,6 +113,8 @@ class CaseRecord:
     compared_pixels: int = 0
     reference_seconds: float = 0.0
     truth_noise: float | None = None
+    truth_rays: int = 1
+    truth_spread: float = 0.0
     rows: tuple[Row, ...] = ()
     pictures: tuple[Picture, ...] = ()
     failure: str | None = None

@@ -130,6 +130,9 @@ class Row:
         Of all targets and buffers of its frames; 53 of them hold the result.
     thickness, transmittance, radiance : Errors, optional
         None where there is no pixel that can be compared.
+    sampled : Errors, optional
+        In radiance, of the mean of 16 samples of each pixel, where the others are of one: of ways of finding
+        interfaces.
     color_difference : ColorDifference, optional
         What anybody could see of these errors; None beside a truth with noise.
     light : LightErrors, optional
@@ -164,6 +167,7 @@ class Row:
     thickness: Errors | None = None
     transmittance: Errors | None = None
     radiance: Errors | None = None
+    sampled: Errors | None = None
     color_difference: ColorDifference | None = None
     light: LightErrors | None = None
     invalid: float | None = None

@@ -33,7 +33,8 @@ def _lines(report: Report) -> Iterator[str]:
         if case.failure:
             yield f"  failed: {case.failure}"
             continue
-        yield _HEAD if case.truth_noise is None else _SCATTERED_HEAD
+        head = _HEAD if case.truth_noise is None else _SCATTERED_HEAD
+        yield head + (f"{'RMS of 16':>11}" if any(row.sampled for row in case.rows) else "")
         yield from (_row(case, row) for row in case.rows)
     yield from _shadows(report.shadows)
     if report.hard_cases:
@@ -94,4 +95,5 @@ def _row(case: CaseRecord, row: Row) -> str:
         return f"{line}{row.light.nrmse:>9.3f}{row.light.block:>9.3f}{bias}{solved:>9}"
     errors = row.errors(case.quantity)
     line += f"{errors.rms:>9.1e}{errors.p999:>9.1e}" if errors else f"{'':>18}"
-    return line + (f"{row.invalid:>9.2%}" if row.invalid is not None else "")
+    line += f"{row.invalid:>9.2%}" if row.invalid is not None else f"{'':>9}"
+    return line + f"{row.sampled.rms:>11.1e}" if row.sampled else line.rstrip()

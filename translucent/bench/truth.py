@@ -33,6 +33,9 @@ BOUNCES = 128
 #: Number of rays through each pixel of each of two references before rough interfaces, whose spread is their noise.
 PATHS = 128
 
+#: Number of rays through each pixel of each of two references where the truth is a mean over pixels.
+RAYS = 4
+
 #: Width and height of the blocks over whose means errors are taken, too, in pixels.
 BLOCK = 4
 
@@ -61,10 +64,12 @@ class Truth:
     seconds : float
         That the frame took.
     halves : two (h, w, 3) arrays, optional
-        Radiances with noise that has nothing to do with each other's, where interfaces are rough; the frame has the
-        mean.
+        Radiances with noise that has nothing to do with each other's, where interfaces are rough or radiance is a mean
+        over pixels; the frame has the mean.
     noise : float, optional
         Of a stored truth: root mean square of its standard error, as a share of its mean.
+    rays : int
+        Through each pixel that is compared, spread over it, whose mean is its radiance; 1 along its center.
     """
 
     frame: Frame
@@ -74,10 +79,27 @@ class Truth:
     seconds: float
     halves: tuple[Array, Array] | None = None
     noise: float | None = None
+    rays: int = 1
+
+    @classmethod
+    def over_pixels(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
+        """Trace the radiance that a camera with a box filter takes, where errors are taken; elsewhere along centers."""
+        along = cls.of(scene, size, tolerance)
+        begin = time.perf_counter()
+        rays = PATHS if along.halves else RAYS
+        halves = along.frame.radiance.copy(), along.frame.radiance.copy()
+        valid = along.frame.valid.copy()
+        used = along.compared
+        for seed, half in enumerate(halves):
+            half[used], sound = reference.light_over_pixels(scene, size, used, rays, tolerance, BOUNCES, seed)
+            valid[used] &= sound
+        frame = dataclasses.replace(along.frame, radiance=0.5 * (halves[0] + halves[1]), valid=valid)
+        seconds = along.seconds + time.perf_counter() - begin
+        return dataclasses.replace(along, frame=frame, seconds=seconds, halves=halves, rays=2 * rays)
 
     @classmethod
     def of(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
-        """Trace the ground truth of a scene."""
+        """Trace the ground truth of a scene, along the centers of pixels."""
         begin = time.perf_counter()
         rough = any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies)
         frame, *others = (
@@ -117,6 +139,14 @@ class Truth:
         return cls(frame, inside, int(counts.max()), diagonal, seconds, halves)
 
     @property
+    def spread(self) -> float:
+        """Standard error of the radiance of pixels, root mean square, as a share of the radiance's own."""
+        if self.halves is None:
+            return 0.0
+        one, other = (half[self.compared] for half in self.halves)
+        return float(np.sqrt(np.mean((one - other) ** 2))) / 2.0 / self.scale("radiance")
+
+    @property
     def compared(self) -> npt.NDArray[np.bool_]:
         """(h, w) pixels that errors are taken over, as far as a method calls them valid."""
         return self.inside & self.frame.coverage & self.frame.valid
@@ -145,7 +175,10 @@ class Truth:
         """Root mean square error in radiance: noise of the two halves is not correlated, so their product has none."""
         used = self.compared & frame.coverage & frame.valid
         shown = np.asarray(frame.radiance, np.float64)
-        return math.sqrt(max(float(np.mean(((shown - one) * (shown - other))[used])), 0.0))
+        products = ((shown - one) * (shown - other))[used].mean(axis=1)
+        # Over pixels the error may be less than noise can tell: then the standard error of its square is told.
+        least = float(products.std()) * max(len(products), 1) ** -0.5 if self.rays > 1 else 0.0
+        return math.sqrt(max(float(products.mean()), least))
 
     def light_errors(self, frame: Frame, solve_seconds: float | None) -> LightErrors | None:
         """Errors of a frame as shares of the mean of a path traced truth; None if there is no such truth."""

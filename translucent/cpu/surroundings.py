@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -11,13 +10,13 @@ import numpy as np
 from translucent.arrays import Array, Mask
 from translucent.cpu.beams import Beams
 from translucent.cpu.footprints import ellipses
-from translucent.cpu.vectors import dot, unit
+from translucent.cpu.vectors import dot
 from translucent.formulas.footprint import ALPHA_OF_DEVIATION, LEAST_BREADTH, MOST_LOOKUPS
 from translucent.reference.ray_ends import ACROSS
 from translucent.reference.rays import Rays
 from translucent.scene.environment import Environment, equirectangular_uv
-from translucent.scene.environment_filter import filtered
-from translucent.scene.environment_map import EnvironmentMap
+from translucent.scene.environment_filter import FilteredEnvironment, filtered
+from translucent.scene.environment_map import bilinear
 from translucent.scene.scene import Scene
 
 
@@ -35,10 +34,9 @@ class Surroundings:
         self.scene, self.aspect, self.environment = scene, aspect, scene.environment
 
     @cached_property
-    def _maps(self) -> tuple[EnvironmentMap, ...]:
+    def _maps(self) -> FilteredEnvironment:
         """Maps of the environment's light, from that of a mirror to that of a surface of roughness 1."""
-        found = filtered(self.environment)
-        return found.sharp, *(EnvironmentMap(level) for level in found.levels)
+        return filtered(self.environment)
 
     def radiance(self, beams: Beams, rays: Rays) -> Array:
         """(n, 3): radiance along beams that nothing stops, which are `rays` in metres from the eye.
@@ -77,21 +75,21 @@ class Surroundings:
         """(n, 3): light averaged over the footprints of beams."""
         axis, breadth = ellipses(beams.footprint[:, 1])
         longer = np.sqrt(dot(axis, axis))
-        lookups = np.clip(np.ceil(longer / np.maximum(breadth, LEAST_BREADTH)), 1.0, MOST_LOOKUPS)
+        lookups = np.clip(np.ceil(longer / np.maximum(breadth, LEAST_BREADTH)), 1, MOST_LOOKUPS).astype(np.int64)
         breadth = np.maximum(breadth, longer / lookups)
         with np.errstate(under="ignore"):
             roughness = np.minimum(beams.blur + (ALPHA_OF_DEVIATION * breadth) ** 2, 1.0) ** 0.25
             # Between the map as it is and the first that is blurred, shares are of the variance.
-            sharpest = 1.0 / (len(self._maps) - 1)
+            sharpest = 1.0 / len(self._maps.levels)
             narrow = (beams.blur == 0.0) & (roughness < sharpest)
             roughness = np.where(narrow, sharpest * (roughness / sharpest) ** 4, roughness)
-        found = np.zeros((len(beams), 3))
-        for i in range(int(lookups.max())):
-            own = np.flatnonzero(i < lookups)
-            aside = np.sqrt(12.0) * ((i + 0.5) / lookups[own] - 0.5)[:, None] * axis[own]
-            uv = equirectangular_uv(unit(beams.directions[own] + aside), environment.turn)
-            found[own] += blurred_lookups(self._maps, uv, roughness[own]) / lookups[own, None]
-        return environment.scale * found
+        own = np.repeat(np.arange(len(beams)), lookups)
+        first = np.cumsum(lookups) - lookups
+        along = (np.arange(len(own)) - first[own] + 0.5) / lookups[own] - 0.5
+        aside = np.sqrt(12.0) * along[:, None] * axis[own]
+        uv = equirectangular_uv(beams.directions[own] + aside, environment.turn)
+        seen = np.add.reduceat(blurred_lookups(self._maps, uv, roughness[own]), first)
+        return environment.scale * seen / lookups[:, None]
 
     def _background(self, seen: Environment, beams: Beams, rays: Rays) -> Array:
         if seen.kind != "checkerboard":
@@ -119,13 +117,13 @@ class Surroundings:
         return across + (0.5 * aspect, 0.5), ahead
 
 
-def blurred_lookups(maps: Sequence[EnvironmentMap], uv: Array, roughness: Array) -> Array:
+def blurred_lookups(maps: FilteredEnvironment, uv: Array, roughness: Array) -> Array:
     """(n, 3): lookups at places (n, 2) for roughnesses (n,) from 0 to 1, to which equal steps lead from map to map."""
-    level = roughness * (len(maps) - 1)
-    below = np.minimum(level.astype(np.int64), len(maps) - 2)
+    level = roughness * len(maps.levels)
+    below = np.minimum(level.astype(np.int64), len(maps.levels) - 1)
     share = (level - below)[:, None]
-    found = np.empty((len(uv), 3))
-    for i in np.unique(below):
-        own = np.flatnonzero(below == i)
-        found[own] = (1.0 - share[own]) * maps[i].at(uv[own]) + share[own] * maps[i + 1].at(uv[own])
-    return found
+    found = share * bilinear(maps.levels, below, uv)
+    sharp, rough = np.flatnonzero(below == 0), np.flatnonzero(below > 0)
+    found[sharp] += (1.0 - share[sharp]) * maps.sharp.at(uv[sharp])
+    found[rough] += (1.0 - share[rough]) * bilinear(maps.levels, below[rough] - 1, uv[rough])
+    return np.asarray(found)

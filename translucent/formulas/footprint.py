@@ -16,7 +16,7 @@ FOOTPRINT_STEP = 0.5
 LEAST_ACROSS = 0.02
 
 #: Most lookups along an ellipse.
-MOST_LOOKUPS = 5
+MOST_LOOKUPS = 2
 
 #: Least shorter axis that the number of lookups counts with, in radians: about a pixel of the blurred maps' finest.
 LEAST_BREADTH = 1e-3

@@ -7,7 +7,7 @@ from translucent.reference.march import march
 from translucent.reference.path_trace import path_trace
 from translucent.reference.photons import LandedPhotons, photon_irradiance, trace_photons
 from translucent.reference.rays import Rays, pixel_rays
-from translucent.reference.refraction import refracted_light
+from translucent.reference.refraction import light_over_pixels, refracted_light
 from translucent.reference.render import hit_counts, opaque_counts, render, shade_hits
 from translucent.reference.sheets import sheet_thicknesses
 from translucent.reference.surface_light import light_transmittance
@@ -19,6 +19,7 @@ __all__ = [
     "Rays",
     "camera_hits",
     "hit_counts",
+    "light_over_pixels",
     "light_transmittance",
     "line_hits",
     "march",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -35,8 +36,15 @@ class Rays:
         """Selection of rays by indices or a slice, renumbered."""
         return Rays(self.origins[chosen], self.directions[chosen], self.backdrop[chosen])
 
+    @staticmethod
+    def joined(parts: Sequence[Rays]) -> Rays:
+        """All rays of one part after another."""
+        return Rays(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Rays)))
 
-def pixel_rays(camera: Camera, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)) -> Rays:
+
+def pixel_rays(
+    camera: Camera, size: tuple[int, int], offset: tuple[float, float] | tuple[Array, Array] = (0.0, 0.0)
+) -> Rays:
     """Rays of all pixels; the index of a ray is row * width + column.
 
     Parameters
@@ -45,12 +53,13 @@ def pixel_rays(camera: Camera, size: tuple[int, int], offset: tuple[float, float
     size : (width, height)
         In pixels.
     offset : (right, down)
-        Shift from the pixel centers, in pixels.
+        Shift from the pixel centers, in pixels: of all the same, or (h, w) each.
     """
     at_origin = camera.pose.copy()
     at_origin[:3, 3] = 0.0
     origins, directions = replace(camera, pose=at_origin).rays(size, offset)
     row, column = np.divmod(np.arange(size[0] * size[1]), size[0])
     left, top, _, more_rows = camera.beyond(size)
-    backdrop = (np.stack([column + left, row + top], axis=-1) + 0.5 + offset) / (size[1] + more_rows)
+    shift = np.stack([np.ravel(part) for part in offset], axis=-1)
+    backdrop = (np.stack([column + left, row + top], axis=-1) + 0.5 + shift) / (size[1] + more_rows)
     return Rays(origins.reshape(-1, 3), directions.reshape(-1, 3), backdrop)

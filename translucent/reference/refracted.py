@@ -1,6 +1,6 @@
 """Radiance along rays that refract and split at interfaces: exact Fresnel and Snell, in float64.
 
-At every interface a ray becomes two, reflected and refracted, until they carry less than `FAINTEST` or have met as many
+At every interface a ray becomes two, reflected and refracted, until they carry less than `faintest` or have met as many
 interfaces as asked for; what is dropped is counted. With rough interfaces one of the two is chosen by chance, so that
 the radiance has noise. Between interfaces media absorb and emit as they do along straight rays.
 
@@ -34,7 +34,7 @@ from translucent.reference.sheets import scene_crossings
 from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import volume_segments
 
-#: Smallest share of each color that a ray must carry to be followed.
+#: Smallest share of each color that a ray must carry to be followed, by default.
 FAINTEST = 1e-5
 
 #: Number of rays of the picture that are followed together: the working arrays stay below 500 MB.
@@ -74,6 +74,8 @@ class RefractedRays:
         Add light that media scatter once, to `tolerance`. Lights reach into media straight on.
     rng : Generator, optional
         Chooses between reflection and refraction. Without it both are followed, and all interfaces are polished.
+    faintest : float
+        Smallest share of each color that a ray must carry to be followed.
     """
 
     def __init__(
@@ -84,7 +86,9 @@ class RefractedRays:
         scatter: bool = False,
         tolerance: float = 1e-6,
         rng: np.random.Generator | None = None,
+        faintest: float = FAINTEST,
     ) -> None:
+        self.faintest = faintest
         self.light, self.scene, self.sheets, self.bounces = light, light.scene, light.paths.sheets, bounces
         self.scatter, self.tolerance, self.rng = scatter, tolerance, rng
         self.ends = RayEnds(light, aspect)
@@ -124,7 +128,9 @@ class _Tree:
             outcome = Meetings(self.own, legs, interfaces, self.refracted.light, self.refracted.rng).outcome()
             self._add(legs, outcome.radiance)
             legs = joined(outcome.branches)
-            lost = np.asarray((legs.throughput < FAINTEST).all(axis=1) | ~legs.rays.directions.any(axis=1))
+            lost = np.asarray(
+                (legs.throughput < self.refracted.faintest).all(axis=1) | ~legs.rays.directions.any(axis=1)
+            )
             self._drop(legs.where(lost))
             legs = legs.where(~lost)
         self._drop(legs)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Mask
 from translucent.errors import InputError
+from translucent.formulas.sampling import sample_shifts
 from translucent.planning.methods import Method
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.rays import Rays, pixel_rays
-from translucent.reference.refracted import RefractedLight, RefractedRays
+from translucent.reference.refracted import FAINTEST, RefractedLight, RefractedRays
 from translucent.reference.sheets import sheet_thicknesses
 from translucent.reference.surface_light import SurfaceLight
 from translucent.scene.scene import Scene
@@ -19,6 +20,10 @@ BOUNCES = 8
 
 #: Default number of rays per pixel before rough interfaces.
 PATHS = 64
+
+#: Smallest share of each color that one of several rays over a pixel must carry to be followed: behind a row of lenses
+#: that leaves out 0.07 % of the light, in half of the time that the default of one ray takes.
+FAINTEST_OF_MANY = 1e-4
 
 #: Number of rays that are averaged together: the working arrays stay below 500 MB.
 BATCH = 1 << 16
@@ -68,13 +73,78 @@ def refracted_light(
         If an argument is not in its range, or a surface has textures.
     """
     _check(scene, bounces, paths)
-    sheets, rays = sheet_thicknesses(scene, method), pixel_rays(scene.camera, size)
-    light = SurfaceLight(LightPaths(scene, sheets))
-    scatter = bool(scene.lights) and light.paths.volume.scatters
-    rough = any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies)
+    rays, rough = pixel_rays(scene.camera, size), _is_rough(scene)
     rng = np.random.default_rng(seed) if rough else None
-    refracted = RefractedRays(light, size[0] / size[1], bounces, scatter, tolerance, rng)
+    refracted = _refracted(scene, size, method, tolerance, bounces, rng, FAINTEST)
     return _mean(refracted, rays, paths) if rough else (refracted.see(rays), np.zeros((len(rays), 3)))
+
+
+def light_over_pixels(
+    scene: Scene,
+    size: tuple[int, int],
+    pixels: Mask,
+    paths: int,
+    tolerance: float = 1e-6,
+    bounces: int = BOUNCES,
+    seed: int = 0,
+) -> tuple[Array, Mask]:
+    """Radiance of pixels as a camera with a box filter takes it: the mean over rays that are spread over each.
+
+    They are the points of samples, moved in each pixel by an offset of its own (Cranley & Patterson 1976,
+    "Randomization of number theoretic methods for multiple integration"). So the mean has no bias, with any number of
+    rays, and with two seeds its errors have nothing to do with each other. Rays that carry less than `FAINTEST_OF_MANY`
+    of each color are not followed.
+
+    Parameters
+    ----------
+    scene : Scene
+    size : (width, height)
+        In pixels.
+    pixels : (h, w) bool
+        Those that are wanted.
+    paths : int
+        Rays of each.
+    tolerance, bounces, seed
+        As of `refracted_light`.
+
+    Returns
+    -------
+    radiance : (k, 3) float64
+        Of the pixels, row by row.
+    valid : (k,) bool
+        All rays of a pixel are.
+    """
+    check_untextured(scene, "use refracted_light along the centers")
+    rng = np.random.default_rng(seed)
+    moves = rng.random((2, *pixels.shape))
+    chosen = np.flatnonzero(pixels)
+    rays = []
+    for shift in sample_shifts(paths):
+        right, down = (shift[:, None, None] + moves) % 1.0 - 0.5
+        rays.append(pixel_rays(scene.camera, size, (right, down)).where(chosen))
+    refracted = _refracted(scene, size, None, tolerance, bounces, rng if _is_rough(scene) else None, FAINTEST_OF_MANY)
+    found = refracted.see(Rays.joined(rays))
+    with np.errstate(under="ignore"):
+        radiance = found.radiance.reshape(paths, -1, 3).mean(axis=0)
+    return radiance, np.asarray(found.valid.reshape(paths, -1).all(axis=0))
+
+
+def _is_rough(scene: Scene) -> bool:
+    return any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies)
+
+
+def _refracted(
+    scene: Scene,
+    size: tuple[int, int],
+    method: Method | None,
+    tolerance: float,
+    bounces: int,
+    rng: np.random.Generator | None,
+    faintest: float,
+) -> RefractedRays:
+    light = SurfaceLight(LightPaths(scene, sheet_thicknesses(scene, method)))
+    scatter = bool(scene.lights) and light.paths.volume.scatters
+    return RefractedRays(light, size[0] / size[1], bounces, scatter, tolerance, rng, faintest)
 
 
 def _mean(refracted: RefractedRays, rays: Rays, paths: int) -> tuple[RefractedLight, Array]:

@@ -186,7 +186,9 @@ class Camera(Frozen):
             return 0, 0, 0, 0
         return window.left, window.top, window.whole[0] - size[0], window.whole[1] - size[1]
 
-    def rays(self, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)) -> tuple[Array, Array]:
+    def rays(
+        self, size: tuple[int, int], offset: tuple[float, float] | tuple[Array, Array] = (0.0, 0.0)
+    ) -> tuple[Array, Array]:
         """Rays through the pixel centers.
 
         Parameters
@@ -194,7 +196,7 @@ class Camera(Frozen):
         size : (width, height)
             In pixels.
         offset : (right, down)
-            Shift from the pixel centers, in pixels.
+            Shift from the pixel centers, in pixels: of all the same, or (h, w) each.
 
         Returns
         -------
@@ -204,8 +206,8 @@ class Camera(Frozen):
         half_width, half_height = self.half_extent(size)
         aside, above = self.center(size)
         x = ((np.arange(size[0]) + 0.5 + offset[0]) / size[0] * 2 - 1 + aside) * half_width
-        y = (1 - (np.arange(size[1]) + 0.5 + offset[1]) / size[1] * 2 + above) * half_height
-        across = x[None, :, None] * self.right + y[:, None, None] * self.up
+        y = (1 - (np.arange(size[1])[:, None] + 0.5 + offset[1]) / size[1] * 2 + above) * half_height
+        across = x[..., None] * self.right + y[..., None] * self.up
         if self.fov_y is None:
             return self.eye + across, np.broadcast_to(self.forward, across.shape).copy()
         directions = across + self.forward

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Integers
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frozen import Frozen
 from translucent.scene.lights import MAX_RADIANCE
@@ -80,16 +80,7 @@ class EnvironmentMap(Frozen):
 
     def at(self, uv: npt.ArrayLike) -> Array:
         """(..., 3) float64: bilinear lookups at positions (..., 2), as `environment.equirectangular_uv` has them."""
-        height, width = self.pixels.shape[:2]
-        u, v = np.moveaxis(np.asarray(uv, dtype=np.float64), -1, 0)
-        column, across = _split(u * width - 0.5)
-        row, down = _split(np.clip(v * height - 0.5, 0.0, height - 1.0))
-        left, right = column % width, (column + 1) % width
-        lower = np.minimum(row + 1, height - 1)
-        with np.errstate(under="ignore"):
-            top = _mix(self.pixels[row, left], self.pixels[row, right], across)
-            bottom = _mix(self.pixels[lower, left], self.pixels[lower, right], across)
-            return _mix(top, bottom, down)
+        return bilinear(self.pixels[None], np.zeros(np.shape(uv)[:-1], np.intp), uv)
 
     def reduced(self, height: int, width: int) -> Array:
         """(height, width, 3) float64: means over the solid angle of larger pixels; smaller ones are left as they are.
@@ -105,6 +96,21 @@ class EnvironmentMap(Frozen):
             # Most of these shares are 0, and in a large picture rows are by far the most work.
             lower = (csr_array(rows) @ self.pixels.reshape(own_height, -1)).reshape(height, own_width, 3)
             return np.asarray(np.einsum("xj,yjc->yxc", columns, lower, optimize=True))
+
+
+def bilinear(maps: npt.NDArray[np.floating[Any]], number: Integers, uv: npt.ArrayLike) -> Array:
+    """(..., 3) float64: lookups as of `EnvironmentMap.at` in those of the maps (m, h, w, 3) with a number (...)."""
+    height, width = maps.shape[1:3]
+    u, v = np.moveaxis(np.asarray(uv, dtype=np.float64), -1, 0)
+    column, across = _split(u * width - 0.5)
+    row, down = _split(np.clip(v * height - 0.5, 0.0, height - 1.0))
+    left, right = column % width, (column + 1) % width
+    upper, lower = ((number * height + at) * width for at in (row, np.minimum(row + 1, height - 1)))
+    pixels = maps.reshape(-1, 3)
+    with np.errstate(under="ignore"):
+        top = _mix(pixels.take(upper + left, axis=0), pixels.take(upper + right, axis=0), across)
+        bottom = _mix(pixels.take(lower + left, axis=0), pixels.take(lower + right, axis=0), across)
+        return _mix(top, bottom, down)
 
 
 def row_blocks(height: int, width: int) -> Iterator[slice]:

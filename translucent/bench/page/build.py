@@ -121,11 +121,15 @@ def _case(case: CaseRecord, name: str) -> dict[str, Any]:
         "refused": _refusals(case),
         "scattered": [row for row in case.rows if row.light is not None],
         "failed": [row for row in case.rows if row.failure is not None],
+        "sampled": any(row.sampled is not None for row in case.rows),
         "errors": [
-            (row, quantity, row.errors(quantity))
+            (row, words, errors)
             for row in case.rows
-            for quantity in UNITS
-            if row.errors(quantity) is not None
+            for words, errors in (
+                *((quantity, row.errors(quantity)) for quantity in UNITS),
+                ("radiance, 16 samples", row.sampled),
+            )
+            if errors is not None
         ],
     }
 
