@@ -1,4 +1,4 @@
-"""Meshes from files, all parts of a file in one: glTF and plain binary PLY by the toolkit's own reader, the others by trimesh.
+"""Meshes from files, all parts of a file in one: glTF and plain binary PLY by own readers, the others by trimesh.
 
 trimesh gets an open file and nothing to follow links with: what an .obj or .ply says of materials and pictures has no
 meaning for a mesh. Archives are no meshes, though trimesh unpacks them.
@@ -151,7 +151,7 @@ def _plain_ply(stream: BinaryIO) -> Triangles | None:
 
     Importing trimesh takes longer than drawing a small picture of one.
     """
-    head, found, rest = stream.read(_HEADER).partition(b"end_header\n")
+    head, found, _ = stream.read(_HEADER).partition(b"end_header\n")
     if match := _PLAIN_PLY.fullmatch(head) if found else None:
         stream.seek(len(head) + len(found))
         vertices = np.frombuffer(stream.read(12 * int(match[1])), dtype="<f4").reshape(-1, 3)

@@ -35,7 +35,7 @@ _QUICK = "GALLIVM_PERF", "nopt"
 
 @contextmanager
 def quick_compiles(wanted: bool) -> Iterator[None]:
-    """Have an OpenGL that is opened meanwhile compile in half the time code that draws a fifth slower, the same picture.
+    """Have an OpenGL that is opened meanwhile compile in half the time: the same picture, drawn a fifth slower.
 
     Mesa's software rasterizer does, where it is the first of its process, and the variable is not set otherwise.
     """
