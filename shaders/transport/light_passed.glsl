@@ -19,7 +19,7 @@ vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m) {
     for (int surface = 0; surface < MOST_STEPS; ++surface) {
         int before = dominant_body(record);
         bool sound = true;
-        Hit hit = Hit(end, -1, -1, vec2(0.0));
+        Hit hit = first_hit(start, -towards, beyond, end);
         Place place = place_at(start, -towards, record, beyond, hit, before, 1, sound);
         bool arrives = hit.object < 0;
         float reached = arrives ? end : hit.path;

@@ -97,8 +97,18 @@ void pass_film(TracedBody film, float cosine, inout vec3 light, inout vec3 share
     share *= transmittance(film.extinction * through);
 }
 
-// What a ray meets where it has hit a surface first. A sheet that lies on the interface of a solid only dims. first: the hit;
-// if of no object, it is looked for here, from `start` up to its path: compilers then have one search less to inline.
+// The hit for `place_at` to begin with, between two distances on a ray: of several objects it is looked for there, in the loop
+// that finds what lies in the same place, so that compilers have one search less to inline.
+Hit first_hit(vec3 origin, vec3 direction, float start, float end) {
+#if ONE_OBJECT
+    return nearest_hit(origin, direction, start, end, uvec4(0u));
+#else
+    return Hit(end, -1, -1, vec2(0.0));
+#endif
+}
+
+// What a ray meets where it has hit a surface first. A sheet that lies on the interface of a solid only dims. first: the hit, or
+// that of `first_hit` from `start` on, which it is then found for; of no object where there is none.
 Place place_at(vec3 origin, vec3 direction, uvec4 record, float start, inout Hit first, int before, int channel, inout bool sound) {
     Place place = Place(AIR, false, vec3(0.0), vec3(0.0), record, 0.0, vec3(1.0), vec3(0.0));
     Hit hit = first;
@@ -106,8 +116,10 @@ Place place_at(vec3 origin, vec3 direction, uvec4 record, float start, inout Hit
     int rank = -1;  // of what decides: 0 a sheet, 1 a solid, 2 what is opaque
     uvec4 met = uvec4(0u);
     for (int surface = 0; surface < RECORD_SIZE; ++surface) {
+#if !ONE_OBJECT
         if (hit.object < 0) { hit = nearest_hit(origin, direction, start, end, met); }
         if (surface == 0) { first = hit; }
+#endif
         if (hit.object < 0) { break; }
         TracedBody body = traced_body(hit.object);
         int kind = int(body.kind);

@@ -138,7 +138,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             }
             int before = dominant_body(ray.record);
             bool sound = true;
-            Hit hit = Hit(reach, -1, -1, vec2(0.0));
+            Hit hit = first_hit(ray.origin, ray.direction, 0.0, reach);
             Place place = place_at(ray.origin, ray.direction, ray.record, 0.0, hit, before, channel, sound);
             if (hit.object < 0 && reach < NOTHING) {
                 reach = NOTHING;  // the rasterizer sees this edge a little elsewhere
