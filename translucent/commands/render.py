@@ -211,7 +211,7 @@ def render(
     require_translucent(model, scene)
     if turntable is not None and camera is None and eye is None:
         scene = framed_all_around(scene, pixels)
-    few = pixels[0] * pixels[1] * samples * (turntable or 1) <= FEW_SAMPLES and method is photons is None
+    few = pixels[0] * pixels[1] * samples * (turntable or 1) <= FEW_SAMPLES and method is None and photons is None
     with quick_compiles(few):
         renderer = tl.Renderer(backend)
     with renderer:
