@@ -163,17 +163,6 @@ TwoSides irradiance_on(vec3 point, vec3 normal, float unoccluded) {
     return sum;
 }
 
-// Irradiance on an opaque surface, as far as light reaches it.
-vec3 reaching_irradiance(vec3 point, vec3 normal) {
-    vec3 sum = environment_irradiance(normal) * environment_reaching(point, normal);
-    for (int light = 0; light < light_count; ++light) {
-        vec3 irradiance;
-        float facing = dot(normal, towards_light(light, point, irradiance));
-        if (facing > 0.0) { sum += facing * irradiance * light_reaching(light, point, normal); }
-    }
-    return sum;
-}
-
 // Diffuse light out of the body: as a layer gives it back, and lets it through from behind. What passes without an event
 // is seen as it is, and left out here.
 vec3 scattered_out(Finish finish, vec3 point, vec3 normal, float thickness, vec3 passed) {

@@ -90,11 +90,13 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 positio
     vec3 painted = (1.0 - finish.metallic) * (1.0 - coat.mirrored);
     vec3 paint = finish.base * (1.0 - finish.passed_share);
 
-    vec3 sum = finish.unoccluded * (mix(coat.mirrored, metal.mirrored, finish.metallic)
-            * environment_light(reflected_direction(ray, normal), finish.roughness)
-        + painted * paint * environment_irradiance(normal) * environment_reaching(point, normal) / PI);
-    if (finish.passed != vec3(0.0)) {
-        sum += finish.unoccluded * painted * finish.passed * environment_irradiance(-normal) * environment_reaching(point, -normal) / PI;
+    vec3 sum = finish.unoccluded * mix(coat.mirrored, metal.mirrored, finish.metallic)
+        * environment_light(reflected_direction(ray, normal), finish.roughness);
+    // One after the other in a loop: compilers then inline the shadows of the environment once.
+    float last = finish.passed == vec3(0.0) ? 1.0 : -1.0;
+    for (float side = 1.0; side >= last; side -= 2.0) {
+        vec3 turned = finish.unoccluded * painted * (side > 0.0 ? paint : finish.passed);
+        sum += turned * environment_irradiance(side * normal) * environment_reaching(point, side * normal) / PI;
     }
 #if CLEAR_COAT
     Layer lacquer = clearcoat_layer(finish.clearcoat, cos_view);

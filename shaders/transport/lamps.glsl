@@ -36,7 +36,7 @@ vec3 straight_share(vec3 origin, float skipped, uvec4 record, vec3 towards, floa
         share *= transmittance(extinction * (hit.path + skipped));
         if (share == vec3(0.0)) { return share; }
         bool sound = true;
-        Place place = place_at(origin, towards, record, hit, before, channel, sound);
+        Place place = place_at(origin, towards, record, 0.0, hit, before, channel, sound);
         TracedBody body = traced_body(place.object);
         int kind = int(body.kind);
         share *= place.coat;

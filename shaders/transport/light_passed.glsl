@@ -18,14 +18,14 @@ vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m) {
     vec3 share = vec3(1.0);
     for (int surface = 0; surface < MOST_STEPS; ++surface) {
         int before = dominant_body(record);
-        Hit hit = nearest_hit(start, -towards, beyond, end, uvec4(0u));
+        bool sound = true;
+        Hit hit = first_hit(start, -towards, beyond, end);
+        Place place = place_at(start, -towards, record, beyond, hit, before, 1, sound);
         bool arrives = hit.object < 0;
         float reached = arrives ? end : hit.path;
         bool lit = reached > counted_to;
         if (lit && record.x != 0u) { share *= transmittance(filling_of(record, before).extinction * (reached - counted_to)); }
         if (arrives || share == vec3(0.0)) { break; }
-        bool sound = true;
-        Place place = place_at(start, -towards, record, hit, before, 1, sound);
         if (lit) {
             share *= place.coat;
             TracedBody body = traced_body(place.object);

@@ -84,19 +84,6 @@ vec3 unblocked_irradiance(vec3 point, vec3 normal) {
     return sum;
 }
 
-// Irradiance on an opaque surface, as far as light reaches it.
-vec3 reaching_irradiance(vec3 point, vec3 normal) {
-    vec3 sum = environment_irradiance(normal) * environment_reaching(point, normal);
-#if LAMPS
-    for (int light = 0; light < light_count; ++light) {
-        Lamp lamp = lamp_at(light, point);
-        float facing = dot(normal, lamp.towards);
-        if (facing > 0.0) { sum += facing * lamp.irradiance * light_reaching(light, point, normal); }
-    }
-#endif
-    return sum;
-}
-
 #include "transport/opaque_objects.glsl"
 
 // Share of the light of each channel that the media of a place turn by an angle, in 1/sr.
@@ -368,7 +355,7 @@ void follow(inout Path path, vec2 pixel, ivec2 texel, inout Draws draws) {
         return;
     }
     bool sound = true;
-    Place place = place_at(path.origin, path.direction, path.record, hit, before, CHANNEL, sound);
+    Place place = place_at(path.origin, path.direction, path.record, 0.0, hit, before, CHANNEL, sound);
     TracedBody body = traced_body(place.object);
     path.lost = !sound && (all_closed == 0 || is_full(path.record));
     path.light += path.share * place.glow;

@@ -160,7 +160,7 @@ void main() {
         int before = dominant_body(photon.record);
         photon.share *= transmittance(filling_of(photon.record, before).extinction * (hit.path + photon.skipped));
         bool sound = true;
-        Place place = place_at(photon.origin, photon.direction, photon.record, hit, before, channel, sound);
+        Place place = place_at(photon.origin, photon.direction, photon.record, 0.0, hit, before, channel, sound);
         if (!sound && (all_closed == 0 || is_full(place.record))) { return; }
         TracedBody body = traced_body(place.object);
         photon.share *= place.coat;

@@ -18,14 +18,17 @@ float path_within(vec3 direction, vec3 face_normal) {
     return SURFACE_OFFSET * surface_reach / max(abs(dot(direction, face_normal)), 1e-2);
 }
 
+float body_index(TracedBody body, int channel) {
+#if DISPERSION
+    return channel_iors(body.ior, body.dispersion)[channel];
+#else
+    return body.ior;
+#endif
+}
+
 float index_of(int body, int channel) {
     if (body == AIR) { return 1.0; }
-    TracedBody row = traced_body(body);
-#if DISPERSION
-    return channel_iors(row.ior, row.dispersion)[channel];
-#else
-    return row.ior;
-#endif
+    return body_index(traced_body(body), channel);
 }
 
 // Color of an opaque object at a point, as far as it is no texture's.
@@ -69,8 +72,20 @@ void met_sides(Hit hit, vec3 direction, out vec3 smooth_normal, out vec3 face_no
 // Whether the step from one medium to another does anything to light.
 bool alters_light(int before, int after, int channel) {
     if (before == after) { return false; }
-    return index_of(before, channel) != index_of(after, channel) || (before != AIR && traced_body(before).plain == 0.0)
-        || (after != AIR && traced_body(after).plain == 0.0);
+    float ior = 1.0;
+    bool plain = true;
+    if (before != AIR) {
+        TracedBody body = traced_body(before);
+        ior = body_index(body, channel);
+        plain = body.plain != 0.0;
+    }
+    float ior_after = 1.0;
+    if (after != AIR) {
+        TracedBody body = traced_body(after);
+        ior_after = body_index(body, channel);
+        plain = plain && body.plain != 0.0;
+    }
+    return ior != ior_after || !plain;
 }
 
 // Light that passes a sheet which only dims and glows.
@@ -82,13 +97,30 @@ void pass_film(TracedBody film, float cosine, inout vec3 light, inout vec3 share
     share *= transmittance(film.extinction * through);
 }
 
-// What a ray meets where it has hit a surface first. A sheet that lies on the interface of a solid only dims.
-Place place_at(vec3 origin, vec3 direction, uvec4 record, Hit hit, int before, int channel, inout bool sound) {
-    Place place = Place(AIR, false, vec3(0.0), vec3(0.0), record, hit.path, vec3(1.0), vec3(0.0));
-    float start = 0.0, end = 0.0;
+// The hit for `place_at` to begin with, between two distances on a ray: of several objects it is looked for there, in the loop
+// that finds what lies in the same place, so that compilers have one search less to inline.
+Hit first_hit(vec3 origin, vec3 direction, float start, float end) {
+#if ONE_OBJECT
+    return nearest_hit(origin, direction, start, end, uvec4(0u));
+#else
+    return Hit(end, -1, -1, vec2(0.0));
+#endif
+}
+
+// What a ray meets where it has hit a surface first. A sheet that lies on the interface of a solid only dims. first: the hit, or
+// that of `first_hit` from `start` on, which it is then found for; of no object where there is none.
+Place place_at(vec3 origin, vec3 direction, uvec4 record, float start, inout Hit first, int before, int channel, inout bool sound) {
+    Place place = Place(AIR, false, vec3(0.0), vec3(0.0), record, 0.0, vec3(1.0), vec3(0.0));
+    Hit hit = first;
+    float end = first.path;
     int rank = -1;  // of what decides: 0 a sheet, 1 a solid, 2 what is opaque
     uvec4 met = uvec4(0u);
-    for (int surface = 0; surface < RECORD_SIZE && hit.object >= 0; ++surface) {
+    for (int surface = 0; surface < RECORD_SIZE; ++surface) {
+#if !ONE_OBJECT
+        if (hit.object < 0) { hit = nearest_hit(origin, direction, start, end, met); }
+        if (surface == 0) { first = hit; }
+#endif
+        if (hit.object < 0) { break; }
         TracedBody body = traced_body(hit.object);
         int kind = int(body.kind);
         vec3 smooth_normal, face_normal;
@@ -96,10 +128,11 @@ Place place_at(vec3 origin, vec3 direction, uvec4 record, Hit hit, int before, i
         met_sides(hit, direction, smooth_normal, face_normal, outside);
         float across = -dot(face_normal, direction);
         bool decides = surface == 0;
+        if (kind == KIND_SOLID) { place.record = crossed_record(place.record, hit.object, outside, sound); }
+        int now = dominant_body(place.record);
+        bool altered = alters_light(before, now, channel);
         if (kind == KIND_SOLID) {
-            place.record = crossed_record(place.record, hit.object, outside, sound);
-            int now = dominant_body(place.record);
-            if (rank == 0 && alters_light(before, now, channel)) {
+            if (rank == 0 && altered) {
                 pass_film(traced_body(place.object), -dot(place.face_normal, direction), place.glow, place.coat);
                 rank = -1;
             }
@@ -108,7 +141,7 @@ Place place_at(vec3 origin, vec3 direction, uvec4 record, Hit hit, int before, i
         } else if (kind == KIND_OPAQUE && (outside || body.one_sided == 0.0)) {
             decides = true;
             rank = 2;
-        } else if (kind == KIND_SHEET && (rank < 0 || (rank == 1 && !alters_light(before, dominant_body(place.record), channel)))) {
+        } else if (kind == KIND_SHEET && (rank < 0 || (rank == 1 && !altered))) {
             decides = true;
             rank = 0;
         } else if (kind == KIND_SHEET || kind == KIND_FILM) {
@@ -131,7 +164,7 @@ Place place_at(vec3 origin, vec3 direction, uvec4 record, Hit hit, int before, i
             end = hit.path + within;
         }
         met = entered_record(met, hit.object);
-        hit = nearest_hit(origin, direction, start, end, met);
+        hit.object = -1;
 #endif
     }
     return place;

@@ -20,6 +20,12 @@ uvec4 entered_record(uvec4 record, int object) {
         record.w << 16 | record.z >> 16);
 }
 
+// The record without its first entry. Loops that shift it take as many turns as there are entries: compilers unroll those
+// over RECORD_SIZE.
+uvec4 next_entries(uvec4 record) {
+    return uvec4(record.x >> 16 | record.y << 16, record.y >> 16 | record.z << 16, record.z >> 16 | record.w << 16, record.w >> 16);
+}
+
 // missing: the ray leaves what it has not entered.
 uvec4 left_record(uvec4 record, int object, out bool missing) {
     uint id = uint(object + 1);
@@ -27,23 +33,24 @@ uvec4 left_record(uvec4 record, int object, out bool missing) {
     if (record.x == id) { return uvec4(0u); }
 #if ONE_OBJECT
     if ((record.x & 0xffffu) == id) {
-        return uvec4(record.x >> 16 | record.y << 16, record.y >> 16 | record.z << 16, record.z >> 16 | record.w << 16, record.w >> 16);
+        return next_entries(record);
     }
     missing = true;
     return record;
 #else
-    uvec4 rest = uvec4(0u);
-    int kept = 0;
+    // From its lowest entry on, those above take the places of those below.
+    uvec4 rest = record, above = next_entries(record);
     missing = true;
-    for (int i = 0; i < RECORD_SIZE; ++i) {
-        uint entry = record_entry(record, i);
-        if (entry == 0u) { break; }
-        if (missing && entry == id) {
+    for (int i = 0; i < 4; ++i) {
+        if (!missing) {
+            rest[i] = above[i];
+        } else if ((record[i] & 0xffffu) == id) {
+            rest[i] = above[i];
             missing = false;
-            continue;
+        } else if (record[i] >> 16 == id) {
+            rest[i] = (record[i] & 0xffffu) | (above[i] & 0xffff0000u);
+            missing = false;
         }
-        rest[kept >> 1] |= (kept & 1) == 0 ? entry : entry << 16;
-        ++kept;
     }
     return rest;
 #endif
@@ -55,13 +62,12 @@ int dominant_body(uvec4 record) {
 #else
     int best = AIR;
     float highest = 0.0;
-    for (int i = 0; i < RECORD_SIZE; ++i) {
-        uint entry = record_entry(record, i);
-        if (entry == 0u) { break; }
-        float rank = traced_body(int(entry) - 1).rank;
+    for (; record.x != 0u; record = next_entries(record)) {
+        int object = int(record.x & 0xffffu) - 1;
+        float rank = traced_body(object).rank;
         if (rank > highest) {
             highest = rank;
-            best = int(entry) - 1;
+            best = object;
         }
     }
     return best;
@@ -104,11 +110,10 @@ Filling filling_of(uvec4 record, int dominant) {
     sum.scattering *= float(turns);
 #endif
 #else
-    for (int i = 0; i < RECORD_SIZE; ++i) {
-        uint entry = record_entry(record, i);
-        if (entry == 0u) { break; }
+    uvec4 rest = record;
+    for (int i = 0; rest.x != 0u; ++i, rest = next_entries(rest)) {
         if (!counts_in(record, i)) { continue; }
-        TracedBody body = traced_body(int(entry) - 1);
+        TracedBody body = traced_body(int(rest.x & 0xffffu) - 1);
         sum.extinction += body.extinction;
         sum.emission += body.emission;
         sum.scattering += body.scattering;

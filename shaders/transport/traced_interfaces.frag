@@ -2,7 +2,7 @@
 // stronger branch is always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked
 // up in the environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
 // interface is that which the rasterizer has found. ADAPTIVE: of several samples of a pixel, those that are worth it; with
-// the square of their luminance in place of the transmittance. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
+// the square of their luminance in place of the transmittance. ROUGH: some body is. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
 
 #include <constants>
 #include <View>
@@ -136,14 +136,19 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
                 ray = waiting[--waits];
                 ends = false;
             }
-            Hit hit = nearest_hit(ray.origin, ray.direction, 0.0, reach, uvec4(0u));
+            int before = dominant_body(ray.record);
+            bool sound = true;
+            Hit hit = first_hit(ray.origin, ray.direction, 0.0, reach);
+            Place place = place_at(ray.origin, ray.direction, ray.record, 0.0, hit, before, channel, sound);
             if (hit.object < 0 && reach < NOTHING) {
                 reach = NOTHING;  // the rasterizer sees this edge a little elsewhere
                 continue;
             }
             reach = NOTHING;
-            if (hit.object < 0 && all_closed == 1) { ray.record = uvec4(0u); }
-            int before = dominant_body(ray.record);
+            if (hit.object < 0 && all_closed == 1) {
+                ray.record = uvec4(0u);
+                before = AIR;
+            }
             passed = vec3(1.0);
             if (ray.record.x != 0u) {
                 if (hit.object < 0) { sum.lost += strength(ray.share) / 3.0; }  // it has left through a hole
@@ -180,8 +185,6 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
 #if FOOTPRINTS
             ray.footprint.point += hit.path * ray.footprint.direction;
 #endif
-            bool sound = true;
-            Place place = place_at(ray.origin, ray.direction, ray.record, hit, before, channel, sound);
             TracedBody body = traced_body(place.object);
             int kind = int(body.kind);
             bool outside = place.outside;
@@ -229,7 +232,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             vec3 coat_normal = smooth_normal;
             bool polished = roughness == 0.0;
 #endif
-#if MICROFACETS
+#if ROUGH
             vec3 facet, facet_normal;
             float facet_alpha = 0.0, full_alpha = 0.0;
             if (roughness > 0.0 && blurred_share < 1.0) {
@@ -274,7 +277,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             } else {
                 on_way = kept_on_side(refracted_direction(ray.direction, smooth_normal, ior), -face_normal);
             }
-#if MICROFACETS
+#if ROUGH
             if (facet_alpha > 0.0) {
                 float towards = -dot(facet_normal, ray.direction);
                 vec3 mirrored_way = reflected_direction(ray.direction, facet);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 import translucent as tl
 from translucent.errors import RenderError
 from translucent.geometry.solids import Sphere
-from translucent.gpu.drivers import require_interfaces
+from translucent.gpu.drivers import quick_compiles, require_interfaces
 
 LAVAPIPE = {
     "GL_RENDERER": "zink (llvmpipe (LLVM 15.0.6, 256 bits))",
@@ -45,3 +46,16 @@ def test_a_renderer_that_refuses_interfaces_goes_on(
             with pytest.raises(RenderError, match="ends the process"):
                 renderer.render(glass, (32, 24), interfaces=interfaces)
             assert renderer.render(dye, (32, 24), interfaces=interfaces).valid.all()
+
+
+def test_quick_compiles_are_asked_for_while_a_context_opens_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("GALLIVM_PERF", raising=False)
+    with quick_compiles(False):
+        assert "GALLIVM_PERF" not in os.environ
+    with quick_compiles(True):
+        assert os.environ["GALLIVM_PERF"] == "nopt"
+    assert "GALLIVM_PERF" not in os.environ
+    monkeypatch.setenv("GALLIVM_PERF", "brilinear")  # the user's word counts
+    with quick_compiles(True):
+        assert os.environ["GALLIVM_PERF"] == "brilinear"
+    assert os.environ["GALLIVM_PERF"] == "brilinear"

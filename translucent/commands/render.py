@@ -54,6 +54,9 @@ from translucent.commands.pictures import Pictures, picture_options
 from translucent.commands.progress import Progress
 from translucent.errors import InputError
 
+#: Samples of all pixels up to which shaders take longer to compile than pictures to draw with a software rasterizer.
+FEW_SAMPLES = 1 << 18
+
 
 @click.command(
     cls=ObjectCommand, epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm"
@@ -170,6 +173,7 @@ def render(
     translucent render bar.glb -o bar.png --object Wine --preset merlot --object Glass --preset crystal
     """
     import translucent as tl
+    from translucent.gpu.drivers import quick_compiles
     from translucent.scene.stages import NO_STAGE, STAGED_TONE
     from translucent.scene.turntable import framed_all_around
 
@@ -207,7 +211,10 @@ def render(
     require_translucent(model, scene)
     if turntable is not None and camera is None and eye is None:
         scene = framed_all_around(scene, pixels)
-    with tl.Renderer(backend) as renderer:
+    few = pixels[0] * pixels[1] * samples * (turntable or 1) <= FEW_SAMPLES and method is None and photons is None
+    with quick_compiles(few):
+        renderer = tl.Renderer(backend)
+    with renderer:
         draw = partial(
             renderer.render,
             size=pixels,

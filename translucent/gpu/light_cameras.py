@@ -37,8 +37,8 @@ def media_sphere(scene: Scene) -> tuple[Array, float]:
     return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) or 1.0
 
 
-#: Vertices from which on it pays to find those of the convex hull.
-_MANY = 1000
+#: Vertices from which on it pays to load SciPy and find those of the convex hull.
+_MANY = 1 << 14
 
 _HULLS: WeakKeyDictionary[Mesh, Array] = WeakKeyDictionary()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import EnvironmentMap
-from translucent.scene.lobes import KEPT, convolved, cosines_between, irradiance_map, sized
+from translucent.scene.lobes import KEPT, convolved, irradiance_map, sized
 
 #: Blurred pictures between roughness 0 and 1, and their rows and columns.
 LEVELS = 8
@@ -59,11 +59,10 @@ def _filtered(source: EnvironmentMap) -> FilteredEnvironment:
     if (source.pixels == color).all():  # which blurring leaves as it is
         levels = np.full((LEVELS, *LEVEL_SIZE, 3), color, dtype=np.float32)
     else:
-        pixels, cosines = sized(source, LEVEL_SIZE), cosines_between(*LEVEL_SIZE)
+        pixels = sized(source, LEVEL_SIZE)
         with np.errstate(under="ignore"):
-            levels = np.stack([convolved(pixels, ggx_lobe(cosines, alpha)) for alpha in roughness**2]).astype(
-                np.float32
-            )
+            blurred = [convolved(pixels, partial(ggx_lobe, alpha=alpha)) for alpha in roughness**2]
+            levels = np.stack(blurred).astype(np.float32)
     return FilteredEnvironment(source, levels, roughness, irradiance_map(source).pixels.astype(np.float32))
 
 

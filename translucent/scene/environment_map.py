@@ -87,14 +87,14 @@ class EnvironmentMap(Frozen):
 
         The integral over all directions stays what it is.
         """
-        from scipy.sparse import csr_array  # scenes without pictures of all directions need no SciPy
-
         own_height, own_width = self.pixels.shape[:2]
+        pixels = self.pixels.reshape(own_height, -1)
         rows = _overlaps(-np.cos(np.linspace(0, np.pi, own_height + 1)), -np.cos(np.linspace(0, np.pi, height + 1)))
         columns = _overlaps(np.linspace(0, 1, own_width + 1), np.linspace(0, 1, width + 1))
         with np.errstate(under="ignore"):
             # Most of these shares are 0, and in a large picture rows are by far the most work.
-            lower = (csr_array(rows) @ self.pixels.reshape(own_height, -1)).reshape(height, own_width, 3)
+            lower = np.stack([row[part] @ pixels[part] for row, part in zip(rows, map(_held, rows), strict=True)])
+            lower = lower.reshape(height, own_width, 3)
             return np.asarray(np.einsum("xj,yjc->yxc", columns, lower, optimize=True))
 
 
@@ -140,6 +140,12 @@ def _overlaps(fine: Array, coarse: Array) -> Array:
     low = np.maximum(coarse[:-1, None], fine[None, :-1])
     high = np.minimum(coarse[1:, None], fine[None, 1:])
     return np.asarray(np.maximum(high - low, 0.0) / np.diff(coarse)[:, None])
+
+
+def _held(shares: Array) -> slice:
+    """From the first to the last of the shares that are not 0."""
+    found = np.flatnonzero(shares)
+    return slice(found[0], found[-1] + 1)
 
 
 def _split(position: Array) -> tuple[npt.NDArray[np.intp], Array]:

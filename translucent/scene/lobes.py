@@ -7,11 +7,12 @@ in the frequencies of longitude: a matrix of rows by rows for each of them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Integers
 from translucent.scene.environment_map import EnvironmentMap, row_solid_angles
 
 #: Rows and columns of the irradiance map, which changes slowly.
@@ -31,8 +32,8 @@ def irradiance_map(source: EnvironmentMap) -> EnvironmentMap:
     Its lookups differ from the integral by a thousandth of the contrast, and within 1.4 degrees of a pole, where all
     that is known are the pixels around it, by a hundredth.
     """
-    lobe = np.maximum(cosines_between(*IRRADIANCE_SIZE), 0.0)
-    return EnvironmentMap(np.pi * convolved(sized(source, IRRADIANCE_SIZE), lobe))
+    pixels = sized(source, IRRADIANCE_SIZE)
+    return EnvironmentMap(np.pi * convolved(pixels, lambda cosines: np.maximum(cosines, 0.0)))
 
 
 def sized(source: EnvironmentMap, size: tuple[int, int]) -> Array:
@@ -44,27 +45,44 @@ def sized(source: EnvironmentMap, size: tuple[int, int]) -> Array:
     return source.at(np.stack(np.meshgrid(u, v), axis=-1))
 
 
-@lru_cache(maxsize=2)
-def cosines_between(height: int, width: int) -> Array:
-    """(height, height, width / 2 + 1): cosine of the angle from a pixel to one of another row and some columns on."""
-    theta = np.pi * (np.arange(height) + 0.5) / height
-    across = np.cos(2.0 * np.pi * np.arange(width // 2 + 1) / width)
-    cosine, sine = np.cos(theta), np.sin(theta)
-    return np.asarray(np.outer(cosine, cosine)[..., None] + np.outer(sine, sine)[..., None] * across)
-
-
-def convolved(pixels: Array, lobe: Array) -> Array:
-    """(h, w, 3): mean of the pixels around each, weighted by a lobe (h, h, w / 2 + 1) of rows and columns on."""
-    import scipy.fft  # late: a window opens without it
-
+def convolved(pixels: Array, lobe: Callable[[Array], Array]) -> Array:
+    """(h, w, 3): mean of the pixels around each, weighted by a lobe, a function of the cosine of the angle."""
     height, width = pixels.shape[:2]
-    # A lobe is even in longitude: its Fourier transform is a cosine transform, and real.
-    spectrum = scipy.fft.dct(lobe, type=1, axis=2)
+    spectrum = _spectrum(height, width, lobe)
     solid_angles = row_solid_angles(height, width)
     balance = _balanced(spectrum[..., 0] * solid_angles)
     spectrum *= (balance[:, None] * balance * solid_angles)[..., None]
-    blurred = np.einsum("ijf,jfc->ifc", spectrum, scipy.fft.rfft(pixels, axis=1), optimize=True)
-    return np.asarray(np.maximum(scipy.fft.irfft(blurred, n=width, axis=1), 0.0))
+    blurred = np.einsum("ijf,jfc->ifc", spectrum, np.fft.rfft(pixels, axis=1), optimize=True)
+    return np.ascontiguousarray(np.maximum(np.fft.irfft(blurred, n=width, axis=1), 0.0))
+
+
+def _spectrum(height: int, width: int, lobe: Callable[[Array], Array]) -> Array:
+    """(height, height, width / 2 + 1): Fourier transforms in longitude of a lobe, for pairs of rows.
+
+    They are the same for two rows in turn and for their mirror images in the equator, so a quarter of them is made.
+    """
+    first, second, cosines = _cosines_between(height, width)
+    weights = lobe(cosines)
+    # A lobe is even in longitude: its transform is real.
+    found = np.fft.rfft(np.concatenate([weights, weights[:, -2:0:-1]], axis=1), axis=1).real
+    spectrum = np.empty((height, height, width // 2 + 1))
+    for i, j in ((first, second), (height - 1 - first, height - 1 - second)):
+        spectrum[i, j] = spectrum[j, i] = found
+    return spectrum
+
+
+@lru_cache(maxsize=2)
+def _cosines_between(height: int, width: int) -> tuple[Integers, Integers, Array]:
+    """Pairs of rows (n,), (n,), a quarter of all, and (n, width / 2 + 1): cosine of the angle from a pixel of the first
+    row to one of the second and some columns on.
+    """
+    upper = np.tri(height, dtype=bool)
+    first, second = np.nonzero(upper.T & upper[::-1])  # i <= j, and i + j < height
+    theta = np.pi * (np.arange(height) + 0.5) / height
+    across = np.cos(2.0 * np.pi * np.arange(width // 2 + 1) / width)
+    cosine, sine = np.cos(theta), np.sin(theta)
+    around = (sine[first] * sine[second])[:, None] * across
+    return first, second, (cosine[first] * cosine[second])[:, None] + around
 
 
 def _balanced(weights: Array) -> Array:

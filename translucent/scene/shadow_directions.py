@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from functools import lru_cache
 
 import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.formulas.color import luminance
+from translucent.formulas.sampling import sobol_points
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, texel_directions
 
@@ -21,10 +21,11 @@ EVEN = 0.25
 #: Rounds that spread the directions. Errors of shadows fall by a quarter, and no further with more rounds.
 ROUNDS = 10
 
+#: Pixels that are compared with all directions at a time.
+_BLOCK = 1 << 10
+
 #: Number of environments whose directions are cached.
 KEPT = 8
-
-_SEED = 0
 
 
 def shadow_directions(environment: Environment, count: int) -> tuple[Array, Array]:
@@ -96,12 +97,7 @@ def _shares(light: Array, solid_angles: Array) -> Array:
 
 def _drawn(share: Array, count: int) -> Integers:
     """(count,): pixels by their shares, row first and then column, from low-discrepancy points."""
-    from scipy.stats import qmc
-
-    with warnings.catch_warnings():
-        # SciPy warns that numbers other than powers of 2 lose the balance of the sequence; they are still well spread.
-        warnings.simplefilter("ignore", UserWarning)
-        points = qmc.Sobol(2, scramble=True, seed=_SEED).random(count)
+    points = sobol_points(count, scrambled=True)
     table = share.reshape(SIZE)
     rows = np.cumsum(table.sum(axis=1))
     row = np.minimum(np.searchsorted(rows, points[:, 0] * rows[-1], side="right"), SIZE[0] - 1)
@@ -125,10 +121,9 @@ def _centered(directions: Array, ways: Array, share: Array) -> Array:
 
 def _nearest(directions: Array, ways: Array) -> tuple[Integers, Array]:
     """Number (n,) of the direction nearest to each of `ways` (n, 3), and the distance (n,)."""
-    from scipy.spatial import cKDTree
-
-    apart, cell = cKDTree(directions).query(ways)
-    return np.asarray(cell), np.asarray(apart)
+    # Few directions: their products with blocks that stay in a cache are found faster than a tree is gone through.
+    cell = np.concatenate([(ways[i : i + _BLOCK] @ directions.T).argmax(axis=1) for i in range(0, len(ways), _BLOCK)])
+    return cell, np.linalg.norm(ways - directions[cell], axis=1)
 
 
 def _sums(cell: Integers, values: Array, count: int) -> Array:

@@ -87,8 +87,10 @@ def studio_radiance(directions: npt.ArrayLike) -> Array:
 
 def _with_panels(radiance: Array, towards: Array, panels: tuple[Panel, ...]) -> Array:
     for panel in panels:
-        share, brightness = _panel(towards, panel)
-        radiance += share * (np.asarray(panel.radiance) * brightness - radiance)
+        # Of most directions a panel covers nothing.
+        on = towards @ _center(panel) > np.cos(np.radians(0.5 * np.hypot(panel.width, panel.height)))
+        share, brightness = _panel(towards[on], panel)
+        radiance[on] += share * (np.asarray(panel.radiance) * brightness - radiance[on])
     return radiance
 
 
@@ -101,10 +103,15 @@ def _room(height: Array) -> Array:
     return _mixed(floor, wall, _smooth((height[..., None] + 0.05) / 0.1))
 
 
-def _panel(towards: Array, panel: Panel) -> tuple[Array, Array]:
-    """Coverage (..., 1) of each direction by a panel, and the panel's brightness there."""
+def _center(panel: Panel) -> Array:
+    """Unit vector towards the middle of a panel."""
     azimuth, elevation = np.radians(panel.azimuth), np.radians(panel.elevation)
-    center = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), -np.cos(elevation) * np.cos(azimuth)])
+    return np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), -np.cos(elevation) * np.cos(azimuth)])
+
+
+def _panel(towards: Array, panel: Panel) -> tuple[Array, Array]:
+    """Coverage (n, 1) of directions (n, 3) by a panel, and the panel's brightness there."""
+    azimuth, center = np.radians(panel.azimuth), _center(panel)
     right = np.array([np.cos(azimuth), 0.0, np.sin(azimuth)])
     ahead = towards @ center
     depth = np.maximum(ahead, 1e-6)  # what is behind the subject is on no panel in front of it

@@ -156,6 +156,7 @@ class TracedInterfacesPass:
         scene, environment = job.scene, job.scene.environment
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         seen_map = environment.seen.kind == "image"
+        rough = any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces)
         return self._variants.program(
             FORKS=job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
             FROM_EYE=job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
@@ -165,7 +166,8 @@ class TracedInterfacesPass:
             EMISSION=job.features.emits and not job.features.scatters,
             LAYERED=any(isinstance(body.medium, LayeredMedium) for body in scene.bodies),
             DIFFUSED=job.diffused_light is not None,
-            MICROFACETS=mirror or any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces),
+            MICROFACETS=mirror or rough,
+            ROUGH=rough,
             MIRROR=mirror,
             ADAPTIVE=job.bending,
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
