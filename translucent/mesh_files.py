@@ -1,4 +1,4 @@
-"""Meshes from files, all parts of a file in one: glTF and plain binary PLY by own readers, the others by trimesh.
+"""Meshes from files, all parts of a file in one: glTF by the toolkit's own reader, the others by trimesh.
 
 trimesh gets an open file and nothing to follow links with: what an .obj or .ply says of materials and pictures has no
 meaning for a mesh. Archives are no meshes, though trimesh unpacks them.
@@ -39,13 +39,6 @@ _GLTF = {"glb", "gltf"}
 
 #: Formats that trimesh reads into arrays of vertices and faces, without transforms.
 _PLAIN = {"obj", "off", "ply", "stl"}
-
-#: Header of a binary PLY of triangles with 16-bit indices, and of nothing else.
-_PLAIN_PLY = re.compile(
-    rb"ply\nformat binary_little_endian 1.0\n(?:comment [^\n]*\n)*"
-    rb"element vertex (\d{1,18})\nproperty float x\nproperty float y\nproperty float z\n"
-    rb"element face (\d{1,18})\nproperty list uchar ushort vertex_indices\n"
-)
 
 #: Suffixes of the native files of programs that can all export .glb.
 _SCENES_OF_PROGRAMS = (
@@ -99,7 +92,7 @@ def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False)
 def _read(path: Path, allow_outside: bool) -> Triangles:
     asked = f"mesh {str(path)!r}"
     require_file(path, asked)
-    if path.suffix[1:].lower() not in _GLTF | _PLAIN and path.suffix[1:].lower() not in mesh_formats():
+    if path.suffix[1:].lower() not in _GLTF and path.suffix[1:].lower() not in mesh_formats():
         do = (
             "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
         )
@@ -137,29 +130,11 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
         _require_archive_room(stream, asked)
         _require_free(stream, path.suffix[1:].lower(), asked)
         try:
-            if (plain := _plain_ply(stream)) is not None:
-                return plain
             return joined([part for part in _parts(stream, path.suffix[1:].lower()) if len(part[1])], asked)
         except InputError:
             raise
         except Exception as error:  # each of trimesh's readers raises its own kinds
             raise InputError(asked, f"it cannot be read ({shown(error)})", "export the mesh again") from error
-
-
-def _plain_ply(stream: BinaryIO) -> Triangles | None:
-    """Triangles of a file as ``tools/make_meshes.py`` writes them; None of all others, which trimesh reads.
-
-    Importing trimesh takes longer than drawing a small picture of one.
-    """
-    head, found, _ = stream.read(_HEADER).partition(b"end_header\n")
-    if match := _PLAIN_PLY.fullmatch(head) if found else None:
-        stream.seek(len(head) + len(found))
-        vertices = np.frombuffer(stream.read(12 * int(match[1])), dtype="<f4").reshape(-1, 3)
-        rows = np.frombuffer(stream.read(), dtype=[("count", "u1"), ("corners", "<u2", 3)])
-        if (len(vertices), len(rows)) == (int(match[1]), int(match[2])) and len(rows) and (rows["count"] == 3).all():
-            return vertices.astype(np.float64), rows["corners"].astype(np.int32), None
-    stream.seek(0)
-    return None
 
 
 def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
