@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.diffusion.dimming import light_passed
 from translucent.diffusion.first_events import Beam
-from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.grid import BodyGrid, other_plane_points
 from translucent.diffusion.photon_fluence import EnteringPhotons
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
@@ -34,6 +35,9 @@ MAP_HEIGHT = 96
 
 #: Start of shadow rays before the surface, as a share of a cell.
 BEFORE = 1e-4
+
+#: Beams of each sample that stand for the light of the environment.
+SKY_BEAMS = 4
 
 #: Bounds of the correction by which a quadrature over directions gives the known share of uniform light.
 _CORRECTION = (0.5, 2.0)
@@ -176,6 +180,48 @@ def transfer(sky: Sky, solid_angles: Array, ior: float, interface: DiffuseInterf
     exact = np.pi * interface.entering
     correction = np.clip(exact / np.maximum(polished, 1e-9), *_CORRECTION)
     return np.asarray(passed * correction[:, None])
+
+
+def sky_beams(
+    sky: Sky, fluxes: Sequence[npt.NDArray[np.float32]], normals: Array, ior: float, mirrored: float
+) -> list[Beam]:
+    """Light of the environment as beams, of which each goes one way below a sample.
+
+    The directions are shared out among the beams by what enters from them, in their order on the spiral. All of it
+    goes on as from one of them, by chance as often as light comes from there: places next to it have others.
+
+    Parameters
+    ----------
+    sky : Sky
+    fluxes : three of (s, k) float32
+        Flux that enters from each direction, in each channel.
+    normals : (s, 3)
+        Of the surface at the samples.
+    ior : float
+    mirrored : float
+        Flux that the surface mirrors, as if it was diffuse, for a unit of what enters.
+    """
+    summed = np.cumsum(np.add(*fluxes[:2]) + fluxes[2], axis=1, dtype=np.float64)
+    count, last = len(summed), sky.directions.shape[0] - 1
+    total = np.maximum(summed[:, -1:], np.finfo(np.float64).tiny)
+    middle = summed - 0.5 * np.diff(summed, axis=1, prepend=0.0)
+    beam = np.minimum(SKY_BEAMS * middle / total, SKY_BEAMS - 1).astype(np.int64)
+    row = np.arange(count)
+    place = (beam + SKY_BEAMS * row[:, None]).ravel()
+    entering = np.stack(
+        [np.bincount(place, flux.ravel(), SKY_BEAMS * count).reshape(count, SKY_BEAMS) for flux in fluxes], axis=2
+    )
+    ends = np.cumsum(entering.sum(axis=2), axis=1)
+    chance = other_plane_points(count)[:, 0]
+    beams = []
+    for i in range(SKY_BEAMS):
+        before = ends[:, i - 1] if i else np.zeros(count)
+        wanted = before + chance * (ends[:, i] - before)
+        chosen = sky.directions[np.minimum((summed < wanted[:, None]).sum(axis=1), last)]
+        lit = np.flatnonzero((ends[:, i] > before) & ((chosen * normals).sum(axis=1) > 0.0))
+        ways = refracted_direction(-chosen[lit], normals[lit], np.full(len(lit), ior))
+        beams.append(Beam(lit, ways, entering[lit, i], mirrored * entering[lit, i]))
+    return beams
 
 
 def from_itself(sky: Sky, shares: Array, solid_angles: Array) -> sparse.csr_array:

@@ -34,6 +34,10 @@ _NOTHING = 1e-3
 #: Over 1 / STRAIGHT reduced mean free paths light that leaves has been turned little by little, and not straight back.
 STRAIGHT = 1.0
 
+#: Reduced mean free paths of the mean chord: of bodies as small, 1 - 1 / e of a half-space's excess is missing. Balls of
+#: albedos .3 to .95 and indices 1.3 and 1.6 lack hardly any of it where the chord is 2.7, and most where it is 5.
+FLAT = 4.0
+
 #: Reduced albedo below which what half-spaces give back is in proportion to it.
 _LEAST_ALBEDO = 1e-6
 
@@ -201,6 +205,7 @@ class FirstEvents:
         self._d = float(diffusion_coefficient(absorption, scattering))
         # In thin bodies light that is not turned back leaves on the far side.
         self._thick = float(optics.opacity(self._extinction * chord))
+        self._flat = float(optics.opacity((self._extinction * chord / FLAT) ** 3))
 
     def of(self, ways: Ways) -> Events:
         """Events of light that goes these ways."""
@@ -210,7 +215,7 @@ class FirstEvents:
         # What of the entering light the exact half-space gives back less than diffusion would.
         asked = None if ways.diffuse else np.asarray(cosine)
         straight = straight_back(self._albedo, self._ior, self._anisotropy, asked) * self._thick
-        excess = half_space_excess(self._albedo, self._ior, asked) / diffuse_interface(self._ior).conductance
+        excess = self._flat * half_space_excess(self._albedo, self._ior, asked)
 
         def counted(path: Array) -> Array:
             """Share of the first events after an optical path from the surface that count as if they were isotropic."""
@@ -236,7 +241,7 @@ class FirstEvents:
             at = start + ways.length(length)[:, None] * ways.directions
             cell, inside = grid.cell_at(at)
             deep.append((cell, self._albedo / DEEP_EVENTS * below * inside * counted(extinction * length)))
-        return Events(near - excess, into_cells, deep)
+        return Events(near - excess / diffuse_interface(self._ior).conductance, into_cells, deep)
 
 
 @lru_cache(maxsize=16)
