@@ -24,7 +24,7 @@ from translucent.diffusion.entering import (
     from_itself,
     from_light,
     nearest_parts,
-    sky_beams,
+    sky_light,
     sky_of,
     transfer,
 )
@@ -240,8 +240,8 @@ class DiffusingBody:
         """
         dimming = dimming_bodies(scene, body)
         grid = self._lit.grid
-        inside, entering = np.zeros((grid.count, 3)), np.zeros((len(grid.points), 3))
-        beams = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
+        entering, beams = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
+        inside = np.zeros((grid.count, 3))
         for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
@@ -250,17 +250,18 @@ class DiffusingBody:
                     from_light(grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops)
                 )
         if photons is not None:
-            entering = flux_of(photons, grid)
+            entering = entering + flux_of(photons, grid)
         found = self._system.solved(entering, self._entrance.itself, inside, beams)
         return _field(self._lit, self._medium, self._roughness, found)
 
-    def _from_sky(self, parts: Array, others: list[Object]) -> list[Beam]:
-        """Light that enters of radiance over solid angles (k, 3), less what other bodies on its way absorb.
+    def _from_sky(self, parts: Array, others: list[Object]) -> tuple[Array, list[Beam]]:
+        """Flux (s, 3) that enters of radiance over solid angles (k, 3), less what other bodies on its way absorb.
 
-        What they scatter goes on elsewhere, and as much comes from there: in uniform light it is not missing.
+        And apart from it, as beams, what is brighter than the rest. What others scatter goes on elsewhere, and as much
+        comes from there: in uniform light it is not missing.
         """
         if not parts.any():
-            return []
+            return np.zeros((len(self._lit.grid.points), 3)), []
         seen, sky, ior = self._entrance.seen, self._lit.sky, self._medium.ior
         fluxes = [seen * parts[:, channel].astype(np.float32) for channel in range(3)]
         absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
@@ -273,7 +274,7 @@ class DiffusingBody:
             lost = depth.tocoo()
             flux[lost.row, lost.col] *= optics.transmittance(lost.data)
         mirrored = (1.0 - diffuse_interface(ior).entering) / self._interface.entering
-        return sky_beams(sky, fluxes, self._lit.grid.normals, ior, mirrored)
+        return sky_light(sky, seen, fluxes, self._lit.grid.normals, ior, mirrored)
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:
