@@ -231,7 +231,7 @@ def _beams(
     lit = np.flatnonzero(summed[:, -1] > 0.0)
     if not len(lit):
         return []
-    summed, count, last = summed[lit], len(lit), summed.shape[1] - 1
+    summed, count = summed[lit], len(lit)
     middle = summed - 0.5 * np.diff(summed, axis=1, prepend=0.0)
     beam = np.minimum(SKY_BEAMS * middle / summed[:, -1:], SKY_BEAMS - 1).astype(np.int64)
     place = (beam + SKY_BEAMS * np.arange(count)[:, None]).ravel()
@@ -242,8 +242,8 @@ def _beams(
     beams = []
     for i in range(SKY_BEAMS):
         before = ends[:, i - 1] if i else np.zeros(count)
-        wanted = before + chance * (ends[:, i] - before)
-        chosen = sky.directions[np.minimum((summed < wanted[:, None]).sum(axis=1), last)]
+        wanted = np.minimum(before + chance * (ends[:, i] - before), summed[:, -1])
+        chosen = sky.directions[(summed < wanted[:, None]).sum(axis=1)]
         of = np.flatnonzero((ends[:, i] > before) & ((chosen * normals[lit]).sum(axis=1) > 0.0))
         ways = refracted_direction(-chosen[of], normals[lit[of]], np.full(len(of), ior))
         beams.append(Beam(lit[of], ways, entering[of, i], mirrored * entering[of, i]))
