@@ -22,9 +22,10 @@ from tests.values.diffusing import (
     lit,
     seen_field,
 )
+from translucent.diffusion import entering
 from translucent.diffusion.cache import diffusion_key
 from translucent.diffusion.entering import Casters, from_light, opaque_surfaces
-from translucent.diffusion.field import DiffusingBody, lit_body
+from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
 from translucent.diffusion.grid import other_plane_points, plane_points
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
@@ -85,6 +86,77 @@ def test_light_of_a_sun_goes_on_as_it_falls(rng: np.random.Generator) -> None:
     print(off)
     # Photons err by 1 %. Diffusion errs most in the twilight, where the light that comes in at a slant leaves soon.
     assert off[0] < 0.13 < 0.2 < off[1]
+
+
+def given_back_by_a_ball(radius: float, albedos: Array, ior: float, photons: int, rng: np.random.Generator) -> Array:
+    """Share of the uniform light entering a ball, of a radius in mean free paths, that leaves it after an event.
+
+    Of media of albedos (k,), in which photons go the same ways.
+    """
+    outside = np.sqrt(rng.random(photons))
+    outside = outside[rng.random(photons) > optics.fresnel_dielectric(outside, ior)]
+    cosine, count = optics.refracted_cosine(outside, ior), len(outside)
+    way = np.stack([np.sqrt(1 - cosine**2), np.zeros(count), -cosine], axis=1)
+    place, scattered, left = np.tile([0.0, 0.0, radius], (count, 1)), np.zeros(count, bool), np.zeros(len(albedos))
+    weight = np.ones((count, len(albedos)))
+    while len(way):
+        ahead = (place * way).sum(axis=1)
+        end = np.sqrt(np.maximum(ahead**2 - (place**2).sum(axis=1) + radius**2, 0.0)) - ahead
+        path = rng.exponential(size=len(way))
+        out = path >= end
+        place = place + np.minimum(path, end)[:, None] * way
+        normal = place / radius
+        along = np.clip((way * normal).sum(axis=1), 0.0, 1.0)
+        mirrored = optics.fresnel_dielectric(along, 1 / ior)
+        left += (1 - mirrored[out & scattered]) @ weight[out & scattered]
+        weight = weight * np.where(out[:, None], mirrored[:, None], albedos)
+        turned = rng.normal(size=way.shape)
+        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+        way = np.where(out[:, None], way - 2 * along[:, None] * normal, turned)
+        live = weight.max(axis=1) > 5e-3
+        way, place, weight, scattered = way[live], place[live], weight[live], (scattered | ~out)[live]
+    return np.asarray(left / count)
+
+
+def test_small_balls_give_back_more_than_half_spaces(rng: np.random.Generator) -> None:
+    """Of two mean free paths in radius. Measured: 1 to 4 % less than photons; 4 to 9 % without."""
+    albedos, index = np.array([0.4, 0.6, 0.8]), 1.6
+    medium = tl.Medium(absorption=2 * (1 - albedos), scattering=2 * albedos, ior=index)
+    found = diffuse_interface(index).exit_share * lit(ball_grid(20), medium).fluence.mean(axis=0)
+    exact = given_back_by_a_ball(2.0, albedos, index, 30000, rng)
+    print(found / exact - 1)
+    # Photons err by 1 %.
+    np.testing.assert_allclose(found, exact, rtol=0.05)
+
+
+def fluence_at(field: DiffusionField) -> Array:
+    """Fluence in the cells next to the surface of the ball, by their height from bottom to top."""
+    points = Sphere().tessellate(24).vertices
+    place = np.floor((points - field.low) / field.step).astype(int)
+    zone = np.minimum((3 * (points[:, 1] + 1)).astype(int), 5)
+    return np.asarray(np.bincount(zone, field.fluence[(*place.T, 0)]) / np.bincount(zone), np.float64)
+
+
+def test_bright_parts_of_the_environment_enter_as_lamps_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disc of 17 degrees overhead, as the sun there; as uniform light it goes less deep. Measured: .015, .22."""
+    texels = np.zeros((64, 128, 3), np.float32)
+    texels[:3] = 1.0
+    overhead = tl.Environment.image(texels)
+    body = tl.Object(BALL, tl.Medium(absorption=0.15, scattering=2.85, ior=1.3))
+    assert body.medium is not None
+    solver = DiffusingBody(lit_body(body, None, Diffusion(12).cell_size(body)), body.medium, 0.0)
+
+    def zones(environment: tl.Environment, *lights: tl.DirectionalLight) -> Array:
+        found = fluence_at(solver.field(tl.Scene([body], CAMERA, lights, environment), 0))
+        return found / found.mean()
+
+    sun = zones(BLACK, tl.DirectionalLight((0, -1, 0), (1, 1, 1)))
+    directed = zones(overhead)
+    monkeypatch.setattr(entering, "BRIGHT", 1e9)
+    uniform = zones(overhead)
+    off = [float(np.abs(found - sun).max()) for found in (directed, uniform)]
+    print(off)
+    assert off[0] < 0.05 < 0.1 < off[1]
 
 
 def test_bodies_on_the_way_absorb_light_of_the_environment() -> None:

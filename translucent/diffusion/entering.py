@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.diffusion.dimming import light_passed
 from translucent.diffusion.first_events import Beam
-from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.grid import BodyGrid, other_plane_points
 from translucent.diffusion.photon_fluence import EnteringPhotons
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
@@ -38,6 +39,12 @@ BEFORE = 1e-4
 #: Least height of a lamp above the samples that it lights, in radii of the area of each, and how far to the side that
 #: counts, in such heights. The first is about a cell: the samples then find its light within a tenth (sd 3 %).
 _WIDTH, _REACH = 3.0, 3.0
+#: What is more times as bright as all that a place sees of the environment, on the average, goes its own way inside:
+#: light of windows and soft boxes does, and that of a smooth sky enters as uniform light.
+BRIGHT = 2.0
+
+#: Beams of each sample that stand for such light.
+SKY_BEAMS = 4
 
 #: Bounds of the correction by which a quadrature over directions gives the known share of uniform light.
 _CORRECTION = (0.5, 2.0)
@@ -180,6 +187,70 @@ def transfer(sky: Sky, solid_angles: Array, ior: float, interface: DiffuseInterf
     exact = np.pi * interface.entering
     correction = np.clip(exact / np.maximum(polished, 1e-9), *_CORRECTION)
     return np.asarray(passed * correction[:, None])
+
+
+def sky_light(
+    sky: Sky,
+    seen: npt.NDArray[np.float32],
+    fluxes: Sequence[npt.NDArray[np.float32]],
+    normals: Array,
+    ior: float,
+    mirrored: float,
+) -> tuple[Array, list[Beam]]:
+    """Light of the environment: flux (s, 3) that enters as uniform light does, and beams of what is brighter.
+
+    Parameters
+    ----------
+    sky : Sky
+    seen : (s, k) float32
+        See `Entrance`.
+    fluxes : three of (s, k) float32
+        Flux that enters from each direction, in each channel.
+    normals : (s, 3)
+        Of the surface at the samples.
+    ior : float
+    mirrored : float
+        Flux that the surface mirrors, as if it was diffuse, for a unit of what enters.
+    """
+    uniform = seen * nearest_parts(sky.directions)[1].astype(np.float32)
+    whole = np.maximum(uniform.sum(axis=1), np.finfo(np.float32).tiny)
+    entering, bright = np.zeros((len(seen), 3)), []
+    for channel, flux in enumerate(fluxes):
+        most = BRIGHT * flux.sum(axis=1) / whole
+        bright.append(np.maximum(flux - most[:, None] * uniform, 0.0))
+        entering[:, channel] = (flux - bright[-1]).sum(axis=1, dtype=np.float64)
+    return entering, _beams(sky, bright, normals, ior, mirrored)
+
+
+def _beams(
+    sky: Sky, fluxes: Sequence[npt.NDArray[np.float32]], normals: Array, ior: float, mirrored: float
+) -> list[Beam]:
+    """Beams of each sample, of which each goes one way below it.
+
+    The directions are shared out among the beams by what enters from them, in their order on the spiral. All of a
+    beam goes on as from one of them, by chance as often as light comes from there: places next to it have others.
+    """
+    summed = np.cumsum(np.add(*fluxes[:2]) + fluxes[2], axis=1, dtype=np.float64)
+    lit = np.flatnonzero(summed[:, -1] > 0.0)
+    if not len(lit):
+        return []
+    summed, count = summed[lit], len(lit)
+    middle = summed - 0.5 * np.diff(summed, axis=1, prepend=0.0)
+    beam = np.minimum(SKY_BEAMS * middle / summed[:, -1:], SKY_BEAMS - 1).astype(np.int64)
+    place = (beam + SKY_BEAMS * np.arange(count)[:, None]).ravel()
+    size = SKY_BEAMS * count
+    entering = np.stack([np.bincount(place, flux[lit].ravel(), size).reshape(count, -1) for flux in fluxes], axis=2)
+    ends = np.cumsum(entering.sum(axis=2), axis=1)
+    chance = other_plane_points(len(normals))[lit, 0]
+    beams = []
+    for i in range(SKY_BEAMS):
+        before = ends[:, i - 1] if i else np.zeros(count)
+        wanted = np.minimum(before + chance * (ends[:, i] - before), summed[:, -1])
+        chosen = sky.directions[(summed < wanted[:, None]).sum(axis=1)]
+        of = np.flatnonzero((ends[:, i] > before) & ((chosen * normals[lit]).sum(axis=1) > 0.0))
+        ways = refracted_direction(-chosen[of], normals[lit[of]], np.full(len(of), ior))
+        beams.append(Beam(lit[of], ways, entering[of, i], mirrored * entering[of, i]))
+    return beams
 
 
 def from_itself(sky: Sky, shares: Array, solid_angles: Array) -> sparse.csr_array:

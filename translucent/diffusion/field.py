@@ -24,9 +24,11 @@ from translucent.diffusion.entering import (
     from_itself,
     from_light,
     nearest_parts,
+    sky_light,
     sky_of,
     transfer,
 )
+from translucent.diffusion.first_events import Beam
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.photon_fluence import EnteringPhotons
 from translucent.diffusion.solution import BodySystem, SurfaceLight
@@ -238,8 +240,8 @@ class DiffusingBody:
         """
         dimming = dimming_bodies(scene, body)
         grid = self._lit.grid
-        entering = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
-        inside, beams = np.zeros((grid.count, 3)), []
+        entering, beams = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
+        inside = np.zeros((grid.count, 3))
         for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
@@ -252,26 +254,27 @@ class DiffusingBody:
         found = self._system.solved(entering, self._entrance.itself, inside, beams)
         return _field(self._lit, self._medium, self._roughness, found)
 
-    def _from_sky(self, parts: Array, others: list[Object]) -> Array:
-        """(s, 3): flux that enters of radiance over solid angles (k, 3), less what other bodies on its way absorb.
+    def _from_sky(self, parts: Array, others: list[Object]) -> tuple[Array, list[Beam]]:
+        """Flux (s, 3) that enters of radiance over solid angles (k, 3), less what other bodies on its way absorb.
 
-        What they scatter goes on elsewhere, and as much comes from there: in uniform light it is not missing.
+        And apart from it, as beams, what is brighter than the rest. What others scatter goes on elsewhere, and as much
+        comes from there: in uniform light it is not missing.
         """
-        seen = self._entrance.seen
-        entering = np.asarray(seen @ parts, np.float64)
+        if not parts.any():
+            return np.zeros((len(self._lit.grid.points), 3)), []
+        seen, sky, ior = self._entrance.seen, self._lit.sky, self._medium.ior
+        fluxes = [seen * parts[:, channel].astype(np.float32) for channel in range(3)]
         absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
-        if not absorbing or not parts.any():
-            return entering
-        paths = self._lit.sky_paths(absorbing)
-        for channel in range(3):
+        paths = self._lit.sky_paths(absorbing) if absorbing else []
+        for channel, flux in enumerate(fluxes):
             depth = sparse.csr_array(seen.shape)
             for body, metres in zip(absorbing, paths, strict=True):
                 assert body.medium is not None
                 depth = depth + metres * float(np.asarray(body.medium.absorption)[channel])
             lost = depth.tocoo()
-            values = seen[lost.row, lost.col] * optics.opacity(lost.data) * parts[lost.col, channel]
-            entering[:, channel] -= np.bincount(lost.row, values, len(entering))
-        return entering
+            flux[lost.row, lost.col] *= optics.transmittance(lost.data)
+        mirrored = (1.0 - diffuse_interface(ior).entering) / self._interface.entering
+        return sky_light(sky, seen, fluxes, self._lit.grid.normals, ior, mirrored)
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:
