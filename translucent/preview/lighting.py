@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from translucent.formulas.brdf_table import brdf_table
-from translucent.formulas.sampling import sample_shifts
 from translucent.geometry.normals import corner_normals
 from translucent.geometry.solids import Box
 from translucent.preview.document import Document
@@ -66,8 +65,7 @@ class Lighting:
 
 def prepare(_: Task) -> None:
     """Prepare the data of frames with surfaces or smooth edges, before it is waited for."""
-    sample_shifts(1)  # these two import large parts of SciPy
-    corner_normals(Box().tessellate())
+    corner_normals(Box().tessellate())  # imports parts of SciPy
     brdf_table()
     for name in ("light-table", "studio"):
         filtered(environment_of(name))
