@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator
 from translucent.gpu.layout import BLOCKS
 
 #: What vertex shaders hand on, by location.
-VARYINGS = ("axial", "world_normal", "from_eye", "from_center", "surface_uv", "vertex_color", "irradiance")
+VARYINGS = ("axial", "world_normal", "from_eye", "from_center", "surface_uv", "vertex_color", "irradiance", "place")
 
 #: Bindings of the loose uniforms of a stage, and of the first of its textures. Blocks are below.
 LOOSE = {"frag": 14, "vert": 15}
