@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 import translucent as tl
+from translucent.geometry.normals import drawn_normals, has_drawn_normals, made_normals
 from translucent.geometry.solids import Box
 from translucent.preview import baking
 from translucent.preview.document import Orbit
@@ -36,6 +38,8 @@ def test_the_model_is_painted_with_its_map(task: Task, pool: Pool) -> None:
     assert scene.objects[0].mesh.uv is not None
     assert scene.objects[0].surface is not None
     assert scene.objects[0].surface.color_texture is not None
+    assert has_drawn_normals(scene.objects[0].mesh)  # the picture makes none
+    np.testing.assert_array_equal(drawn_normals(scene.objects[0].mesh), made_normals(scene.objects[0].mesh))
 
 
 def test_what_the_baker_refuses_is_told(task: Task, pool: Pool) -> None:

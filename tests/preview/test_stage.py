@@ -16,8 +16,10 @@ import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
 from translucent.planning.render_plan import RenderPlan
+from translucent.preview import presenting
 from translucent.preview import stage as stages
 from translucent.preview.actions import Change, ChoosePreset, Turn
+from translucent.preview.diffusing import SMALL
 from translucent.preview.document import Model
 from translucent.preview.measuring import crossing
 from translucent.preview.stage import Stage
@@ -107,13 +109,44 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(stage: Stage, work: Workspac
     assert np.abs(pixels(stage) - frame.to_srgb8().astype(int)).mean() < 1.0
     work.do(Change("look.light", True))
     finish(stage, work)
-    for action, known in ((Turn(20.0, 10.0), True), (Change("look.light_yaw", 3.0), False)):
+    for action, told in ((Turn(20.0, 10.0), ""), (Change("look.light_yaw", 3.0), "on a small grid")):
         work.do(action)
         stage.draw(work, SIZE)
-        assert (stage.ways.told[1] == "") is known
+        assert (told in stage.ways.told[1]) if told else not stage.ways.told[1]
+        assert stage.plans[0].given_back.diffusion == (SMALL if told else tl.Diffusion())
+        assert work.lanes["diffuse"].task is None  # while the light moves, nothing is looked for that nobody will see
+    finish(stage, work)
+    assert stage.plans[0].given_back.diffusion == tl.Diffusion()
     work.do(Change("display.scattering", "single"))
     finish(stage, work)
     assert not stage.plans[0].given_back
+
+
+def test_a_picture_that_takes_long_to_be_shown_has_frames_for_that(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stages, "BUDGET", 0.0)  # steps of 16 x 16
+    work.do(Change("display.antialias", False))
+    finish(stage, work)
+    whole = pixels(stage)
+    monkeypatch.setattr(presenting, "QUICK", 0.0)
+    monkeypatch.setattr(presenting, "APART", 0.0)
+    frame: list[str] = []
+    for name in ("step", "present"):
+        done = getattr(stage.viewport, name)
+        monkeypatch.setattr(
+            stage.viewport, name, lambda *a, done=done, name=name, **k: (frame.append(name), done(*a, **k))
+        )
+    work.do(Turn(20.0, 10.0))
+    frames = []
+    while stage.draw(work, SIZE):
+        frames.append(tuple(frame))
+        frame.clear()
+    assert frames[1] == ("step", "present")  # the first that is sharper than what moved
+    assert set(frames[2:]) == {("step",), ("present",)}
+    work.do(Turn(-20.0, -10.0))
+    finish(stage, work)
+    assert (pixels(stage) != whole).mean() < 1e-3  # the last step is shown, too
 
 
 def test_light_that_cannot_be_solved_for_is_told_once(
@@ -143,7 +176,10 @@ def test_smooth_edges_are_those_of_many_samples(stage: Stage, work: Workspace) -
     assert np.abs(shown - smooth).mean() < 0.5 * np.abs(sharp - smooth).mean()
 
 
-def test_a_split_shows_another_method_and_then_the_reference(stage: Stage, work: Workspace) -> None:
+def test_a_split_shows_another_method_and_then_the_reference(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stages, "BUDGET", 1e9)  # both sides take steps of one size
     work.do(Change("display.mode", "thickness"))
     work.do(Change("display.compare", "method"))
     finish(stage, work)

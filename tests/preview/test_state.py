@@ -13,7 +13,7 @@ import translucent as tl
 from translucent.cli import main
 from translucent.geometry.solids import Box
 from translucent.planning.plan import plan
-from translucent.preview import numbers, orbiting
+from translucent.preview import loading, numbers, orbiting
 from translucent.preview.actions import Change, ChoosePreset, Open, Pan, SetOrbit, Turn, Zoom, apply
 from translucent.preview.document import RANGES, Document, Material, Model, Orbit
 from translucent.preview.history import MAX_STEPS, History
@@ -21,7 +21,8 @@ from translucent.preview.loaded import Loaded
 from translucent.preview.scenes import material_of, medium_of, scattering_of, scene_of
 from translucent.preview.script import read_script
 from translucent.preview.session import load_session, save_session
-from translucent.preview.timing import Pace
+from translucent.preview.tasks import Task
+from translucent.preview.timing import FrameBudget, Pace
 from translucent.scene.showcase import framing, showcase
 
 ORBIT = Orbit((0.1, 0.2, 0.3), 40.0, 20.0, 2.0)
@@ -268,4 +269,36 @@ def test_what_nobody_has_timed_yet_is_drawn_coarsely_and_traced_rays_most_of_all
         for seconds in (5.0, 4.0, 0.01):  # steps of 8 x 8 take 78 ms, 62 ms
             pace.note(found, seconds)
             factors[name].append(pace.stride(found, 0.045))
-    assert factors == {"clear": [4, 16, 8, 1], "glass": [8, 16, 8, 1]}
+    assert factors == {"clear": [16, 16, 8, 1], "glass": [16, 16, 8, 1]}
+
+
+@pytest.mark.parametrize(
+    ("size", "pictured", "read"), [(1 << 19, True, "there"), (1 << 19, False, "here"), (9, True, "here")]
+)
+def test_another_process_reads_models_beside_a_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int, pictured: bool, read: str
+) -> None:
+    path = tmp_path / "model.glb"
+    path.write_bytes(bytes(size))
+    monkeypatch.setattr(loading, "load", lambda *_: "here")
+
+    class Elsewhere:
+        def call(self, *_: object, **__: object) -> tuple[str, list[object]]:
+            return "there", []
+
+    task = Task("opening", lambda _: None, lambda _: None)
+    assert loading.load_with(task, Elsewhere(), Model(str(path)), pictured=pictured) == read  # type: ignore[arg-type]
+
+
+def test_drawing_has_less_time_where_the_rest_of_the_window_takes_long() -> None:
+    now = [0.0]
+    budget = FrameBudget(lambda: now[0])
+    assert budget.begin(0.045) == 0.045  # nothing is known
+    for rest, left in ((0.5, 0.015), (0.025, 0.030), (0.004, 0.045), (0.025, 0.045)):  # the quickest one lately counts
+        budget.end(more=True)
+        now[0] += rest
+        assert budget.begin(0.045) == pytest.approx(left)
+    other = FrameBudget(lambda: now[0])
+    other.end(more=False)
+    now[0] += 0.5  # asleep
+    assert other.begin(0.045) == 0.045

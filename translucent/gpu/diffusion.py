@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Hashable, Sequence
 from threading import Lock
 from typing import TYPE_CHECKING
@@ -20,6 +21,10 @@ from translucent.scene.scene import Scene
 
 if TYPE_CHECKING:
     from translucent.diffusion.cache import FieldCache, Fields
+
+
+#: Sizes of grids whose solutions are kept: a window has a small one while things move.
+KEPT_GRIDS = 2
 
 
 class DiffusedLight:
@@ -91,13 +96,14 @@ class DiffusionCache:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
-        self._fields: FieldCache | None = None
+        #: One for each size of grids: what is solved on a small one waits for no large one.
+        self._solvers: OrderedDict[Diffusion, FieldCache] = OrderedDict()
         self._lock = Lock()
         self._last: DiffusedLight | None = None
 
     def of(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> DiffusedLight | None:
         """Diffused light of a scene whose media are marked, None where there is none."""
-        if not marked_media(scene) or not (fields := self._solver.of(scene, diffusion, caustics)):
+        if not marked_media(scene) or not (fields := self._solver(diffusion).of(scene, diffusion, caustics)):
             return None
         if self._last is None or self._last.fields is not fields:
             self._release_last()
@@ -106,27 +112,29 @@ class DiffusionCache:
 
     def has(self, key: Hashable) -> bool:
         """True if the light of this `diffusion_key` is known."""
-        return self._fields is not None and self._fields.has(key)
+        return any(solver.has(key) for solver in tuple(self._solvers.values()))
 
     def solve(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> None:
         """Find the light of a scene whose media are marked, to be drawn later. Needs no context: a thread may do it."""
-        self._solver.of(scene, diffusion, caustics)
+        self._solver(diffusion).of(scene, diffusion, caustics)
 
     def release(self) -> None:
         """Free the texture."""
         self._release_last()
-        if self._fields is not None:
-            self._fields.clear()
+        for solver in tuple(self._solvers.values()):
+            solver.clear()
 
-    @property
-    def _solver(self) -> FieldCache:
+    def _solver(self, diffusion: Diffusion) -> FieldCache:
         """Solver, with the parts of SciPy that it needs: half a second of loading for the first scene that needs it."""
         from translucent.diffusion.cache import FieldCache
 
         with self._lock:  # threads share it
-            if self._fields is None:
-                self._fields = FieldCache()
-            return self._fields
+            if diffusion not in self._solvers:
+                self._solvers[diffusion] = FieldCache()
+                if len(self._solvers) > KEPT_GRIDS:
+                    self._solvers.popitem(last=False)
+            self._solvers.move_to_end(diffusion)
+            return self._solvers[diffusion]
 
     def _release_last(self) -> None:
         if self._last is not None:

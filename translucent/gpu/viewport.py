@@ -97,7 +97,7 @@ class Viewport:
             gl, vertex, "present/gather.frag", radiance=0, optical_depth=1, thickness=2, flags=3
         )
         self._gathering = gl.vertex_array(self._gather, [])
-        self._draw_part = build_program(gl, vertex, "present/window.frag", picture=0)
+        self._draw_part = build_program(gl, "present/window.vert", "present/window.frag", picture=0)
         self._drawing_part = gl.vertex_array(self._draw_part, [])
         self._variants: dict[tuple[int, ...], tuple[moderngl.Program, moderngl.VertexArray]] = {}
         self._colors = gl.texture((256, 1), 3, false_colors().tobytes(), alignment=1)
@@ -148,7 +148,6 @@ class Viewport:
         window.viewport = part
         self._gl.enable_only(moderngl.NOTHING)
         self.texture.use(0)
-        set_uniform(self._draw_part, "part", part)
         self._drawing_part.render(moderngl.TRIANGLES, vertices=3)
         window.viewport = whole
 

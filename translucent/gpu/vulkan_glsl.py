@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 
 from translucent.gpu.layout import BLOCKS
 
-#: What the vertex shaders of bodies hand on, and that of the pass over pixels, each by location.
+#: What the vertex shaders of bodies hand on, that of the pass over pixels, and that of pictures in windows, each by location.
 _OF_BODIES = (
     "axial",
     "world_normal",
@@ -44,7 +44,8 @@ _OF_PICTURES = (
     "span",
     "corner_and_ahead",
 )
-VARYINGS = {name: place for names in (_OF_BODIES, _OF_PICTURES) for place, name in enumerate(names)}
+_OF_WINDOWS = ("place",)
+VARYINGS = {name: place for names in (_OF_BODIES, _OF_PICTURES, _OF_WINDOWS) for place, name in enumerate(names)}
 
 #: Bindings of the loose uniforms of a stage, and of the first of its textures. Blocks are below.
 LOOSE = {"frag": 14, "vert": 15}

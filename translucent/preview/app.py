@@ -259,7 +259,9 @@ class _Window:
         from imgui_bundle import imgui
 
         style = imgui.get_style()
-        for part in (imgui.Col_.window_bg, imgui.Col_.docking_empty_bg, imgui.Col_.child_bg):
+        # Nor is the whole window dimmed behind a page or a browser, which is to blend each of its pixels.
+        plain = imgui.Col_.window_bg, imgui.Col_.docking_empty_bg, imgui.Col_.child_bg, imgui.Col_.modal_window_dim_bg
+        for part in plain:
             style.set_color_(part, imgui.ImVec4(0.0, 0.0, 0.0, 0.0))
         style.set_color_(imgui.Col_.popup_bg, imgui.ImVec4(*POPUP))
         imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard  # Escape closes menus and lists

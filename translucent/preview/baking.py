@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.formulas.color import srgb_to_linear
 from translucent.frames.aovs import EMPTY, false_colors
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.normals import drawn_normals
+from translucent.geometry.normals import keep_drawn_normals, made_normals
 from translucent.media.medium import Medium
 from translucent.preview.document import Orbit
 from translucent.preview.numbers import length_text
@@ -68,19 +69,22 @@ def bake_map(task: Task, pool: Pool, body: Object, medium: Medium, mode: str, si
     if mode == "transmittance":
         options["medium"] = medium
     # xatlas holds the interpreter's lock while it makes texture coordinates.
-    baked = pool.call(task, _bake, body.mesh, options, urgency=Urgency.LATER)
-    _ = baked.mesh.diagnosis, drawn_normals(baked.mesh)  # which the picture needs
+    baked, normals = pool.call(task, _bake, body.mesh, options, urgency=Urgency.LATER)
+    keep_drawn_normals(baked.mesh, normals)
     return Bake(baked, mode, painted(dataclasses.replace(body, mesh=baked.mesh), baked))
 
 
-def _bake(report: Report, mesh: Mesh, options: dict[str, Any]) -> ThicknessMap:
+def _bake(report: Report, mesh: Mesh, options: dict[str, Any]) -> tuple[ThicknessMap, npt.NDArray[np.float32]]:
+    """Bake a map; with what the picture needs of its mesh, which is diagnosed, too: its normals."""
     from translucent.bake.bake import bake_thickness
 
     def progress(done: int, total: int, cast: int) -> None:
         report(done / max(total, 1), f"{cast / 1e6:.1f} million rays")
 
     report(None, "starting")
-    return bake_thickness(mesh, progress=progress, **options)
+    baked = bake_thickness(mesh, progress=progress, **options)
+    _ = baked.mesh.diagnosis  # goes with the mesh
+    return baked, made_normals(baked.mesh)
 
 
 def painted(body: Object, baked: ThicknessMap) -> Scene:

@@ -47,7 +47,7 @@ FRAME = (80, 48)
 SIDES = {True: 64, False: 60}
 
 #: Largest number of triangles whose normals are made without the worker process.
-SMOOTHED_AT_ONCE = 50_000
+SMOOTHED_AT_ONCE = 20_000
 
 #: Largest number of directions of the environment that throw shadows.
 SHADOWS = 16

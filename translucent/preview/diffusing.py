@@ -1,16 +1,25 @@
-"""Light that is scattered many times, solved for in a thread while the picture shows it more simply."""
+"""Light that is scattered many times: on a small grid while things move, and solved for in a thread when they rest."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from translucent.diffusion.keys import diffusion_key
+from translucent.diffusion.keys import diffusion_key, place_of
 from translucent.gpu.diffusion import DiffusionCache
-from translucent.planning.scattering import Scattering, ScatteringLayer, SingleScattering
-from translucent.planning.scattering.choice import GivenBack, shown
+from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
+from translucent.planning.scattering.choice import GivenBack, given_back, shown
 from translucent.preview.tasks import Lane, Task
 from translucent.scene.scene import Scene
+
+#: Grid on which light is solved for in the frame while things move: in the bear, other lights take 10 ms of processor
+#: time and another medium 20 ms, a fifth of what they take on the usual one. Pixels of milk, jade and wax in bear and
+#: candle are 1.2 to 6.5 of 255 off those of the usual one, those of layers 1.9 to 24.
+SMALL = Diffusion(12)
+
+#: Seconds of a frame that it may take. Where it took longer, it waits until the scene rests.
+LONGEST = 0.03
 
 UNTIL = "light that is scattered many times {}, until its diffusion is solved for"
 NEVER = "light that is scattered many times {}, since it could not be solved for"
@@ -42,11 +51,16 @@ class Diffusing:
         self.told = ""
         self._solving: _Solving | None = None
         self._insoluble: Hashable = None
+        self._last: Hashable = None
+        #: Bodies whose cells of the small grid are known, which take longest.
+        self._cut: Hashable = None
 
     def scattering(
         self, scene: Scene, asked: Scattering | None, back: GivenBack, cache: DiffusionCache, lane: Lane
     ) -> Scattering | None:
         """Scattering to draw with: that asked for if its light is known, else a simpler one, while the search goes on.
+
+        The search begins when the light is asked for again: while things move, that of every picture is another.
 
         Parameters
         ----------
@@ -62,22 +76,60 @@ class Diffusing:
         self.told = ""
         if not back.solved:
             return asked
-        instead = ScatteringLayer() if back.diffused else SingleScattering()
+        instead: Scattering = ScatteringLayer() if back.diffused else SingleScattering()
         simply = "as of flat layers" if back.diffused else "once alone"
         marked, diffusion = shown(scene, back).with_ambient_emitted, back.diffusion
-        if cache.has(key := diffusion_key(marked, diffusion)):
+        key = diffusion_key(marked, diffusion)
+        moves, self._last = key != self._last, key
+        if cache.has(key):
             return asked
         if self._solving is not None and self._solving.failed:
             self._insoluble, self._solving = self._solving.key, None
         if key == self._insoluble:
             self.told = NEVER.format(simply)
             return instead
-        self.told = UNTIL.format(simply)
-        if lane.task is None:
-            task = lane.start(
-                "diffusing light",
-                lambda _: cache.solve(marked, diffusion),
-                lambda _: None,
-            )
+        small = self._smaller(scene, asked, back)
+        if lane.task is None and not moves:
+            task = lane.start("diffusing light", lambda _: self._solve(scene, small, back, cache), lambda _: None)
             self._solving = _Solving(key, task)
+        if small is not None and self._known(scene, small, cache):
+            simply, instead = f"on a small grid, {SMALL} for {diffusion}", SMALL
+        self.told = UNTIL.format(simply)
         return instead
+
+    def _smaller(self, scene: Scene, asked: Scattering | None, back: GivenBack) -> GivenBack | None:
+        """The same bodies on the small grid; None where that does not take all of them, or is no smaller."""
+        small = replace(back, diffusion=SMALL)
+        if back.diffusion.resolution <= SMALL.resolution:
+            return None
+        if any(SMALL.refusal(scene.objects[i]) is not None for i in (*back.diffused, *back.volumes)):
+            return None
+        wanted = given_back(scene, SMALL, layers=True)
+        return small if wanted == small else None
+
+    def _known(self, scene: Scene, small: GivenBack, cache: DiffusionCache) -> bool:
+        """True if the light on the small grid is known, which is solved for here if that is quick."""
+        marked = shown(scene, small).with_ambient_emitted
+        if cache.has(diffusion_key(marked, SMALL)):
+            return True
+        if self._cut != _bodies(scene, small):
+            return False
+        begun = time.perf_counter()
+        cache.solve(marked, SMALL)
+        if time.perf_counter() - begun > LONGEST:
+            self._cut = None
+        return True
+
+    def _solve(self, scene: Scene, small: GivenBack | None, back: GivenBack, cache: DiffusionCache) -> None:
+        """Solve for light in a thread: on the small grid if that is new to the bodies, and on the one asked for."""
+        if small is not None and self._cut != (bodies := _bodies(scene, small)):
+            cache.solve(shown(scene, small).with_ambient_emitted, SMALL)
+            self._cut = bodies
+        cache.solve(shown(scene, back).with_ambient_emitted, back.diffusion)
+
+
+def _bodies(scene: Scene, back: GivenBack) -> Hashable:
+    """Places of the bodies in which light is solved for, and of what shadows them."""
+    return tuple(place_of(scene.objects[i]) for i in (*back.diffused, *back.volumes)), tuple(
+        place_of(item) for item in scene.opaque
+    )

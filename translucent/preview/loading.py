@@ -18,21 +18,24 @@ from translucent.preview.tasks import Report, Task
 from translucent.preview.worker import Pool, Urgency
 from translucent.scene.scene import Scene
 
-#: Bytes of a file from which on it is read by a worker process.
-LARGE_FILE = 1 << 23
+#: Bytes of a file from which on it is read by a worker process: while a picture is on show, and before. Whatever reads
+#: it holds the interpreter's lock now and then, which nobody sees in a window without a picture, and no process need
+#: be started for the first one.
+LARGE_BESIDE_PICTURE, LARGE_FILE = 1 << 18, 1 << 23
 
 Normals: TypeAlias = list[tuple[Mesh, npt.NDArray[np.float32]]]
 
 
-def load_with(task: Task, pool: Pool, model: Model, allow_outside: bool = False) -> Loaded:
-    """Load a model here, or if it is large, in a worker process.
+def load_with(task: Task, pool: Pool, model: Model, allow_outside: bool = False, *, pictured: bool = False) -> Loaded:
+    """Load a model here, or if it is large, in a worker process; `pictured` while the window shows another.
 
     Raises
     ------
     InputError
         If it cannot be read.
     """
-    if not (os.path.isfile(model.path) and os.path.getsize(model.path) > LARGE_FILE):
+    large = LARGE_BESIDE_PICTURE if pictured else LARGE_FILE
+    if not (os.path.isfile(model.path) and os.path.getsize(model.path) > large):
         return load(model, allow_outside)
     loaded, normals = pool.call(task, load_elsewhere, model, allow_outside, urgency=Urgency.PICTURE)
     for mesh, made in normals:

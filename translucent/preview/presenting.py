@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 from translucent.gpu.viewport import Shown, Viewport
 from translucent.preview.measuring import Truth
 from translucent.preview.scales import thickest, worst
@@ -9,6 +11,10 @@ from translucent.preview.scenes import method_of
 from translucent.preview.staging import tone_of
 from translucent.preview.workspace import Workspace
 from translucent.scene.scene import Scene
+
+#: Seconds up to which a presentation is quick: whatever changes is shown at once. Others are as many seconds apart, and
+#: have frames of their own.
+QUICK, APART = 0.006, 0.25
 
 
 class Presenting:
@@ -25,11 +31,12 @@ class Presenting:
     def __init__(self) -> None:
         self.truth: Truth | None = None
         self.shown: tuple[object, ...] = ()
+        self._wanted: tuple[Shown, tuple[object, ...]] | None = None
+        self._pending = self._alone = False
+        self._seconds = self._when = 0.0
 
-    def present(
-        self, workspace: Workspace, scene: Scene, viewport: Viewport, key: tuple[object, ...], *, changed: bool
-    ) -> None:
-        """Show the samples so far, unless they are on show: those of a picture with a key."""
+    def begin(self, workspace: Workspace, scene: Scene, viewport: Viewport, key: tuple[object, ...]) -> bool:
+        """Begin a frame that shows samples of a picture with a key; returns whether it is to do nothing else."""
         display, look = workspace.document.display, workspace.document.look
         wanted_method = method_of(display.method, workspace.document.material)
         if display.compare in ("reference", "error"):
@@ -40,7 +47,7 @@ class Presenting:
             fits = truth is not None and truth.scene is scene and truth.method == wanted_method
             if fits and truth is not None and truth is not self.truth and truth.straight >= straight:
                 viewport.put(truth.frame)
-                self.truth, changed = truth, True
+                self.truth, self._pending = truth, True
         right = {"off": "same", "method": "second", "reference": "second", "error": "difference"}[display.compare]
         if display.compare in ("reference", "error") and self.truth is None:
             right = "same"
@@ -53,7 +60,29 @@ class Presenting:
             look.exposure,
             tone_of(look, scene),
         )
-        wanted = (shown, key)
-        if changed or wanted != self.shown:
-            viewport.present(shown)
-            self.shown = wanted
+        self._wanted = shown, key
+        waits = self._wanted != self.shown or (self._pending and time.perf_counter() - self._when > APART)
+        self._alone = waits and self._seconds > QUICK and viewport.steps(0) > 0
+        return self._alone
+
+    def present(self, viewport: Viewport, *, changed: bool, last: bool) -> None:
+        """Show the samples so far, unless they are on show, or more of them can be shown later.
+
+        Parameters
+        ----------
+        viewport : Viewport
+        changed : bool
+            There are others than before.
+        last : bool
+            No others are to come.
+        """
+        assert self._wanted is not None
+        self._pending = self._pending or changed
+        now = self._alone or last or self._seconds <= QUICK
+        if self._wanted == self.shown and not (self._pending and now):
+            return
+        begun = time.perf_counter()
+        viewport.present(self._wanted[0])
+        viewport.engine.context.gl.finish()
+        self.shown, self._pending, self._when = self._wanted, False, time.perf_counter()
+        self._seconds = self._when - begun

@@ -23,13 +23,14 @@ from translucent.preview.presenting import Presenting
 from translucent.preview.scenes import method_of
 from translucent.preview.staging import tone_of
 from translucent.preview.tasks import Lane, Task
-from translucent.preview.timing import Pace, Timing
+from translucent.preview.timing import FrameBudget, Pace, Timing
 from translucent.preview.ways import SCREEN, Ways
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
-#: Largest time of a step in seconds, and samples of a pixel when steps are quick or slow.
+#: Largest time of a step in seconds, where the rest of the window takes little; and samples of a pixel when steps are
+#: quick or slow.
 BUDGET = 0.045
 SAMPLES, SLOW_SAMPLES = 16, 4
 
@@ -101,7 +102,8 @@ class Stage:
         self._asked: Task | None = None
         self._presenting = Presenting()
         self._pace = Pace()
-        self._strides = [4, 4]
+        self._frame_budget, self._budget = FrameBudget(), BUDGET
+        self._strides, self._coarsened = [4, 4], [False, False]
         self.ways = Ways(traced_at_once=compiler is None)
         self.converging, self.photons = Converging(), Photons()
         self._watched, self._newest = time.monotonic(), newest_shader()
@@ -116,8 +118,9 @@ class Stage:
         What goes wrong is told in `problem`, and the last picture stays.
         """
         started = time.perf_counter()
+        self._budget = self._frame_budget.begin(BUDGET)
         if self._compiler is not None:
-            self._compiler.ledger.begin_frame(BUDGET)
+            self._compiler.ledger.begin_frame(self._budget)
         with self.current():
             try:
                 more = self._draw(workspace, size)
@@ -132,6 +135,7 @@ class Stage:
                 if self._window is not None:
                     self._window.use()
         self.drawing = time.perf_counter() - started
+        self._frame_budget.end(more=more)
         return more
 
     def show_in(self, part: tuple[int, int, int, int]) -> None:
@@ -146,7 +150,9 @@ class Stage:
             return False
         material, both = workspace.document.material, display.compare == "method"
         methods = [method_of(display.method, material), method_of(display.method_b, material)]
+        begun = time.perf_counter()
         self.ways.choose(workspace, scene, methods[0], self.renderer)
+        self._budget -= min(time.perf_counter() - begun, 0.5 * self._budget)  # light may be solved for in the frame
         scattering, interfaces = self.ways.scattering, self.ways.interfaces
         second = methods[1] if both else None
         wanted = (scene, methods[0], second, scattering, interfaces, self.viewport.size, self.renderer)
@@ -168,7 +174,8 @@ class Stage:
             self._shown = wanted
             self.viewport.restart()
             self._presenting.truth = None
-            self._strides = [self._pace.stride(plan, BUDGET) for plan in self.plans]
+            self._strides = [self._pace.stride(plan, self._budget) for plan in self.plans]
+            self._coarsened = [False, False]
             self._moving, self.simpler = None, ""
             if self._compiler is not None and self._compiler.lacks_normals(scene, self._drawn_plans):
                 self._postpone(workspace, wanted)
@@ -180,14 +187,17 @@ class Stage:
         lit = display.follows_photons and self.viewport.steps(0) >= self._strides[0] ** 2
         still = (display.converges or display.follows_photons) and self.ways.traceable(workspace, scene)
         lit = lit and still
-        more = drawn = not lit and any(self._step(side, scene, display.antialias) for side in sides)
-        if display.converges and still and not drawn:
-            more, drawn = self.converging.step(scene, self.renderer, self.viewport, BUDGET)
+        # A large picture takes as long to be shown as a step: it has a frame for that alone.
+        alone = self._presenting.begin(workspace, scene, self.viewport, self._shown)
+        drawn = not lit and not alone and any(self._step(side, scene, display.antialias) for side in sides)
+        more = drawn or alone
+        if display.converges and still and not more:
+            more, drawn = self.converging.step(scene, self.renderer, self.viewport, self._budget)
         if lit:
             more, drawn = self._light_by_photons(scene, methods[0], display.antialias, workspace.lanes["diffuse"])
             if self.photons.light is None and not more:  # there are no photons to follow
                 more = drawn = self._step(0, scene, display.antialias)
-        self._presenting.present(workspace, scene, self.viewport, self._shown, changed=drawn)
+        self._presenting.present(self.viewport, changed=drawn, last=not more)
         return more
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
@@ -203,7 +213,7 @@ class Stage:
             self._moving = self.renderer.plan(
                 scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
             )
-        begun, factor = time.perf_counter(), self._pace.factor(self._moving or self.plans[0], FACTORS, BUDGET)
+        begun, factor = time.perf_counter(), self._pace.factor(self._moving or self.plans[0], FACTORS, self._budget)
         try:
             with self.viewport.at_once(factor) as framebuffer:
                 plan = self.renderer.draw(
@@ -233,7 +243,7 @@ class Stage:
         """True if tracing interfaces is known to take too long for a picture that moves."""
         if plan is None or not plan.has(PassName.TRACED):
             return False
-        return self._pace.known(plan) / COARSEST_TRACED**2 > BUDGET
+        return self._pace.known(plan) / COARSEST_TRACED**2 > self._budget
 
     def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
         """Draw the next sample of a side, if there is one left to draw."""
@@ -246,7 +256,21 @@ class Stage:
         self.simpler, begun = "", time.perf_counter()
         self.viewport.step(side, scene, plan, stride, max(samples, 1))
         self._finish(side, plan, stride, begun)
+        self._correct(side, plan, drawn + 1)
         return True
+
+    def _correct(self, side: int, plan: RenderPlan, drawn: int) -> None:
+        """Begin a side anew with another stride if that is what its first steps tell, of which the very first compiles:
+        a smaller one at 2, 4, 8 ... steps while less than a quarter of them would be lost, a larger one once.
+        """
+        now = self._strides[side]
+        if drawn < 2 or drawn & (drawn - 1) or 4 * drawn > now * now:
+            return
+        stride = self._pace.stride(plan, self._budget)
+        if stride < now or (stride > now and not self._coarsened[side]):
+            self._coarsened[side] |= stride > now
+            self._strides[side] = stride
+            self.viewport.restart(side)
 
     def _samples(self, stride: int, antialias: bool) -> int:
         return (SAMPLES if stride == 1 else SLOW_SAMPLES) if antialias else 0
@@ -256,14 +280,14 @@ class Stage:
         photons = self.photons
         expected = 0.0 if self.plans[0] is None else self._pace.known(self.plans[0])
         scattering = self.ways.scattering
-        if not photons.ready(scene, self.renderer, self.viewport, method, scattering, lane, BUDGET, expected):
+        if not photons.ready(scene, self.renderer, self.viewport, method, scattering, lane, self._budget, expected):
             if (plan := photons.show_media(self.viewport)) is not None:
-                self.plans[0], self._strides[0] = plan, self._pace.stride(plan, BUDGET)
+                self.plans[0], self._strides[0] = plan, self._pace.stride(plan, self._budget)
             return False, False
         if not photons.drawing or photons.plan is None or photons.light is None:
             return True, False
         if photons.side == 1 and not self.viewport.steps(1):
-            self._strides[1] = self._pace.stride(photons.plan, BUDGET)
+            self._strides[1] = self._pace.stride(photons.plan, self._budget)
         stride, begun = self._strides[photons.side], time.perf_counter()
         samples = self._samples(stride, antialias)
         self.viewport.step(photons.side, scene, photons.plan, stride, max(samples, 1), photons=photons.light.texture)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -15,6 +17,37 @@ Factor = TypeVar("Factor", int, float)
 #: Budgets that a step of the largest stride but one may take: a whole picture of the largest takes twice as long, since
 #: each step costs the window a frame.
 OVERDRAWN = 1.5
+
+
+#: Frames of which the quickest tells what the rest of a window takes; seconds of it that cost drawing nothing; and the
+#: least share of its budget that drawing keeps.
+RECENT, FREE, LEAST_SHARE = 16, 0.010, 1.0 / 3.0
+
+
+class FrameBudget:
+    """Seconds that drawing may take of a frame: less of it where the rest of the window takes long, as large ones do.
+
+    Parameters
+    ----------
+    clock : callable
+        Seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._clock = clock
+        self._rests: deque[float] = deque(maxlen=RECENT)
+        self._ended: float | None = None
+
+    def begin(self, budget: float) -> float:
+        """Begin to draw a frame, and return what is left of a budget."""
+        if self._ended is not None:
+            self._rests.append(self._clock() - self._ended)
+        taken = min(self._rests, default=0.0) - FREE
+        return budget - min(max(taken, 0.0), (1.0 - LEAST_SHARE) * budget)
+
+    def end(self, *, more: bool) -> None:
+        """End it. Where no other follows at once, the window may sleep."""
+        self._ended = self._clock() if more else None
 
 
 @dataclass
@@ -61,7 +94,9 @@ class Pace:
         return next((factor for factor in factors if known / factor**2 <= budget), factors[-1])
 
     def stride(self, plan: RenderPlan | None, budget: float) -> int:
-        """Stride of a progressive picture whose steps are expected to take so many seconds."""
+        """Stride of a progressive picture whose steps are expected to take so many seconds; the largest if unknown."""
         *usual, largest = STRIDES
+        if plan is not None and not self.known(plan):
+            return largest
         slow = plan is not None and self.known(plan) / usual[-1] ** 2 > OVERDRAWN * budget
         return largest if slow else self.factor(plan, usual, budget)

@@ -362,10 +362,12 @@ class Workspace:
             self._complete()
 
     def _load(self, model: Model, then: Callable[[Loaded], None]) -> None:
+        pictured = self.loaded is not None
+
         def work(task: Task) -> Loaded:
             task.report(None, f"reading {Path(model.path).name}")
             try:
-                return load_with(task, self.pool, model, self.allow_outside)
+                return load_with(task, self.pool, model, self.allow_outside, pictured=pictured)
             except InputError:
                 self._refused = model
                 raise

@@ -60,9 +60,10 @@ def _card(desk: Desk, name: str, size: ImVec2) -> None:
     tooltip(name or "The stage's, or the model's own.")
     over = imgui.get_window_draw_list()
     high = ImVec2(low.x + size.x, low.y + 0.5 * size.x)
-    picture = desk.work.shelf.picture(panorama_key(name), draw_panorama, name) if name else None
+    key = panorama_key(name) if name else ""
+    picture = desk.work.shelf.picture(key, draw_panorama, name) if name else None
     if picture is not None:
-        over.add_image(imgui.ImTextureRef(desk.texture(panorama_key(name), picture).glo), low, high)
+        over.add_image(imgui.ImTextureRef(desk.texture(key, picture).glo), low, high)
     else:
         over.add_rect_filled(low, high, 0xFF303030)
     chosen = desk.get("look.environment") == name
