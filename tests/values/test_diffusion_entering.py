@@ -119,7 +119,7 @@ def given_back_by_a_ball(radius: float, albedos: Array, ior: float, photons: int
 
 
 def test_small_balls_give_back_more_than_half_spaces(rng: np.random.Generator) -> None:
-    """Of two mean free paths in radius. Measured: 1 to 4 % less than photons; 4 to 9 % without."""
+    """Balls of two mean free paths in radius. Measured: 1 to 4 % less than photons; 4 to 9 % without."""
     albedos, index = np.array([0.4, 0.6, 0.8]), 1.6
     medium = tl.Medium(absorption=2 * (1 - albedos), scattering=2 * albedos, ior=index)
     found = diffuse_interface(index).exit_share * lit(ball_grid(20), medium).fluence.mean(axis=0)

@@ -195,7 +195,7 @@ def _check_usage(*groups: dict[str, object]) -> None:
 
 
 def _distance_hint(color: str) -> str:
-    """What to write instead of a name or a color alone."""
+    """Advice on what to write instead of a name or a color alone."""
     from translucent.media.presets import presets
 
     if color in presets():

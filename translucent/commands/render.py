@@ -213,8 +213,8 @@ def render(
         scene = framed_all_around(scene, pixels)
     few = pixels[0] * pixels[1] * samples * (turntable or 1) <= FEW_SAMPLES and method is None and photons is None
     with quick_compiles(few):
-        renderer = tl.Renderer(backend)
-    with renderer:
+        opened = tl.Renderer(backend)
+    with opened as renderer:
         draw = partial(
             renderer.render,
             size=pixels,

@@ -306,7 +306,7 @@ def from_light(
 
 
 def _spread(towards: Array, grid: BodyGrid) -> tuple[Array, Array]:
-    """How deep below its place each sample looks at a lamp, and what is made of the light there, (s,) each.
+    """Depth below its place at which each sample looks at a lamp, and what is made of the light there, (s,) each.
 
     A lamp that is nearer to the surface than its samples are to each other shines on a spot between them. On a plane
     the irradiance h / (r^2 + h^2)^(3/2) of a lamp at height h has the same integral 2 pi for every h: as seen from

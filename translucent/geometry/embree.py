@@ -109,13 +109,17 @@ def starts(origins: Array, directions: Array) -> Array:
     return np.asarray(-np.einsum("ki,ki->k", origins, directions) - BEFORE)
 
 
-@cache  # to make a device and to look for a package's metadata takes milliseconds, and each record of a batch asks
 def embree_versions() -> dict[str, str]:
     """Versions of embreex, and of the Embree in it; raises `RenderError` if it cannot be imported."""
     _import_embreex()
+    return {"embreex": version("embreex"), "embree": _embree_version()}
+
+
+@cache  # making a device takes milliseconds, and each record of a batch asks
+def _embree_version() -> str:
     from embreex.rtcore import EmbreeDevice
 
-    return {"embreex": version("embreex"), "embree": str(EmbreeDevice()).rpartition(" ")[2]}
+    return str(EmbreeDevice()).rpartition(" ")[2]
 
 
 def _import_embreex() -> None:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 
 from translucent.gpu.layout import BLOCKS
 
-#: What the vertex shaders of bodies hand on, that of the pass over pixels, and that of pictures in windows, each by location.
+#: Outputs of the vertex shaders of bodies, of the pass over pixels, and of pictures in windows, each by location.
 _OF_BODIES = (
     "axial",
     "world_normal",

@@ -14,7 +14,6 @@ from translucent.gpu.context import open_context
 from translucent.gpu.ledger import PostponedError, ProgramName
 from translucent.gpu.viewport import Probe, Viewport
 from translucent.planning.methods import Method
-from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.converging import Converging
@@ -22,6 +21,7 @@ from translucent.preview.photons import Photons
 from translucent.preview.presenting import Presenting
 from translucent.preview.scenes import method_of
 from translucent.preview.staging import tone_of
+from translucent.preview.strides import Strides, samples_of
 from translucent.preview.tasks import Lane, Task
 from translucent.preview.timing import FrameBudget, Pace, Timing
 from translucent.preview.ways import SCREEN, Ways
@@ -29,10 +29,8 @@ from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
-#: Largest time of a step in seconds, where the rest of the window takes little; and samples of a pixel when steps are
-#: quick or slow.
+#: Largest time of a step in seconds, where the rest of the window takes little.
 BUDGET = 0.045
-SAMPLES, SLOW_SAMPLES = 16, 4
 
 #: Factors by which a picture is coarser while it moves.
 FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
@@ -103,7 +101,7 @@ class Stage:
         self._presenting = Presenting()
         self._pace = Pace()
         self._frame_budget, self._budget = FrameBudget(), BUDGET
-        self._strides, self._coarsened = [4, 4], [False, False]
+        self._strides = Strides(self._pace)
         self.ways = Ways(traced_at_once=compiler is None)
         self.converging, self.photons = Converging(), Photons()
         self._watched, self._newest = time.monotonic(), newest_shader()
@@ -174,8 +172,7 @@ class Stage:
             self._shown = wanted
             self.viewport.restart()
             self._presenting.truth = None
-            self._strides = [self._pace.stride(plan, self._budget) for plan in self.plans]
-            self._coarsened = [False, False]
+            self._strides.begin(self.plans, self._budget)
             self._moving, self.simpler = None, ""
             if self._compiler is not None and self._compiler.lacks_normals(scene, self._drawn_plans):
                 self._postpone(workspace, wanted)
@@ -184,7 +181,7 @@ class Stage:
                 return self._draw_at_once(scene, methods[0], workspace)
         # One side at a time, the one that is behind: two would take twice as long.
         sides = sorted((0, 1), key=self.viewport.steps) if both else [0]
-        lit = display.follows_photons and self.viewport.steps(0) >= self._strides[0] ** 2
+        lit = display.follows_photons and self.viewport.steps(0) >= self._strides.of[0] ** 2
         still = (display.converges or display.follows_photons) and self.ways.traceable(workspace, scene)
         lit = lit and still
         # A large picture takes as long to be shown as a step: it has a frame for that alone.
@@ -208,7 +205,8 @@ class Stage:
             self._moving = self.renderer.plan(
                 scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
             )
-        if self._traces_slowly(self.plans[0]) or self._traces_slowly(self._moving):
+        slowest = self._budget * COARSEST_TRACED**2
+        if any(self._pace.traces_longer(plan, slowest) for plan in (self.plans[0], self._moving)):
             interfaces = SCREEN
             self._moving = self.renderer.plan(
                 scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
@@ -239,16 +237,10 @@ class Stage:
         self._presenting.shown = ()
         return True
 
-    def _traces_slowly(self, plan: RenderPlan | None) -> bool:
-        """True if tracing interfaces is known to take too long for a picture that moves."""
-        if plan is None or not plan.has(PassName.TRACED):
-            return False
-        return self._pace.known(plan) / COARSEST_TRACED**2 > self._budget
-
     def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
         """Draw the next sample of a side, if there is one left to draw."""
-        stride, plan = self._strides[side], self.plans[side]
-        samples = self._samples(stride, antialias)
+        stride, plan = self._strides.of[side], self.plans[side]
+        samples = samples_of(stride, antialias)
         drawn, whole = self.viewport.steps(side), stride * stride
         self.state = "sharpening" if drawn + 1 < whole else f"full picture, {max(drawn // whole, 1)} samples"
         if plan is None or drawn >= whole * (1 + samples):
@@ -256,24 +248,9 @@ class Stage:
         self.simpler, begun = "", time.perf_counter()
         self.viewport.step(side, scene, plan, stride, max(samples, 1))
         self._finish(side, plan, stride, begun)
-        self._correct(side, plan, drawn + 1)
-        return True
-
-    def _correct(self, side: int, plan: RenderPlan, drawn: int) -> None:
-        """Begin a side anew with another stride if that is what its first steps tell, of which the very first compiles:
-        a smaller one at 2, 4, 8 ... steps while less than a quarter of them would be lost, a larger one once.
-        """
-        now = self._strides[side]
-        if drawn < 2 or drawn & (drawn - 1) or 4 * drawn > now * now:
-            return
-        stride = self._pace.stride(plan, self._budget)
-        if stride < now or (stride > now and not self._coarsened[side]):
-            self._coarsened[side] |= stride > now
-            self._strides[side] = stride
+        if self._strides.corrected(side, plan, drawn + 1, self._budget):
             self.viewport.restart(side)
-
-    def _samples(self, stride: int, antialias: bool) -> int:
-        return (SAMPLES if stride == 1 else SLOW_SAMPLES) if antialias else 0
+        return True
 
     def _light_by_photons(self, scene: Scene, method: Method | None, antialias: bool, lane: Lane) -> tuple[bool, bool]:
         """Follow photons, or draw a step of the picture with their light; whether more is to come, and it changed."""
@@ -282,18 +259,18 @@ class Stage:
         scattering = self.ways.scattering
         if not photons.ready(scene, self.renderer, self.viewport, method, scattering, lane, self._budget, expected):
             if (plan := photons.show_media(self.viewport)) is not None:
-                self.plans[0], self._strides[0] = plan, self._pace.stride(plan, self._budget)
+                self.plans[0], self._strides.of[0] = plan, self._pace.stride(plan, self._budget)
             return False, False
         if not photons.drawing or photons.plan is None or photons.light is None:
             return True, False
         if photons.side == 1 and not self.viewport.steps(1):
-            self._strides[1] = self._pace.stride(photons.plan, self._budget)
-        stride, begun = self._strides[photons.side], time.perf_counter()
-        samples = self._samples(stride, antialias)
+            self._strides.of[1] = self._pace.stride(photons.plan, self._budget)
+        stride, begun = self._strides.of[photons.side], time.perf_counter()
+        samples = samples_of(stride, antialias)
         self.viewport.step(photons.side, scene, photons.plan, stride, max(samples, 1), photons=photons.light.texture)
         self._finish(0, photons.plan, stride, begun)
         if photons.take_over(self.viewport, stride, samples):
-            self._strides[0], self.plans[0] = stride, photons.plan
+            self._strides.of[0], self.plans[0] = stride, photons.plan
         return True, photons.side == 0
 
     def _finish(self, side: int, plan: RenderPlan, stride: float, begun: float) -> None:
@@ -308,7 +285,7 @@ class Stage:
 
     def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
         """Values of a pixel of a side, once it is final."""
-        done = self._strides[side] ** 2 if side == 0 or self.plans[1] is not None else 1
+        done = self._strides.of[side] ** 2 if side == 0 or self.plans[1] is not None else 1
         if self.viewport.steps(side) < done:
             return None
         with self.current():

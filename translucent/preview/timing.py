@@ -85,6 +85,10 @@ class Pace:
         """Seconds of a whole picture; 0 if there was none."""
         return self._seconds.get(kind(plan), 0.0)
 
+    def traces_longer(self, plan: RenderPlan | None, seconds: float) -> bool:
+        """True if a whole picture in which interfaces are traced is known to take longer."""
+        return plan is not None and plan.has(PassName.TRACED) and self.known(plan) > seconds
+
     def factor(self, plan: RenderPlan | None, factors: Sequence[Factor], budget: float) -> Factor:
         """Smallest factor of reduction at which a picture is expected to be drawn within so many seconds."""
         known = None if plan is None else self._seconds.get(kind(plan))

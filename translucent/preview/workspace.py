@@ -362,12 +362,10 @@ class Workspace:
             self._complete()
 
     def _load(self, model: Model, then: Callable[[Loaded], None]) -> None:
-        pictured = self.loaded is not None
-
         def work(task: Task) -> Loaded:
             task.report(None, f"reading {Path(model.path).name}")
             try:
-                return load_with(task, self.pool, model, self.allow_outside, pictured=pictured)
+                return load_with(task, self.pool, model, self.allow_outside, pictured=self.loaded is not None)
             except InputError:
                 self._refused = model
                 raise
