@@ -112,7 +112,7 @@ def test_what_has_no_caustics_says_why_and_keeps_its_picture(stage: Stage, work:
     work.do(Change("display.caustics", True))
     finish(stage, work)
     assert stage.photons.told.startswith("no caustics; the scene has no lights")
-    assert stage.viewport.steps(0) > stage._strides[0] ** 2  # edges become smooth all the same
+    assert stage.viewport.steps(0) > stage._strides.of[0] ** 2  # edges become smooth all the same
     work.do(Turn(10.0, 0.0))
     assert stage.draw(work, SIZE)
     work.do(Change("display.mode", "thickness"))
