@@ -395,6 +395,7 @@ def _warn(frame: Frame) -> None:
     for effect in frame.plan.unmodelled:
         if effect.kind is NoteKind.LIGHTS_LEFT_OUT:
             warnings.warn(str(effect), TranslucentWarning, stacklevel=3)
-    if invalid := int(np.count_nonzero(~frame.valid)):
+    if not frame.valid.all():
+        invalid = int(np.count_nonzero(~frame.valid))
         text = invalid_text(frame.plan, invalid, int(np.count_nonzero(frame.coverage)))
         warnings.warn(text, TranslucentWarning, stacklevel=3)

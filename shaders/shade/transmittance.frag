@@ -1,7 +1,7 @@
 // From the accumulated path to what the frame holds: thickness, optical depth, transmittance, radiance, and the mask.
 // Row 0 of the output is the top row.
 // SPECTRAL: 0: sums are of paths in one medium; 1: of optical depths, with paths beside; 2, 3: of paths in so many media, apart.
-// COMPACT: one output has radiance and thickness, whose sign bit marks what is not valid. All else follows from these, but for
+// COMPACT: outputs are radiance, and thickness whose sign bit marks what is not valid. All else follows from these, but for
 // optical depths in several media.
 
 // What is alike for all pixels, from uniform blocks: see transmittance.vert.
@@ -85,8 +85,9 @@ layout(location = 0) out vec4 out_sums;
 layout(location = 1) out float out_end;
 #elif COMPACT
 layout(location = 0) out vec4 out_radiance;
+layout(location = 1) out float out_marked_thickness;
 #if SPECTRAL
-layout(location = 1) out vec4 out_optical_depth;
+layout(location = 2) out vec4 out_optical_depth;
 #endif
 #else
 layout(location = 0) out vec4 out_radiance;
@@ -202,7 +203,7 @@ void main() {
 #endif
 #if COMPACT
     // The larger of -0 and 0 may be either.
-    out_radiance.a = uintBitsToFloat((floatBitsToUint(path.thickness) & 0x7fffffffu) | (valid ? 0u : 0x80000000u));
+    out_marked_thickness = uintBitsToFloat((floatBitsToUint(path.thickness) & 0x7fffffffu) | (valid ? 0u : 0x80000000u));
 #if SPECTRAL
     out_optical_depth = vec4(path.optical_depth, 1.0);
 #endif

@@ -59,8 +59,8 @@ def scene_of(seed: int, most: int, media: tuple[tl.Medium, ...]) -> tl.Scene:
 
 
 def shade_everything(patch: pytest.MonkeyPatch) -> None:
-    def whole(objects: tuple[tl.Object, ...], camera: tl.Camera, size: tuple[int, int]) -> Array:
-        return np.tile([0.0, 0.0, *size], (len(objects), 1)).astype(np.float64)
+    def whole(boxes: Array, radii: Array, camera: tl.Camera, size: tuple[int, int]) -> Array:
+        return np.tile([0.0, 0.0, *size], (len(boxes), 1)).astype(np.float64)
 
     patch.setattr(job, "extents", whole)
 
@@ -119,13 +119,16 @@ def test_with_nothing_in_view_the_environment_is_all(
 def test_every_point_of_a_body_that_is_seen_is_within_its_extent(kind: str) -> None:
     rng = np.random.default_rng(5)
     seen = 0
-    for _ in range(200):
+    for number in range(200):
         camera = camera_of(rng, kind)
         at = trimesh.transformations.random_rotation_matrix(rng.random(3))
+        at[:3, :3] *= rng.uniform(0.5, 1.5, 3)
         at[:3, 3] = rng.normal(size=3)
-        body = tl.Object(MESHES[1], MEDIA[0], at)
+        body = tl.Object(MESHES[number % 2], MEDIA[0], at)
         shift = rng.uniform(-0.99, 0.99, 2)
-        part = part_of(extents(body.bounds[None], camera, SIZE), (float(shift[0]), float(shift[1])), SIZE)
+        part = part_of(
+            extents(body.bounds[None], np.array([body.radius]), camera, SIZE), (float(shift[0]), float(shift[1])), SIZE
+        )
         corners = (body.mesh.vertices @ at[:3, :3].T + at[:3, 3])[body.mesh.faces]
         points = np.einsum("nk,nkj->nj", rng.dirichlet(np.ones(3), len(corners)), corners) - camera.eye
         across = points @ np.stack([camera.right, camera.up], axis=1)
@@ -141,10 +144,25 @@ def test_every_point_of_a_body_that_is_seen_is_within_its_extent(kind: str) -> N
     assert seen > 1000
 
 
+@pytest.mark.parametrize("flat", [False, True])
+def test_the_extent_of_a_ball_is_that_of_its_image_and_not_of_its_box(flat: bool) -> None:
+    distance, aside, size = 5.0, 0.7, (1000, 1000)
+    eye, target = (0, 0, distance), (0, 0, 0)
+    camera = tl.Camera.orthographic(eye, target, height=4.0) if flat else tl.Camera.look_at(eye, target, fov_y=40.0)
+    edges = extents(np.array([[[aside - 1.0, -1.0, -1.0], [aside + 1.0, 1.0, 1.0]]]), np.ones(1), camera, size)[0]
+    away = np.hypot(distance, aside)
+    turn, reach = np.arctan2(aside, distance), np.arcsin(1.0 / away)
+    right = aside + 1.0 if flat else np.tan(turn + reach)
+    top = 1.0 if flat else np.tan(np.arcsin(1.0 / distance))
+    expected = (np.array([right, top]) / camera.half_extent(size) + 1.0) * 0.5 * size
+    assert edges[2:] == pytest.approx(expected, abs=0.05)
+
+
 def test_what_is_beside_or_behind_has_no_part_and_what_is_around_has_all() -> None:
     def part(eye: tuple[float, float, float], target: tuple[float, float, float]) -> Part:
         camera = tl.Camera.look_at(eye, target, fov_y=45.0)
-        return part_of(extents(tl.Object(MESHES[0], MEDIA[0]).bounds[None], camera, SIZE), (0.0, 0.0), SIZE)
+        body = tl.Object(MESHES[0], MEDIA[0])
+        return part_of(extents(body.bounds[None], np.array([body.radius]), camera, SIZE), (0.0, 0.0), SIZE)
 
     assert not part((0, 0, 5), (0, 0, 10))
     assert not part((0, 0, 5), (5, 0, 5))

@@ -121,15 +121,15 @@ def test_it_is_told_in_words_and_as_json() -> None:
     assert str(told).splitlines() == [
         "bytes in targets at most, of one sample:",
         "  signed_depth: 0 read, 8 written per pixel and 8 read, 8 written for each face over it",
-        "  transmittance: 8 read, 16 written per pixel",
-        "  together: 8 read, 24 written per pixel, and 16 read back",
+        "  transmittance: 8 read, 20 written per pixel",
+        "  together: 8 read, 28 written per pixel, and 16 read back",
     ]
     shown = dataclasses.replace(told, passes=(*told.passes, PassTraffic(PassName.CAUSTICS)))
     assert str(shown).splitlines()[-1] == "  not counted, as it goes with what a ray meets: caustics"
     assert shown.summary() == {
         "passes": [
             {"name": "signed_depth", "pixel": {"read": 0, "written": 8}, "face": {"read": 8, "written": 8}},
-            {"name": "transmittance", "pixel": {"read": 8, "written": 16}, "face": {"read": 0, "written": 0}},
+            {"name": "transmittance", "pixel": {"read": 8, "written": 20}, "face": {"read": 0, "written": 0}},
             {"name": "caustics", "pixel": None, "face": None},
         ],
         "read_back": 16,

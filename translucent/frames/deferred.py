@@ -28,36 +28,25 @@ class Deferred:
         return self._make(*self._arguments)
 
 
-def radiance_of(light: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """(h, w, 3): the first three channels of (h, w, 4)."""
-    # As one item for each pixel: NumPy copies many short rows slowly.
-    triples = np.dtype({"names": ["rgb"], "formats": ["V12"], "itemsize": 16})
-    radiance = np.empty((*light.shape[:2], 3), dtype=np.float32)
-    radiance.view("V12")[..., 0] = light.view(triples)[..., 0]["rgb"]
-    return radiance
-
-
-def thickness_of(light: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """(h, w): magnitude of the fourth channel."""
-    found: npt.NDArray[np.float32] = np.abs(light[..., 3])
+def thickness_of(marked: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """(h, w): magnitude of a thickness whose sign bit marks what is not valid."""
+    found: npt.NDArray[np.float32] = np.abs(marked)
     return found
 
 
-def valid_of(light: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
-    """(h, w): whether the sign bit of the fourth channel is clear."""
-    marked = np.signbit(light[..., 3])
-    return np.logical_not(marked, out=marked)
+def valid_of(marked: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+    """(h, w): whether the sign bit is clear."""
+    return np.asarray(marked.view(np.int32) >= 0)
 
 
-def coverage_of(light: npt.NDArray[np.float32], floor: float) -> npt.NDArray[np.bool_]:
+def coverage_of(marked: npt.NDArray[np.float32], floor: float) -> npt.NDArray[np.bool_]:
     """(h, w): whether there is a thickness above `floor`, or none that is valid."""
-    values = light[..., 3]
-    return (values > np.float32(floor)) | np.signbit(values)
+    return (marked > np.float32(floor)) | np.signbit(marked)
 
 
-def optical_depth_of(light: npt.NDArray[np.float32], extinction: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def optical_depth_of(marked: npt.NDArray[np.float32], extinction: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """(h, w, 3): thickness times the extinction (3,) of the one medium."""
-    thickness = thickness_of(light)
+    thickness = thickness_of(marked)
     depth = np.empty((*thickness.shape, 3), dtype=np.float32)
     with np.errstate(under="ignore"):
         for channel, value in enumerate(extinction):
@@ -65,9 +54,9 @@ def optical_depth_of(light: npt.NDArray[np.float32], extinction: npt.NDArray[np.
     return depth
 
 
-def transmitted_of(light: npt.NDArray[np.float32], extinction: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def transmitted_of(marked: npt.NDArray[np.float32], extinction: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """(h, w, 3): transmittance of thickness in one medium with this extinction (3,)."""
-    thickness = thickness_of(light)
+    thickness = thickness_of(marked)
     through, depth = np.empty((*thickness.shape, 3), dtype=np.float32), np.empty_like(thickness)
     with np.errstate(under="ignore"):
         for channel, value in enumerate(extinction):

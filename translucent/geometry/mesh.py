@@ -128,10 +128,14 @@ class Mesh(Frozen):
     @cached_property
     def bounds(self) -> Array:
         """(2, 3): smallest and largest coordinates of the vertices that faces use."""
-        used = use_mask(self.faces, len(self.vertices))
-        bounds = extent(self.vertices if used.all() else self.vertices[used])
+        bounds = extent(self._used)
         bounds.setflags(write=False)
         return bounds
+
+    @property
+    def _used(self) -> Array:
+        used = use_mask(self.faces, len(self.vertices))
+        return self.vertices if used.all() else self.vertices[used]
 
     @cached_property
     def center(self) -> Array:
@@ -139,6 +143,12 @@ class Mesh(Frozen):
         center = np.asarray(0.5 * self.bounds[0] + 0.5 * self.bounds[1])
         center.setflags(write=False)
         return center
+
+    @cached_property
+    def radius(self) -> float:
+        """Distance of the farthest vertex from the center of the bounding box in metres."""
+        away = self._used - self.center
+        return float(np.sqrt(np.einsum("ij,ij->i", away, away).max()))
 
     @property
     def diagonal(self) -> float:

@@ -56,12 +56,13 @@ class Part:
         return tuple(part for part in parts if part)
 
 
-def extents(boxes: Array, camera: Camera, size: tuple[int, int]) -> Array:
-    """(n, 4): left, bottom, right and top edge of what objects with these bounds (n, 2, 3) may cover, in pixels, at
-    most 2 pixels off the picture; right of left nowhere for objects out of view.
+def extents(boxes: Array, radii: Array, camera: Camera, size: tuple[int, int]) -> Array:
+    """(n, 4): left, bottom, right and top edge of what objects may cover, in pixels, at most 2 pixels off the picture;
+    right of left nowhere for objects out of view.
 
-    They enclose the images of all faces, since they come from the corners of bounds. Bounds that reach behind the eye,
-    and may yet be in view, give all of the picture.
+    An object lies within its bounds (n, 2, 3) and within a ball of radius (n,) around their center. They enclose the
+    images of all faces, since they come from the corners of bounds, and from the ball. Bounds that reach behind the
+    eye, and may yet be in view, give all of the picture.
     """
     count = len(boxes)
     bounds = boxes - camera.eye
@@ -89,11 +90,28 @@ def extents(boxes: Array, camera: Camera, size: tuple[int, int]) -> Array:
     # An edge is farthest out at the near end of the slack where it is on that side, and at the far end elsewhere.
     low, high = across - slack[..., None], across + slack[..., None]
     low, high = np.where(low < 0.0, low / near, low / far), np.where(high > 0.0, high / near, high / far)
-    limits = np.stack([low.min(axis=1), high.max(axis=1)], axis=1) / half
+    least_of_ball, most_of_ball = _sides_of_balls(seen.mean(axis=1), radii + slack[:, 0], flat=flat)
+    low, high = np.maximum(low.min(axis=1), least_of_ball), np.minimum(high.max(axis=1), most_of_ball)
+    limits = np.stack([low, high], axis=1) / half
     pixels = np.clip((limits - center + 1.0) * 0.5 * size, -2.0, np.array(size) + 2.0)
     pixels[whole] = [[-2.0, -2.0], [size[0] + 2.0, size[1] + 2.0]]
     pixels[hidden] = 0.0
     return np.asarray(pixels.reshape(count, 4))
+
+
+def _sides_of_balls(centers: Array, radii: Array, *, flat: bool) -> tuple[Array, Array]:
+    """(n, 2) each: least and most that balls reach to the right and up at distance 1, or in metres where rays are
+    parallel; infinite for a ball that is not all ahead of the eye. Centers (n, 3): right, up and ahead of the eye.
+    """
+    across, ahead = centers[:, :2], centers[:, 2:]
+    reach = radii[:, None]
+    if flat:
+        return across - reach, across + reach
+    # Seen along an axis of the picture, a ball is a disc between two tangents through the eye.
+    distance = np.hypot(across, ahead)
+    front = ahead > reach
+    way, aside = np.arctan2(across, ahead), np.arcsin(np.where(front, reach / np.where(front, distance, 1.0), 0.0))
+    return np.where(front, np.tan(way - aside), -np.inf), np.where(front, np.tan(way + aside), np.inf)
 
 
 def part_of(edges: Array, shift: tuple[float, float], size: tuple[int, int]) -> Part:

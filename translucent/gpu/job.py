@@ -134,7 +134,7 @@ class FrameJob(SceneView):
         super().__init__(gl, placed, self.roles_of(counts), contents, targets, resources)
         self._cleared: set[str] = set()
         self._lit = False
-        self._extents = extents(scene.boxes, scene.camera, targets.size)
+        self._extents = extents(scene.boxes, scene.radii, scene.camera, targets.size)
         self._in_view = frozenset(np.flatnonzero(self._extents[:, 2] > self._extents[:, 0]).tolist())
         if self.features.marches and not self.features.scatters:
             self.light(LightLookup(media_sphere(scene)[0], (), np.zeros((0, 4)), np.zeros((0, 4))))

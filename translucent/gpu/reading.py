@@ -12,7 +12,6 @@ from translucent.frames.deferred import (
     copied,
     coverage_of,
     optical_depth_of,
-    radiance_of,
     thickness_of,
     transmittance_of,
     transmitted_of,
@@ -72,21 +71,21 @@ def _whole_arrays(job: FrameJob) -> dict[str, Any]:
 
 
 def _compact_arrays(job: FrameJob) -> dict[str, Any]:
-    light = _fixed(read_floats(job.compact_result, 0, 4))
+    marked = _fixed(read_floats(job.compact_result, 1, 1))
     if job.plan.spectral:
-        values = _fixed(read_floats(job.compact_result, 1, 3))
+        values = _fixed(read_floats(job.compact_result, 2, 3))
         depth, through = Deferred(copied, values), Deferred(transmittance_of, values)
     else:
         extinction = bounded_extinction(job.scene.bodies[0].medium, job.scene.diagonal).astype(np.float32)
-        depth = Deferred(optical_depth_of, light, extinction)
-        through = Deferred(transmitted_of, light, extinction)
+        depth = Deferred(optical_depth_of, marked, extinction)
+        through = Deferred(transmitted_of, marked, extinction)
     return {
-        "radiance": Deferred(radiance_of, light),
+        "radiance": read_floats(job.compact_result, 0, 3),
         "transmittance": through,
         "optical_depth": depth,
-        "thickness": Deferred(thickness_of, light),
-        "coverage": Deferred(coverage_of, light, COVERAGE_FLOOR * job.scene.diagonal),
-        "valid": Deferred(valid_of, light),
+        "thickness": Deferred(thickness_of, marked),
+        "coverage": Deferred(coverage_of, marked, COVERAGE_FLOOR * job.scene.diagonal),
+        "valid": Deferred(valid_of, marked),
     }
 
 

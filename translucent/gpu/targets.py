@@ -102,7 +102,7 @@ class Targets:
         return self._get("result")
 
     def compact(self, *, with_depth: bool) -> moderngl.Framebuffer:
-        """RGBA32F radiance and thickness, with the sign bit where it cannot be trusted; and RGBA32F optical depth."""
+        """RGBA32F radiance; R32F thickness, with the sign bit where it cannot be trusted; and RGBA32F optical depth."""
         return self._get(f"compact-{with_depth}", compact_format(with_depth))
 
     def average(self) -> moderngl.Framebuffer:

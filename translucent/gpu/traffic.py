@@ -149,8 +149,7 @@ def _read_back(features: FrameFeatures) -> int:
     """Bytes of each pixel that `gpu.reading` takes."""
     floats = 4
     if features.can_be_compact:
-        size = compact_format(features.plan.spectral).bytes_of(0)
-        size += 3 * floats if features.plan.spectral else 0
+        size = (3 + 1 + (3 if features.plan.spectral else 0)) * floats
     else:
         size = (3 + 3 + 3 + 1) * floats + 1
     if features.path_traced:

@@ -207,6 +207,11 @@ class Object(Frozen):
         world = corners @ self.matrix[:3, :3].T + self.matrix[:3, 3]
         return np.stack([world.min(axis=0), world.max(axis=0)])
 
+    @cached_property
+    def radius(self) -> float:
+        """Radius of a ball around the center of the bounds that holds the object."""
+        return float(np.linalg.norm(self.matrix[:3, :3], ord=2)) * self.mesh.radius
+
     def winding_number(self, point: npt.ArrayLike) -> float:
         """Winding number around a world-space point: 0 or 1 for a simple solid; quick outside the bounds."""
         local = np.linalg.solve(self.matrix[:3, :3], np.asarray(point, dtype=np.float64) - self.matrix[:3, 3])
@@ -311,6 +316,11 @@ class Scene(Frozen):
     def boxes(self) -> Array:
         """(objects, 2, 3): smallest and largest world coordinates of each object."""
         return np.array([body.bounds for body in self.objects])
+
+    @cached_property
+    def radii(self) -> Array:
+        """(objects,): radius of a ball around the center of each object's box that holds it."""
+        return np.array([body.radius for body in self.objects])
 
     @cached_property
     def filled(self) -> Mask:

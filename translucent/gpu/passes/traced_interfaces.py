@@ -145,7 +145,8 @@ class TracedInterfacesPass:
         _set(program, {**values, "mirror_plane": (*mirror.normal, height), "mirror_finish": finish})
         twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
         width, rows = job.targets.size
-        edges = extents(np.array([twin.bounds for twin in twins]), job.scene.camera, (width, rows))
+        boxes, radii = np.array([twin.bounds for twin in twins]), np.array([twin.radius for twin in twins])
+        edges = extents(boxes, radii, job.scene.camera, (width, rows))
         seen = edges[:, 2] > edges[:, 0]
         edges[seen] += MIRROR_ROOM * rows * np.array([-1.0, -1.0, 1.0, 1.0])
         job.gl.enable_only(moderngl.BLEND)
