@@ -88,3 +88,18 @@ def _finite(triple: Array, text: str) -> Array:
     if not np.isfinite(triple).all():
         raise InputError(f"color {text}", "a channel is not finite", "give numbers")
     return triple
+
+
+def reflectance(color: ColorLike, name: str) -> Array:
+    """Read-only color (3,) of an opaque object of this name; raises `InputError` unless it is one."""
+    where = f"color of {name!r}"
+    try:
+        values = np.array(parse_color(color) if isinstance(color, str) else color, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        values = np.zeros(0)
+    if values.shape != (3,) or not ((values >= 0) & (values <= 1)).all():
+        raise InputError(f"{where} {color!r}", "not three numbers in 0 to 1", "give for example (0.6, 0.6, 0.6)")
+    values.setflags(write=False)
+    return values

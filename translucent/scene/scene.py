@@ -15,7 +15,7 @@ from translucent.arrays import Array, Mask
 from translucent.errors import InputError
 from translucent.frozen import Frozen
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh
-from translucent.media.colors import ColorLike, parse_color
+from translucent.media.colors import ColorLike, reflectance
 from translucent.media.density import Density
 from translucent.media.medium import MAX_EMISSION, Medium
 from translucent.scene.camera import Camera
@@ -100,7 +100,7 @@ class Object(Frozen):
                 "not above 0",
                 "give metres, for example 1e-3",
             )
-        object.__setattr__(self, "color", _reflectance(self.color, self.mesh.name))
+        object.__setattr__(self, "color", reflectance(self.color, self.mesh.name))
         if self.density is not None:
             _require_type("density of an object", self.density, get_args(Density), "use for example tl.DensityGrid")
             if self.medium is None or self.sheet_thickness is not None:
@@ -388,20 +388,6 @@ def object_names(items: Iterable[Object]) -> str:
     names = list(dict.fromkeys(repr(item.mesh.name) for item in items))
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES + 1 else ""
     return ", ".join(names[:MOST_NAMES] if more else names) + more
-
-
-def _reflectance(color: ColorLike, name: str) -> Array:
-    where = f"color of {name!r}"
-    try:
-        values = np.array(parse_color(color) if isinstance(color, str) else color, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        values = np.zeros(0)
-    if values.shape != (3,) or not ((values >= 0) & (values <= 1)).all():
-        raise InputError(f"{where} {color!r}", "not three numbers in 0 to 1", "give for example (0.6, 0.6, 0.6)")
-    values.setflags(write=False)
-    return values
 
 
 def _require_type(what: str, value: object, kinds: type | tuple[type, ...], do: str) -> None:
