@@ -396,6 +396,5 @@ def _warn(frame: Frame) -> None:
         if effect.kind is NoteKind.LIGHTS_LEFT_OUT:
             warnings.warn(str(effect), TranslucentWarning, stacklevel=3)
     if not frame.valid.all():
-        invalid = int(np.count_nonzero(~frame.valid))
-        text = invalid_text(frame.plan, invalid, int(np.count_nonzero(frame.coverage)))
+        text = invalid_text(frame.plan, *(int(np.count_nonzero(kind)) for kind in (~frame.valid, frame.coverage)))
         warnings.warn(text, TranslucentWarning, stacklevel=3)
