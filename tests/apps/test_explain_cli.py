@@ -53,7 +53,7 @@ def test_explain_as_json(run: Run, cube: Path) -> None:
     assert told["plan"]["method"] == "BackFaceDepth()"
     assert told["plan"]["exact"] is True
     assert [step["name"] for step in told["plan"]["passes"]] == ["back_face_depth", "transmittance"]
-    assert [step["pixel"]["written"] for step in told["plan"]["traffic"]["passes"]] == [16 + 8 + 8, 16]
+    assert [step["pixel"]["written"] for step in told["plan"]["traffic"]["passes"]] == [16 + 8 + 8, 16 + 4]
 
 
 def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:

@@ -82,6 +82,7 @@ class _Pool(ProcessPoolExecutor):
         if kind is not None:
             # Not public before Python 3.14, which has terminate_workers().
             processes = list((self._processes or {}).values())
+            manager: Any = self._executor_manager_thread  # typeshed takes it for something else
             for process in processes:
                 process.terminate()
             self.shutdown(wait=False, cancel_futures=True)
@@ -89,6 +90,8 @@ class _Pool(ProcessPoolExecutor):
                 process.join(PATIENCE)
                 process.kill()  # one that was asked while it started may not have heard
                 process.join()
+            if manager is not None:  # it waits for the processes, too, and may be about to write down that one ended
+                manager.join(1.0)
         self.shutdown(wait=True, cancel_futures=True)
 
 
