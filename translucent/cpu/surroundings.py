@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from translucent.arrays import Array, Mask
+from translucent.arrays import Array
 from translucent.cpu.beams import Beams
 from translucent.cpu.footprints import ellipses
 from translucent.cpu.vectors import dot
 from translucent.formulas.footprint import ALPHA_OF_DEVIATION, LEAST_BREADTH, MOST_LOOKUPS
-from translucent.reference.ray_ends import ACROSS
+from translucent.reference.ray_ends import places_on_backdrop
 from translucent.reference.rays import Rays
 from translucent.scene.environment import Environment, equirectangular_uv
 from translucent.scene.environment_filter import FilteredEnvironment, filtered
@@ -94,27 +94,11 @@ class Surroundings:
     def _background(self, seen: Environment, beams: Beams, rays: Rays) -> Array:
         if seen.kind != "checkerboard":
             return self._light(seen, beams)
-        place, ahead = self._on_backdrop(rays)
+        place, ahead = places_on_backdrop(self.scene, self.aspect, rays)
         bent = beams.met > 0
         found = seen.radiance(rays.directions, np.where(bent[:, None], place, rays.backdrop))
         found[bent & ~ahead] = seen.mean
         return found
-
-    def _on_backdrop(self, rays: Rays) -> tuple[Array, Mask]:
-        """Places in the picture at which rays meet a wall across the view behind all objects, and whether they do."""
-        camera = self.scene.camera
-        low, high = self.scene.bounds - camera.eye
-        farthest = float(np.maximum(low * camera.forward, high * camera.forward).sum())
-        towards = rays.directions @ camera.forward
-        ahead = towards > ACROSS
-        path = np.maximum(farthest - rays.origins @ camera.forward, 0.0) / np.where(ahead, towards, 1.0)
-        points = rays.origins + path[:, None] * rays.directions
-        depth = points @ camera.forward if camera.fov_y is not None else np.ones(len(points))
-        ahead &= depth > 0
-        heights = 2.0 * replace(camera, window=None).half_extent((1, 1))[1] * np.where(ahead, depth, 1.0)
-        across = np.stack([points @ camera.right, -(points @ camera.up)], axis=1) / heights[:, None]
-        aspect = self.aspect if camera.window is None else camera.window.whole[0] / camera.window.whole[1]
-        return across + (0.5 * aspect, 0.5), ahead
 
 
 def blurred_lookups(maps: FilteredEnvironment, uv: Array, roughness: Array) -> Array:
