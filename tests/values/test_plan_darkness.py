@@ -26,7 +26,8 @@ def test_a_body_is_black_from_a_step_of_8_bits_on(scale: float) -> None:
         found = plan(scene(cube))
         assert len(found.remarks) == expected
         assert found.says(NoteKind.BLACK) == bool(expected)
-        assert found.exact and not any("black" in note for note in (*found.limits, *found.unmodelled))
+        assert found.exact
+        assert not any("black" in note for note in (*found.limits, *found.unmodelled))
 
 
 def test_the_remark_tells_thickness_what_passes_and_what_would_show_it() -> None:

@@ -29,24 +29,21 @@ def black_bodies(scene: Scene) -> tuple[Note, ...]:
     for body in scene.bodies:
         if body.density is None and not body.covers and (body.surface is None or body.surface.transmission == 1.0):
             by_medium.setdefault(id(body.medium), []).append(body)
-    passed: dict[int, float] = {}
-    black: list[Object] = []
+    black: list[tuple[float, Object]] = []
     for bodies in by_medium.values():
         medium = bodies[0].medium
         # As thick as the whole scene: if anything passes that, no body is black.
         if medium is None or medium.emits or _passes(medium, scene.diagonal) + given_back(scene, medium) >= BLACK:
             continue
-        for body in bodies:
-            if (share := _passes(medium, _chord(body))) < BLACK:
-                passed[id(body)] = share
-                black.append(body)
+        shares = luminance(medium.transmittance([_chord(body) for body in bodies])).tolist()
+        black += [(share, body) for share, body in zip(shares, bodies, strict=True) if share < BLACK]
     if not black:
         return ()
-    clearest = max(black, key=lambda body: passed[id(body)])
+    passed, clearest = max(black, key=lambda found: found[0])
     assert clearest.medium is not None
     chord, shown = _chord(clearest), _distance(clearest.medium, SHOWN)
     text = (
-        f"{object_names(black)}: black: {passed[id(clearest)]:.1e} of white light passes "
+        f"{object_names(body for _, body in black)}: black: {passed:.1e} of white light passes "
         f"{_text(chord)}, the mean thickness{'' if len(black) == 1 else f' of {clearest.mesh.name!r}'}, and a "
         f"fifth passes {_text(shown)}; a medium {chord / shown:.2g} times as dilute (a color at a distance so "
         "much longer) shows its color"

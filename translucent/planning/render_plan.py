@@ -122,7 +122,7 @@ class RenderPlan:
         return any(step.name in names for step in self.passes)
 
     def says(self, kind: NoteKind) -> bool:
-        """True if the plan has a note of this kind, among its limits, the effects that it does not model or its remarks."""
+        """True if the plan has a note of this kind: a limit, an effect that it does not model, or a remark."""
         return any(note.kind is kind for note in (*self.limits, *self.unmodelled, *self.remarks))
 
     def summary(self) -> dict[str, object]:
