@@ -1,4 +1,4 @@
-"""Make the pictures of docs/gallery/ and their overview by running the examples: ``python tools/gallery.py [NAME...]``."""
+"""Make the pictures of docs/gallery/ and their overview from the examples: ``python tools/gallery.py [NAME...]``."""
 
 from __future__ import annotations
 
