@@ -1,12 +1,12 @@
-"""Makes the pictures of docs/gallery/ by running the examples: ``python tools/gallery.py [NAME ...]``."""
+"""Make the pictures of docs/gallery/ and their overview from the examples: ``python tools/gallery.py [NAME...]``."""
 
 from __future__ import annotations
 
 import os
 import runpy
-import sys
 from pathlib import Path
 
+import click
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -17,7 +17,9 @@ OVERVIEW = ("wine", "jade", "soap", "bears", "amber", "candle")
 TILE = (320, 240)
 
 
-def main(names: list[str]) -> None:
+@click.command(help=__doc__)
+@click.argument("names", nargs=-1, type=click.Choice((*OVERVIEW, "bubble")))
+def main(names: tuple[str, ...]) -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     os.chdir(FOLDER)
     for name in names or OVERVIEW:
@@ -36,4 +38,4 @@ def write_overview() -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -96,6 +96,14 @@ def test_explain_says_how_light_scattered_many_times_is_shown(run: Run, cube: Pa
     assert strict_json(run(*milk).out)["plan"] == told["diffusion"]
 
 
+def test_explain_says_what_is_black(run: Run) -> None:
+    plan = strict_json(run("explain", "wine", "--preset", "merlot", "--json").out)["plan"]
+    (remark,) = plan["remarks"]
+    assert remark.startswith("'wine.ply': black: 1.6e-03 of white light passes 42.1 mm, the mean thickness")
+    assert f"  remark: {remark}\n" in run("explain", "wine", "--preset", "merlot").out
+    assert "remark" not in run("explain", "bear", "--preset", "merlot").out
+
+
 def test_what_a_scene_leaves_out_is_a_warning_line(run: Run, tmp_path: Path) -> None:
     coated = GLASS | {"KHR_materials_clearcoat": {"clearcoatTexture": {"index": 0}}}
     model = write_scene(tmp_path / "scene.glb", {"extensions": coated, "name": "Glass"})

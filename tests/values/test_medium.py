@@ -37,6 +37,22 @@ def test_color_distance_and_extinction_agree(color: tuple[float, ...], distance:
     assert medium.transmittance(factor * distance) == pytest.approx(expected, rel=1e-14 * max(1.0, depth.max()), abs=0)
 
 
+@pytest.mark.parametrize(
+    ("distance", "told"),
+    [
+        (-1, "what passes -1 m; below 0; give lengths of ways through the medium, 0 and above"),
+        ([0.0, -0.5, np.nan, -2.0], "what passes -0.5 m; below 0 at 2 of 4 places; give"),
+        (-np.inf, "what passes -inf m; below 0;"),
+    ],
+)
+def test_no_way_is_shorter_than_nothing(distance: Any, told: str) -> None:
+    medium = Medium(absorption=(1, 2, 3))
+    for of in (medium.transmittance, lambda some: tl.color_at_distance(medium.extinction, some)):
+        with pytest.raises(tl.InputError, match=re.escape(told)):
+            of(distance)
+        assert of(-0.0).tolist() == [1.0, 1.0, 1.0]
+
+
 @pytest.mark.parametrize("shape", [(), (4,), (2, 3), (0,)])
 def test_transmittance_adds_a_channel_axis(shape: tuple[int, ...]) -> None:
     assert Medium(absorption=(1, 2, 3)).transmittance(np.ones(shape)).shape == (*shape, 3)

@@ -246,7 +246,18 @@ def test_a_backdrop_keeps_to_what_the_machine_can_do() -> None:
 def test_a_plan_goes_into_json(objects: list[tl.Object], method: Any) -> None:
     found = plan(scene(*objects), method)
     told = json.loads(json.dumps(found.summary()))
-    keys = ["caustics", "cost", "exact", "given_back", "interfaces", "limits", "method", "passes", "unmodelled"]
+    keys = [
+        "caustics",
+        "cost",
+        "exact",
+        "given_back",
+        "interfaces",
+        "limits",
+        "method",
+        "passes",
+        "remarks",
+        "unmodelled",
+    ]
     assert sorted(told) == keys
     assert (told["method"], told["exact"], told["cost"]) == (str(found.method), found.exact, round(found.cost, 2))
     assert (told["limits"], told["unmodelled"]) == (list(found.limits), list(found.unmodelled))

@@ -47,8 +47,10 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
     seen = frame.coverage & frame.valid
     if not seen.any():
         return
+    from translucent.planning.darkness import given_back
+
     passed = float(frame.transmittance[seen].mean())
-    if passed >= NEARLY_BLACK or any(_given_back(scene, medium) >= HARDLY_LIT for medium in _media(scene)):
+    if passed >= NEARLY_BLACK or any(given_back(scene, medium) >= HARDLY_LIT for medium in _media(scene)):
         return
     depth = frame.optical_depth[seen].astype(np.float64)
     low, high = (
@@ -108,16 +110,6 @@ def _media(scene: Scene) -> list[Medium]:
     return [
         body.medium for body in scene.bodies if body.medium is not None and body.has_interface and body.medium.scatters
     ]
-
-
-def _given_back(scene: Scene, medium: Medium) -> float:
-    """Luminance of white light scattered back by a body as large as the scene."""
-    from translucent.formulas.color import luminance
-    from translucent.formulas.two_stream import two_stream_absorption, two_stream_reflectance, two_stream_scattering
-
-    absorbed = two_stream_absorption(medium.absorption) * scene.diagonal
-    turned = two_stream_scattering(medium.scattering, medium.anisotropy) * scene.diagonal
-    return float(luminance(two_stream_reflectance(absorbed, turned)))
 
 
 def _extent(size: np.ndarray) -> str:

@@ -92,9 +92,33 @@ def clamp_colors(colors: npt.ArrayLike) -> tuple[Array, npt.NDArray[np.bool_]]:
 
 
 def color_at_distance(extinction: npt.ArrayLike, distances: npt.ArrayLike) -> Array:
-    """(..., 3): linear color left of white light after `distances` (...,) metres: exp(-sigma_t d)."""
+    """(..., 3): linear color left of white light after `distances` (...,) metres, >= 0: exp(-sigma_t d).
+
+    Raises
+    ------
+    InputError
+        If a distance is below 0.
+    """
     with np.errstate(under="ignore"):
-        return optics.transmittance(_triples(extinction) * np.asarray(distances, dtype=np.float64)[..., None])
+        return optics.transmittance(_triples(extinction) * lengths(distances)[..., None])
+
+
+def lengths(metres: npt.ArrayLike) -> Array:
+    """Lengths of ways through a medium in metres, as they are: more light than white would be left of a negative one.
+
+    Raises
+    ------
+    InputError
+        If one is below 0.
+    """
+    found = np.asarray(metres, dtype=np.float64)
+    if (below := found < 0).any():
+        raise InputError(
+            f"what passes {float(found[below].flat[0]):g} m",
+            f"below 0{'' if found.ndim == 0 else f' at {int(below.sum())} of {found.size} places'}",
+            "give lengths of ways through the medium, 0 and above",
+        )
+    return found
 
 
 def condition_number(colors: npt.ArrayLike) -> Array:

@@ -165,9 +165,15 @@ class Medium(Frozen):
         return total
 
     def transmittance(self, distance: npt.ArrayLike) -> Array:
-        """(..., 3): share of light per channel that passes `distance` (...,) metres of the medium."""
+        """(..., 3): share of light per channel that passes `distance` (...,) metres of the medium, 0 and above.
+
+        Raises
+        ------
+        InputError
+            If a distance is below 0.
+        """
         with np.errstate(under="ignore", invalid="ignore", over="ignore"):
-            optical_depth = np.asarray(distance, dtype=np.float64)[..., None] * self.extinction
+            optical_depth = conversion.lengths(distance)[..., None] * self.extinction
         # Without extinction even an infinite way, 0 times infinity, loses nothing.
         return optics.transmittance(np.where(self.extinction == 0, 0.0, optical_depth))
 

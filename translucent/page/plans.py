@@ -71,7 +71,7 @@ class PagePlan:
     @property
     def notes(self) -> tuple[Note, ...]:
         """Notes on what the page does not show, or not exactly."""
-        return (*self.own_notes, *self.plan.limits, *self.plan.unmodelled)
+        return (*self.own_notes, *self.plan.limits, *self.plan.unmodelled, *self.plan.remarks)
 
     @property
     def own_notes(self) -> tuple[Note, ...]:

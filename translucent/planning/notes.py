@@ -49,6 +49,9 @@ class NoteKind(StrEnum):
     INVISIBLE = "invisible"
     UNUSED_PRIORITIES = "unused priorities"
 
+    # What is right and shows nothing.
+    BLACK = "black"
+
     # What a page in a browser does with a scene.
     MANY_TRIANGLES = "many triangles"
 

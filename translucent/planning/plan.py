@@ -11,6 +11,7 @@ from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
 from translucent.planning.caustic_plan import with_caustics
 from translucent.planning.caustics import Caustics, check_caustics
+from translucent.planning.darkness import black_bodies
 from translucent.planning.effects import shadow_effects, unmodelled_effects, with_ambient_told, with_given_back_told
 from translucent.planning.interface_choice import USUAL_DEPTH, check_interfaces, chosen_interfaces, with_fallback_told
 from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
@@ -76,6 +77,8 @@ def plan(
     check_shadows(shadows)
     diagnose_together(body.mesh for body in scene.bodies if body.sheet_thickness is None)
     chosen = _plan(scene, method, capabilities, interfaces, scattering, caustics)
+    if remarks := black_bodies(scene):
+        chosen = dataclasses.replace(chosen, remarks=remarks)
     if caustics is not None:
         chosen = with_caustics(chosen, scene, caustics, method, capabilities or Capabilities())
     if chosen.traced:

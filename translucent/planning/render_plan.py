@@ -52,6 +52,8 @@ class RenderPlan:
         Where thickness, transmittance or emission are not exact, and why; empty for an exact plan.
     unmodelled : tuple of Note
         What the scene asks for and no pass renders.
+    remarks : tuple of Note
+        What is rendered right, and a picture hardly shows: bodies that are black.
     interfaces : Interfaces, optional
         How interfaces are found; None where none changes light, or none is rendered.
     given_back : GivenBack
@@ -75,6 +77,7 @@ class RenderPlan:
     spectral: bool = False
     limits: tuple[Note, ...] = ()
     unmodelled: tuple[Note, ...] = ()
+    remarks: tuple[Note, ...] = ()
     interfaces: Interfaces | None = None
     given_back: GivenBack = NOTHING_GIVEN_BACK
     traced: bool = False
@@ -119,8 +122,8 @@ class RenderPlan:
         return any(step.name in names for step in self.passes)
 
     def says(self, kind: NoteKind) -> bool:
-        """True if the plan has a note of this kind among its limits or the effects that it does not model."""
-        return any(note.kind is kind for note in (*self.limits, *self.unmodelled))
+        """True if the plan has a note of this kind: a limit, an effect that it does not model, or a remark."""
+        return any(note.kind is kind for note in (*self.limits, *self.unmodelled, *self.remarks))
 
     def summary(self) -> dict[str, object]:
         """Plan as values that JSON can hold."""
@@ -142,6 +145,7 @@ class RenderPlan:
             ],
             "limits": [str(note) for note in self.limits],
             "unmodelled": [str(note) for note in self.unmodelled],
+            "remarks": [str(note) for note in self.remarks],
         }
 
     def __str__(self) -> str:
@@ -152,4 +156,5 @@ class RenderPlan:
             lines.append(f"  light scattered many times {self.given_back}")
         lines += [f"  limit: {limit}" for limit in self.limits]
         lines += [f"  not modelled: {effect}" for effect in self.unmodelled]
+        lines += [f"  remark: {remark}" for remark in self.remarks]
         return "\n".join(lines)

@@ -57,6 +57,8 @@ def _plan(plan: RenderPlan, timing: Timing) -> None:
         wrapped(f"limit: {limit}", WARNING)
     for effect in plan.unmodelled:
         wrapped(f"not modelled: {effect}", WARNING)
+    for remark in plan.remarks:
+        wrapped(f"remark: {remark}", WARNING)
 
 
 def _errors(desk: Desk) -> None:
