@@ -24,7 +24,6 @@ void main() {
     vec3 way = reflected_direction(direction, facet);
     if (dot(way, normal) <= 0.0) { return; }
     vec3 origin = point + MIRROR_MARGIN * surface_reach * normal;
-    if (nearest_hit(origin, way, 0.0, NOTHING, uvec4(0u)).object < 0) { return; }
     float blur = blurred_share * alpha * alpha;
     Seen nothing;
     nothing.object = AIR;
