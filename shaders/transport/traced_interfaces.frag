@@ -1,7 +1,7 @@
 // Rays that meet the interfaces of bodies, followed through the mesh: a tree of exact reflections and refractions. The
 // stronger branch is always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked
 // up in the environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
-// interface is that which the rasterizer has found. ADAPTIVE: of several samples of a pixel, those that are worth it; with
+// interface is that which the rasterizer has found. adaptive: of several samples of a pixel, those that are worth it; with
 // the square of their luminance in place of the transmittance. ROUGH: some body is. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
 
 #include <constants>
@@ -29,6 +29,9 @@
 #include "transport/footprint.glsl"
 #endif
 #include "transport/opaque_objects.glsl"
+
+uniform bool adaptive;
+
 #include "transport/branch_ends.glsl"
 #include "transport/sampled_facets.glsl"
 
@@ -477,8 +480,8 @@ void main() {
 #endif
     out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);
     out_transmittance.a = 1.0 - min(sum.lost, 1.0);
-#if ADAPTIVE
-    float level = min(luminance(out_radiance.rgb), 1e15);
-    out_transmittance.rgb = vec3(level * level, 0.0, 0.0);
-#endif
+    if (adaptive) {
+        float level = min(luminance(out_radiance.rgb), 1e15);
+        out_transmittance.rgb = vec3(level * level, 0.0, 0.0);
+    }
 }

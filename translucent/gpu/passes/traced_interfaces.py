@@ -83,7 +83,7 @@ class TracedInterfacesPass:
         gl.blend_func = moderngl.ONE, moderngl.ONE
         record = record_at_eye(job)
         gl.enable_only(blending)
-        mirror = mirror_of(job.scene) if job.features.has_opaque and not job.bending else None
+        mirror = mirror_of(job.scene) if job.features.has_opaque else None
         if not any(record):
             if job.bending:
                 self._mark_unsettled(job, framebuffer)
@@ -104,6 +104,7 @@ class TracedInterfacesPass:
         depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
         values = {
             "mirrored": False,
+            "adaptive": job.bending,
             "faintest_share": faintest_share(forks),
             "most_interfaces": depth,
             "all_closed": all_closed(job.scene),
@@ -122,7 +123,7 @@ class TracedInterfacesPass:
             gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         if job.bending or not job.bent_apart:
             self._variants.draw_covered(job, program, framebuffer, top_first=True)
-        if mirror is not None:
+        if mirror is not None and not job.bending:
             self._draw_mirrored(job, mirror, framebuffer, program)
         gl.enable_only(blending)
         for table in tables:
@@ -179,7 +180,6 @@ class TracedInterfacesPass:
             MICROFACETS=mirror or rough,
             ROUGH=rough,
             MIRROR=mirror,
-            ADAPTIVE=job.bending,
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
