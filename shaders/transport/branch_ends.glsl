@@ -53,7 +53,7 @@ bool opaque_shown(Glimpse end, out vec3 light) {
     }
 #endif
     vec4 found = texelFetch(opaque_radiance, texel, 0);
-    light = adaptive ? found.rgb / max(found.a, 1e-3) : found.rgb;  // the mean of samples some of which may pass it
+    light = adaptive == 1 ? found.rgb / max(found.a, 1e-3) : found.rgb;  // the mean of samples some of which may pass it
     return true;
 }
 #endif

@@ -2,7 +2,7 @@
 // the picture: the light along one ray, reflected at a microfacet of the coat, takes the place of that of the environment, which
 // the ground is shaded with. It is the program of the first interfaces, so that there is one to compile.
 
-uniform bool mirrored;       // these rays, and not those of the first interfaces
+uniform int mirrored;        // 1: these rays, and not those of the first interfaces
 uniform vec4 mirror_plane;   // of the ground: unit normal upwards, and metres along it from the center of the media
 uniform vec2 mirror_finish;  // roughness and ior of its coat
 

@@ -30,7 +30,7 @@
 #endif
 #include "transport/opaque_objects.glsl"
 
-uniform bool adaptive;
+uniform int adaptive;              // 1: with the square of luminance, and opaque objects as the mean of all samples shows them
 
 #include "transport/branch_ends.glsl"
 #include "transport/sampled_facets.glsl"
@@ -383,7 +383,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
 #if MIRROR
 #include "transport/mirrored_ground.glsl"
 #else
-const bool mirrored = false;
+const int mirrored = 0;
 #endif
 
 // The first ray of a pixel, which starts a little before what the rasterizer has found, and how far it looks for that.
@@ -436,7 +436,7 @@ void main() {
     vec4 surface = vec4(0.0);
 #if MIRROR
     vec3 mirrored_share;
-    if (mirrored) {
+    if (mirrored == 1) {
         out_radiance = out_transmittance = vec4(0.0);
         if (front.w < NOTHING || !begin_in_mirror(pixel, texel, direction, ray, seen, mirrored_share)) { return; }
     } else
@@ -450,7 +450,7 @@ void main() {
     }
     Sum sum = follow(ray, seen, reach, 1);
 #if MIRROR
-    if (mirrored) {
+    if (mirrored == 1) {
         vec3 without = environment_seen(ray.origin, ray.direction, true, ray.blur);
         out_radiance = vec4(mirrored_share * through * (min(sum.light, vec3(NOTHING)) - without), 0.0);
         return;
@@ -480,7 +480,7 @@ void main() {
 #endif
     out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);
     out_transmittance.a = 1.0 - min(sum.lost, 1.0);
-    if (adaptive) {
+    if (adaptive == 1) {
         float level = min(luminance(out_radiance.rgb), 1e15);
         out_transmittance.rgb = vec3(level * level, 0.0, 0.0);
     }

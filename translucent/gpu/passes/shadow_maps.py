@@ -279,7 +279,7 @@ def _read(job: FrameJob, views: ShadowViews | None, first: int, step: int) -> li
     """Maps that a frame reads: those of lights, and of directions whose light may fall on what is seen."""
     if views is None:
         return []
-    side = None if job.features.shadows_backdrop else lit_side(job.scene)
+    side = None if job.any_eye or job.features.shadows_backdrop else lit_side(job.scene)
     sky = [view for view in views.sky[first::step] if side is None or view.camera.forward @ side < _GRAZING]
     return [*itertools.chain(*views.lights), *sky]
 

@@ -103,8 +103,8 @@ class TracedInterfacesPass:
         program = self._program(job, mirror=mirror is not None)
         depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
         values = {
-            "mirrored": False,
-            "adaptive": job.bending,
+            "mirrored": 0,
+            "adaptive": int(job.bending),
             "faintest_share": faintest_share(forks),
             "most_interfaces": depth,
             "all_closed": all_closed(job.scene),
@@ -146,7 +146,7 @@ class TracedInterfacesPass:
         assert surface is not None
         height = mirror.height - float(mirror.normal @ media_center(job.scene))
         finish = surface.roughness, surface.ior
-        _set(program, {"mirrored": True, "mirror_plane": (*mirror.normal, height), "mirror_finish": finish})
+        _set(program, {"mirrored": 1, "mirror_plane": (*mirror.normal, height), "mirror_finish": finish})
         twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
         width, rows = job.targets.size
         boxes, radii = np.array([twin.bounds for twin in twins]), np.array([twin.radius for twin in twins])
@@ -159,7 +159,7 @@ class TracedInterfacesPass:
         # The state of the first interfaces, and depths that let all pass.
         job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         framebuffer.color_mask = ((False,) * 4,) * 2
-        framebuffer.clear(viewport=part.scissor)
+        framebuffer.clear()
         framebuffer.color_mask = ((True,) * 4,) * 2
         self._variants.draw_part(part, program, framebuffer)
 
