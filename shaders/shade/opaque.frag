@@ -4,7 +4,11 @@
 
 #include <constants>
 #include <View>
+#if DEPTH_ONLY && !SURFACE
+#include "geometry/of_body.glsl"
+#else
 #include <Body>
+#endif
 #include <Environment>
 #include <Lights>
 #include "lib/environment.glsl"
@@ -51,9 +55,9 @@ void main() {
     OpaqueFinish finish = opaque_finish_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
     if (finish.is_hole || (opaque_passed.w == 0.0 && !gl_FrontFacing)) { discard; }
 #endif
-    if (axial < axial_start) { discard; }  // behind an orthographic picture
     opaque_axial_depth = axial * axial_depth_scale + axial_depth_start;
 #if !PROJECTED_DEPTH
+    if (axial < axial_start) { discard; }  // behind an orthographic picture
     gl_FragDepth = clamp((opaque_axial_depth - opaque_range.x) * opaque_range.y, 0.0, 1.0);
 #endif
 #if !DEPTH_ONLY

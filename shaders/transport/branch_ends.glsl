@@ -53,11 +53,7 @@ bool opaque_shown(Glimpse end, out vec3 light) {
     }
 #endif
     vec4 found = texelFetch(opaque_radiance, texel, 0);
-#if ADAPTIVE
-    light = found.rgb / max(found.a, 1e-3);  // the mean of samples some of which may pass it
-#else
-    light = found.rgb;
-#endif
+    light = adaptive == 1 ? found.rgb / max(found.a, 1e-3) : found.rgb;  // the mean of samples some of which may pass it
     return true;
 }
 #endif

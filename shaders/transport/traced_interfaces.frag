@@ -1,7 +1,7 @@
 // Rays that meet the interfaces of bodies, followed through the mesh: a tree of exact reflections and refractions. The
 // stronger branch is always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked
 // up in the environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
-// interface is that which the rasterizer has found. ADAPTIVE: of several samples of a pixel, those that are worth it; with
+// interface is that which the rasterizer has found. adaptive: of several samples of a pixel, those that are worth it; with
 // the square of their luminance in place of the transmittance. ROUGH: some body is. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
 
 #include <constants>
@@ -29,6 +29,9 @@
 #include "transport/footprint.glsl"
 #endif
 #include "transport/opaque_objects.glsl"
+
+uniform int adaptive;              // 1: with the square of luminance, and opaque objects as the mean of all samples shows them
+
 #include "transport/branch_ends.glsl"
 #include "transport/sampled_facets.glsl"
 
@@ -380,6 +383,38 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
 #if MIRROR
 #include "transport/mirrored_ground.glsl"
 #else
+const int mirrored = 0;
+#endif
+
+// The first ray of a pixel, which starts a little before what the rasterizer has found, and how far it looks for that.
+void begin(vec2 pixel, vec3 direction, vec4 front, vec4 surface, vec4 tint, bool starts_inside, out Ray ray, out Seen seen, out float reach) {
+    Finish finish = finish_of(surface);
+    finish.color = tint.rgb;
+    finish.unoccluded = tint.a;
+    seen = Seen(front.w < NOTHING ? int(surface.x + 0.5) : AIR, point_at(pixel, front.w), front.xyz, finish);
+    vec3 eye = point_at(pixel, surface_eye_axial_depth);
+    float margin = min(1e-3 * surface_reach, distance(seen.point, eye));
+    ray = Ray(seen.point - margin * direction, 0.0, direction, vec3(1.0), uvec4(0u), 0, FORKS, false, 0.0, 0, -direction
+#if FOOTPRINTS
+        , footprint_of(pixel, front.w)
+#endif
+    );
+    reach = margin + 1e-3 * surface_reach;
+#if FROM_EYE
+    // Something may lie before the first interface.
+    ray.origin = point_at(pixel, 0.0);
+#if FOOTPRINTS
+    ray.footprint = footprint_of(pixel, starts_inside ? surface_eye_axial_depth : 0.0);
+#endif
+    if (starts_inside) {
+        ray.skipped = 2.0 * SURFACE_OFFSET * surface_reach;
+        ray.origin = eye + ray.skipped * direction;
+        ray.record = record_at_eye(eye, direction, ray.skipped);
+    }
+    reach = NOTHING;
+#endif
+}
+
 void main() {
     read_bodies();
     vec2 pixel = gl_FragCoord.xy + frame_size.zw;
@@ -395,38 +430,32 @@ void main() {
 #else
     const bool starts_inside = false;
 #endif
-    if (front.w >= NOTHING && !starts_inside) {
+    Ray ray;
+    Seen seen;
+    float reach = NOTHING;
+    vec4 surface = vec4(0.0);
+#if MIRROR
+    vec3 mirrored_share;
+    if (mirrored == 1) {
+        out_radiance = out_transmittance = vec4(0.0);
+        if (front.w < NOTHING || !begin_in_mirror(pixel, texel, direction, ray, seen, mirrored_share)) { return; }
+    } else
+#endif
+    if (front.w < NOTHING || starts_inside) {
+        surface = texelFetch(surface_finish, texel, 0);
+        begin(pixel, direction, front, surface, texelFetch(surface_color, texel, 0), starts_inside, ray, seen, reach);
+    } else {
         out_radiance = vec4(background(pixel, direction, texel) * through + emitted, 1.0);
         return;
     }
-    vec4 surface = texelFetch(surface_finish, texel, 0);
-    vec4 tint = texelFetch(surface_color, texel, 0);
-    Finish finish = finish_of(surface);
-    finish.color = tint.rgb;
-    finish.unoccluded = tint.a;
-    Seen seen = Seen(front.w < NOTHING ? int(surface.x + 0.5) : AIR, point_at(pixel, front.w), front.xyz, finish);
-    vec3 eye = point_at(pixel, surface_eye_axial_depth);
-    float margin = min(1e-3 * surface_reach, distance(seen.point, eye));
-    Ray ray = Ray(seen.point - margin * direction, 0.0, direction, vec3(1.0), uvec4(0u), 0, FORKS, false, 0.0, 0, -direction
-#if FOOTPRINTS
-        , footprint_of(pixel, front.w)
-#endif
-    );
-    float reach = margin + 1e-3 * surface_reach;
-#if FROM_EYE
-    // Something may lie before the first interface.
-    ray.origin = point_at(pixel, 0.0);
-#if FOOTPRINTS
-    ray.footprint = footprint_of(pixel, starts_inside ? surface_eye_axial_depth : 0.0);
-#endif
-    if (starts_inside) {
-        ray.skipped = 2.0 * SURFACE_OFFSET * surface_reach;
-        ray.origin = eye + ray.skipped * direction;
-        ray.record = record_at_eye(eye, direction, ray.skipped);
-    }
-    reach = NOTHING;
-#endif
     Sum sum = follow(ray, seen, reach, 1);
+#if MIRROR
+    if (mirrored == 1) {
+        vec3 without = environment_seen(ray.origin, ray.direction, true, ray.blur);
+        out_radiance = vec4(mirrored_share * through * (min(sum.light, vec3(NOTHING)) - without), 0.0);
+        return;
+    }
+#endif
 #if DISPERSION
     Sum red = follow(ray, seen, reach, 0);
     Sum blue = follow(ray, seen, reach, 2);
@@ -437,12 +466,12 @@ void main() {
     vec3 share = vec3(1.0);
     if (front.w < NOTHING && !starts_inside) {
         float cosine = clamp(-dot(front.xyz, direction), 0.0, 1.0);
-        share = vec3(1.0 - interface_reflectance(cosine, finish.ior, finish.roughness)) * finish.transmission * finish.color;
-        vec3 glints = highlights(seen.point, front.xyz, direction, finish, highlight_alpha(finish.roughness, surface.w));
+        share = vec3(1.0 - interface_reflectance(cosine, seen.finish.ior, seen.finish.roughness)) * seen.finish.transmission * seen.finish.color;
+        vec3 glints = highlights(seen.point, front.xyz, direction, seen.finish, highlight_alpha(seen.finish.roughness, surface.w));
 #if CLEAR_COAT
-        float below = 1.0 - coated_share(finish.clearcoat, cosine);
+        float below = 1.0 - coated_share(seen.finish.clearcoat, cosine);
         share *= below;
-        glints = below * glints + coat_highlights(seen.point, front.xyz, direction, finish, surface.w);
+        glints = below * glints + coat_highlights(seen.point, front.xyz, direction, seen.finish, surface.w);
 #endif
         light += glints;
     }
@@ -451,9 +480,8 @@ void main() {
 #endif
     out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);
     out_transmittance.a = 1.0 - min(sum.lost, 1.0);
-#if ADAPTIVE
-    float level = min(luminance(out_radiance.rgb), 1e15);
-    out_transmittance.rgb = vec3(level * level, 0.0, 0.0);
-#endif
+    if (adaptive == 1) {
+        float level = min(luminance(out_radiance.rgb), 1e15);
+        out_transmittance.rgb = vec3(level * level, 0.0, 0.0);
+    }
 }
-#endif

@@ -17,6 +17,7 @@ from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.light_cameras import outermost
 from translucent.gpu.shadow_atlas import LEAST_TEXELS, MOST_BYTES, ShadowViews
 from translucent.gpu.shadow_cameras import ShadowThrowers
+from translucent.planning.mirrors import lit_side
 
 SIZE = (96, 72)
 DARK = tl.Environment.constant((0, 0, 0))
@@ -231,6 +232,49 @@ def test_samples_of_a_pixel_together_look_at_each_direction_once(renderer: tl.Re
     one, four, many = (renderer.render(shown, (8, 8), samples=n).radiance.mean() for n in (1, 4, 32))
     assert one < 0.98 * renderer.render(replace(shown, environment_shadows=0), (8, 8)).radiance.mean()
     np.testing.assert_allclose((four, many), one, rtol=5e-3)
+
+
+CATCHER = replace(ground(), shadow_catcher=True)
+BELOW = tl.Camera.look_at((0, -4.5, 7), (0, -0.7, 0), fov_y=30)
+
+
+def test_directions_below_a_ground_have_maps_where_its_lower_side_is_seen(renderer: tl.Renderer) -> None:
+    """And without them the picture from above is the same to the last bit."""
+    environment = tl.Environment.gradient((0.2, 0.2, 0.2), (1, 1, 1.2))
+    above = tl.Scene([tl.Object(BALL, WINE), CATCHER], CAMERA, [], environment, environment_shadows=16)
+    frame = renderer.render(above, SIZE)
+    atlas = renderer.gpu.shadows
+    assert atlas.views is not None
+    sky = set(atlas.views.sky)
+    assert atlas.drawn == {view for view in sky if view.camera.forward[1] < 0}
+    assert 0 < len(atlas.drawn) < 16
+    below = renderer.render(replace(above, camera=BELOW), SIZE)
+    assert atlas.drawn == sky  # those that were there are kept
+    np.testing.assert_array_equal(renderer.render(above, SIZE).radiance, frame.radiance)
+    # Seen from below the ball is behind the ground, and takes next to nothing of its light.
+    truth = tl.reference.render(replace(above, camera=BELOW), SIZE)
+    assert np.median(relative(below, truth)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        pytest.param({"camera": BELOW}, id="seen from below"),
+        pytest.param({"objects": [moved(BALL, (0, -0.5, 0), WINE), CATCHER]}, id="sunk"),
+        pytest.param({"objects": [tl.Object(BALL, WINE), STONE, CATCHER]}, id="not alone"),
+        pytest.param({"objects": [tl.Object(BALL, WINE), ground()]}, id="no ground"),
+        pytest.param(
+            {"objects": [tl.Object(BALL, WINE), replace(CATCHER, surface=tl.Surface(diffuse_transmission=0.5))]},
+            id="thin",
+        ),
+    ],
+)
+def test_grounds_lit_from_both_sides(changed: dict[str, Any]) -> None:
+    shown = tl.Scene([tl.Object(BALL, WINE), CATCHER], CAMERA, [], DARK)
+    side = lit_side(shown)
+    assert side is not None
+    np.testing.assert_allclose(side, (0, 1, 0), atol=1e-12)
+    assert lit_side(replace(shown, **changed)) is None
 
 
 def test_32_directions_are_within_a_few_percent_of_256(renderer: tl.Renderer) -> None:

@@ -90,6 +90,8 @@ class FrameJob(SceneView):
         Rays are traced from interfaces apart from what else a sample shows.
     bending : bool
         Of a sample, that alone is drawn now.
+    any_eye : bool
+        What is drawn is to fit all cameras.
     projected_depth : bool
         The accumulator has a depth buffer of opaque surfaces, against which passes can test.
     covered : Part
@@ -98,7 +100,7 @@ class FrameJob(SceneView):
     """
 
     corner: tuple[int, int] = (0, 0)
-    for_map = path_only = two_media = projected_depth = bent_apart = bending = False
+    for_map = path_only = two_media = projected_depth = bent_apart = bending = any_eye = False
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
 
     def __init__(

@@ -35,6 +35,7 @@ from translucent.gpu.uniforms import media_center
 from translucent.media.medium import Medium
 from translucent.planning.caustic_plan import darkened
 from translucent.planning.methods import Method
+from translucent.planning.mirrors import lit_side
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.paths import straight_scene
 from translucent.planning.plan import plan
@@ -50,6 +51,9 @@ _FEW_SHARES = 16
 #: Largest ratio of distances from a lamp that a projected depth buffer resolves: its step at the far end is
 #: 2^-24 far^2 / near, so at most 1e-6 of the distance.
 _FARTHEST = 16.0
+
+#: Sine of the angle below a ground up to which light may fall on it, by rounding.
+_GRAZING = 1e-4
 
 _BLACK = Environment.constant((0.0, 0.0, 0.0))
 
@@ -145,7 +149,7 @@ class ShadowMapsPass:
             seen, first, step, few = replace(seen, step=step), 0, 1, False  # no more than these
         elif atlas.held is not None and atlas.held.step > 1:
             atlas.held = None
-        if atlas.held is None or not atlas.drawn.issuperset(self._read(atlas.views, first, step)):
+        if atlas.held is None or not atlas.drawn.issuperset(_read(job, atlas.views, first, step)):
             self._render(job, seen, first, step)
         assert atlas.views is not None
         center = media_center(scene)
@@ -179,7 +183,7 @@ class ShadowMapsPass:
         assert atlas.views is not None
         center = media_center(scene)
         used = {everything[0]}
-        for view in self._read(atlas.views, first, step):
+        for view in _read(job, atlas.views, first, step):
             if view in atlas.drawn:
                 continue
             if job.plan.shadows.directions is None:
@@ -206,10 +210,6 @@ class ShadowMapsPass:
         for size in self._targets.keys() - {view.size for view in atlas.views}:
             self._targets.pop(size).release()
         job.uniforms.bind()
-
-    def _read(self, views: ShadowViews | None, first: int, step: int) -> list[ShadowView]:
-        """Maps that a frame reads."""
-        return [] if views is None else [*itertools.chain(*views.lights), *views.sky[first::step]]
 
     def _views(self, job: FrameJob, seen: Seen, opaque: tuple[int, ...], *, in_place: bool) -> ShadowViews:
         """Places of all maps; where they are stays the same when only media change."""
@@ -273,6 +273,15 @@ class ShadowMapsPass:
         if name not in self._made:
             self._made[name] = _STEPS[name](self._gl).run
         return self._made[name]
+
+
+def _read(job: FrameJob, views: ShadowViews | None, first: int, step: int) -> list[ShadowView]:
+    """Maps that a frame reads: those of lights, and of directions whose light may fall on what is seen."""
+    if views is None:
+        return []
+    side = None if job.any_eye or job.features.shadows_backdrop else lit_side(job.scene)
+    sky = [view for view in views.sky[first::step] if side is None or view.camera.forward @ side < _GRAZING]
+    return [*itertools.chain(*views.lights), *sky]
 
 
 def _resolves(scene: Scene) -> bool:

@@ -83,7 +83,7 @@ class TracedInterfacesPass:
         gl.blend_func = moderngl.ONE, moderngl.ONE
         record = record_at_eye(job)
         gl.enable_only(blending)
-        mirror = mirror_of(job.scene) if job.features.has_opaque and not job.bending else None
+        mirror = mirror_of(job.scene) if job.features.has_opaque else None
         if not any(record):
             if job.bending:
                 self._mark_unsettled(job, framebuffer)
@@ -100,9 +100,11 @@ class TracedInterfacesPass:
         if diffused is not None:
             diffused.texture.use(_UNITS["diffused_light"])
         job.resources.shadows.use(_UNITS)
-        program = self._program(job)
+        program = self._program(job, mirror=mirror is not None)
         depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
         values = {
+            "mirrored": 0,
+            "adaptive": int(job.bending),
             "faintest_share": faintest_share(forks),
             "most_interfaces": depth,
             "all_closed": all_closed(job.scene),
@@ -116,10 +118,13 @@ class TracedInterfacesPass:
             **_footprint(job),
         }
         _set(program, values)
+        if mirror is not None and not any(record):
+            # What is drawn next finds zeros. Software rasterizers compile a program again for every other state.
+            gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         if job.bending or not job.bent_apart:
             self._variants.draw_covered(job, program, framebuffer, top_first=True)
-        if mirror is not None:
-            self._draw_mirrored(job, mirror, framebuffer, values)
+        if mirror is not None and not job.bending:
+            self._draw_mirrored(job, mirror, framebuffer, program)
         gl.enable_only(blending)
         for table in tables:
             table.release()
@@ -134,26 +139,31 @@ class TracedInterfacesPass:
         job.gl.depth_func = "<"
 
     def _draw_mirrored(
-        self, job: FrameJob, mirror: Mirror, framebuffer: moderngl.Framebuffer, values: dict[str, Any]
+        self, job: FrameJob, mirror: Mirror, framebuffer: moderngl.Framebuffer, program: moderngl.Program
     ) -> None:
         """Add what bodies change in the mirror image of the ground."""
         surface = mirror.ground.surface
         assert surface is not None
-        program = self._program(job, mirror=True)
         height = mirror.height - float(mirror.normal @ media_center(job.scene))
         finish = surface.roughness, surface.ior
-        _set(program, {**values, "mirror_plane": (*mirror.normal, height), "mirror_finish": finish})
+        _set(program, {"mirrored": 1, "mirror_plane": (*mirror.normal, height), "mirror_finish": finish})
         twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
         width, rows = job.targets.size
         boxes, radii = np.array([twin.bounds for twin in twins]), np.array([twin.radius for twin in twins])
         edges = extents(boxes, radii, job.scene.camera, (width, rows))
         seen = edges[:, 2] > edges[:, 0]
         edges[seen] += MIRROR_ROOM * rows * np.array([-1.0, -1.0, 1.0, 1.0])
-        job.gl.enable_only(moderngl.BLEND)
-        job.gl.blend_func = moderngl.ONE, moderngl.ONE
-        self._variants.draw_part(part_of(edges, (0.0, 0.0), (width, rows)).flipped(rows), program, framebuffer)
+        part = part_of(edges, (0.0, 0.0), (width, rows)).flipped(rows)
+        if not part:
+            return
+        # The state of the first interfaces, and depths that let all pass.
+        job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
+        framebuffer.color_mask = ((False,) * 4,) * 2
+        framebuffer.clear()
+        framebuffer.color_mask = ((True,) * 4,) * 2
+        self._variants.draw_part(part, program, framebuffer)
 
-    def _program(self, job: FrameJob, *, mirror: bool = False) -> moderngl.Program:
+    def _program(self, job: FrameJob, *, mirror: bool) -> moderngl.Program:
         scene, environment = job.scene, job.scene.environment
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         seen_map = environment.seen.kind == "image"
@@ -170,7 +180,6 @@ class TracedInterfacesPass:
             MICROFACETS=mirror or rough,
             ROUGH=rough,
             MIRROR=mirror,
-            ADAPTIVE=job.bending,
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
@@ -179,8 +188,7 @@ class TracedInterfacesPass:
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,
-            # Rays that a ground has mirrored have none.
-            FOOTPRINTS=environment.kind == "image" and not mirror,
+            FOOTPRINTS=environment.kind == "image",
             **coat_switches(scene.objects),
         )
 

@@ -28,6 +28,8 @@ SIZE = (1021, 769)
 class RecordedJob(FrameJob):
     """Job whose passes draw all objects, and over the whole picture, as any camera may see them."""
 
+    any_eye = True
+
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
         super().place(shift, with_depth=with_depth)
