@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
@@ -365,25 +364,46 @@ def test_no_scheduler_is_a_plain_error(tmp_path: Path, capsys: pytest.CaptureFix
 # Ctrl-C
 
 
+#: The command line, which tells when its first rays are traced: then it is interrupted.
+TELLING = """
+import sys
+from translucent.bake.strips import Strips
+from translucent.cli import main
+
+bake = Strips.bake
+
+def telling(*arguments):
+    print("tracing", flush=True)
+    return bake(*arguments)
+
+Strips.bake = telling
+if __name__ == "__main__":
+    sys.exit(main())
+"""
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 @pytest.mark.parametrize("many", [False, True])
 def test_ctrl_c_leaves_nothing(many: bool, ball_glb: Path, tmp_path: Path) -> None:
     folder = tmp_path / "maps"
     folder.mkdir()
     where = ["--out-dir", str(folder)] if many else ["-o", str(folder / "ball.exr")]
-    # A ball needs no time for its texture coordinates, so that it is rays that are interrupted.
-    command = [sys.executable, "-m", "translucent", "bake", str(ball_glb), *where, "--rays", "4096", "--size", "2048"]
+    # Spawned processes run the script, too, but for its end.
+    (tmp_path / "bake.py").write_text(TELLING)
+    options = ["--rays", "4096", "--size", "2048"]
+    command = [sys.executable, str(tmp_path / "bake.py"), "bake", str(ball_glb), *where, *options]
     # A shell that runs tests in the background has its children ignore what Ctrl-C sends.
     heeding = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding
     ) as process:
-        timer = threading.Timer(2.5, process.send_signal, [signal.SIGINT])
-        timer.start()
         try:
+            assert process.stdout is not None
+            while (line := process.stdout.readline()) != "tracing\n":
+                assert line, "it ends before it traces rays"
+            process.send_signal(signal.SIGINT)
             _, error = process.communicate(timeout=60)
         finally:
-            timer.cancel()
             process.kill()
     assert process.returncode == 130, error
     assert error.strip().splitlines()[-1] == "error: interrupted"

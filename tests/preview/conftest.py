@@ -64,6 +64,9 @@ def display() -> Iterator[str]:
         server.wait(10)
 
 
+#: Compiled shaders are kept where they are for the tests of rendering, whatever folders a window gets.
+SHADERS = {"MESA_SHADER_CACHE_DIR": os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")}
+
 Preview = Callable[..., subprocess.CompletedProcess[str]]
 
 
@@ -76,7 +79,7 @@ def preview(display: str, tmp_path: Path) -> Preview:
         command = [sys.executable, "-m", "translucent", "preview", *arguments, "--size", "640x480", "--json"]
         command += ["--script", str(tmp_path / "script.toml"), "--screenshot", str(tmp_path / "window.png")]
         folders = dict.fromkeys(("XDG_CONFIG_HOME", "XDG_CACHE_HOME"), str(tmp_path))
-        environment = {**os.environ, "DISPLAY": display, **folders}
+        environment = {**SHADERS, **os.environ, "DISPLAY": display, **folders}
         return subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment, check=False)
 
     return run
