@@ -155,7 +155,8 @@ def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     # As a shell would.
     arguments = [name for word in shlex.split(command) for name in ("*" in word and sorted(glob.glob(word))) or [word]]
     small = SMALL_SCATTER if "scatter" in arguments else SMALL.get(arguments[0], [])
-    assert main([*arguments, *small]) == 0
+    few = ["--turntable", "3"] if "--turntable" in arguments else []
+    assert main([*arguments, *small, *few]) == 0
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])
