@@ -71,6 +71,7 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     usual = stage.plans[0].interfaces
     assert usual == tl.TracedInterfaces(depth=12)
     monkeypatch.setattr(stages, "BUDGET", 0.0 if slow else 1e9)
+    monkeypatch.setattr(Pace, "stride", lambda *_: 4 if slow else 1)  # not 256 steps for a picture
     drawn: list[RenderPlan] = []
     draw = stage.renderer.draw
 
