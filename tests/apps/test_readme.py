@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from tests.little import with_few_shadows
+from tests.little import with_few_shadows, without_processes
 from translucent.assets import web_path
 from translucent.bake import unwrap
 from translucent.cli import cli, main
@@ -63,12 +63,13 @@ def new_uv(mesh: tl.Mesh, size: int) -> Any:
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer) -> None:
-    """One renderer, which keeps its programs, for all; and few shadows."""
+    """One renderer, which keeps its programs, for all; few shadows, and no processes."""
     own = tl.Renderer
     monkeypatch.setattr(
         tl, "Renderer", lambda backend="auto": own("cpu") if backend == "cpu" else nullcontext(renderer)
     )
     with_few_shadows(monkeypatch)
+    without_processes(monkeypatch)
     monkeypatch.setattr(unwrap, "_new_uv", new_uv)
 
 
@@ -154,7 +155,8 @@ def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     # As a shell would.
     arguments = [name for word in shlex.split(command) for name in ("*" in word and sorted(glob.glob(word))) or [word]]
     small = SMALL_SCATTER if "scatter" in arguments else SMALL.get(arguments[0], [])
-    assert main([*arguments, *small]) == 0
+    few = ["--turntable", "3"] if "--turntable" in arguments else []
+    assert main([*arguments, *small, *few]) == 0
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])

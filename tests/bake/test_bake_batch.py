@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
@@ -21,6 +20,7 @@ import pytest
 import trimesh
 
 import translucent as tl
+from tests.bake.tasks import die_or_double, sleep_long
 from translucent.bake import jobs as jobs_module
 from translucent.bake.bake_file import bake_file
 from translucent.bake.batch import bake_many, run_job
@@ -238,38 +238,11 @@ def test_a_share_is_of_the_diagonal(make_jobs: Any) -> None:
 # Processes that die
 
 
-def die_or_double(number: int) -> int:
-    """In a process: 3 ends it, like a crash would."""
-    if number == 3:
-        os._exit(9)
-    return 2 * number
-
-
-def sleep_long(number: int) -> int:
-    """In a process."""
-    if number:
-        time.sleep(60)
-    return number
-
-
-@pytest.fixture
-def importable(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Lets spawned processes find the functions of this file."""
-    name = "test_bake_batch"
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    monkeypatch.setitem(sys.modules, name, sys.modules[__name__])
-    for function in (die_or_double, sleep_long):
-        monkeypatch.setattr(function, "__module__", name)
-    return
-
-
-@pytest.mark.usefixtures("importable")
 def test_a_process_that_dies_takes_only_its_own_item_along() -> None:
     found = sorted(in_processes(die_or_double, list(range(7)), 2, lambda item: -item))
     assert found == [-3, 0, 2, 4, 8, 10, 12]
 
 
-@pytest.mark.usefixtures("importable")
 def test_processes_end_when_the_work_is_given_up() -> None:
     results = in_processes(sleep_long, [0, 1, 2], 2, lambda item: -item)
     assert next(results) == 0
@@ -281,12 +254,12 @@ def test_processes_end_when_the_work_is_given_up() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     code = (
-        "import sys, time; from test_bake_batch import tell_and_sleep\n"
+        "import sys, time; from tests.bake.tasks import tell_and_sleep\n"
         "from translucent.bake.local_pool import in_processes\n"
         "if __name__ == '__main__': list(in_processes(tell_and_sleep, [0, 1], 2, lambda item: -item))\n"
     )
     (tmp_path / "batch.py").write_text(code)
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen(
         [sys.executable, tmp_path / "batch.py"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
     ) as parent:
@@ -308,12 +281,6 @@ def _runs(process: int) -> bool:
         return False
     status = Path(f"/proc/{process}/stat")
     return not (status.exists() and status.read_text().rpartition(")")[2].split()[0] == "Z")
-
-
-def tell_and_sleep(item: int) -> int:
-    print(os.getpid(), flush=True)
-    time.sleep(600.0)
-    return item
 
 
 # Dask
@@ -397,25 +364,46 @@ def test_no_scheduler_is_a_plain_error(tmp_path: Path, capsys: pytest.CaptureFix
 # Ctrl-C
 
 
+#: The command line, which tells when its first rays are traced: then it is interrupted.
+TELLING = """
+import sys
+from translucent.bake.strips import Strips
+from translucent.cli import main
+
+bake = Strips.bake
+
+def telling(*arguments):
+    print("tracing", flush=True)
+    return bake(*arguments)
+
+Strips.bake = telling
+if __name__ == "__main__":
+    sys.exit(main())
+"""
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 @pytest.mark.parametrize("many", [False, True])
 def test_ctrl_c_leaves_nothing(many: bool, ball_glb: Path, tmp_path: Path) -> None:
     folder = tmp_path / "maps"
     folder.mkdir()
     where = ["--out-dir", str(folder)] if many else ["-o", str(folder / "ball.exr")]
-    # A ball needs no time for its texture coordinates, so that it is rays that are interrupted.
-    command = [sys.executable, "-m", "translucent", "bake", str(ball_glb), *where, "--rays", "4096", "--size", "2048"]
+    # Spawned processes run the script, too, but for its end.
+    (tmp_path / "bake.py").write_text(TELLING)
+    options = ["--rays", "4096", "--size", "512"]
+    command = [sys.executable, str(tmp_path / "bake.py"), "bake", str(ball_glb), *where, *options]
     # A shell that runs tests in the background has its children ignore what Ctrl-C sends.
     heeding = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding
     ) as process:
-        timer = threading.Timer(2.5, process.send_signal, [signal.SIGINT])
-        timer.start()
         try:
+            assert process.stdout is not None
+            while (line := process.stdout.readline()) != "tracing\n":
+                assert line, "it ends before it traces rays"
+            process.send_signal(signal.SIGINT)
             _, error = process.communicate(timeout=60)
         finally:
-            timer.cancel()
             process.kill()
     assert process.returncode == 130, error
     assert error.strip().splitlines()[-1] == "error: interrupted"

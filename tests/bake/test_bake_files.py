@@ -203,23 +203,28 @@ from translucent.bake.writing import save_map
 values = np.random.default_rng(1).uniform(0.1, 1, (256, 256)).astype(np.float32)
 made = ThicknessMap(values, values > 0, values, 0.0, conftest.quad(), BakeSettings(size=256), conftest.report())
 resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
-try:
-    save_map(made, Path(sys.argv[1]))
-except tl.RenderError as error:
-    print(error)
+for path in sys.argv[1:]:
+    try:
+        save_map(made, Path(path))
+    except tl.RenderError as error:
+        print(error)
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit on the size of files")
-@pytest.mark.parametrize("suffix", [".exr", ".npy", ".npz", ".png", ".glb"])
-def test_a_disk_that_is_full_leaves_the_old_file(suffix: str, tmp_path: Path) -> None:
-    path = tmp_path / f"t{suffix}"
-    path.write_bytes(b"precious")
+def test_a_disk_that_is_full_leaves_the_old_file(tmp_path: Path) -> None:
+    paths = [tmp_path / f"t{suffix}" for suffix in (".exr", ".glb", ".npy", ".npz", ".png")]
+    for path in paths:
+        path.write_bytes(b"precious")
     script = FULL.format(tests=str(Path(__file__).parent))
-    done = subprocess.run([sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=False)
-    assert "cannot be written" in done.stdout, done.stderr
-    assert path.read_bytes() == b"precious"
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    done = subprocess.run([sys.executable, "-c", script, *paths], capture_output=True, text=True, check=False)
+    told = done.stdout.splitlines()
+    assert len(told) == len(paths), done.stderr
+    for path, line in zip(paths, told, strict=True):
+        assert str(path) in line
+        assert "cannot be written" in line
+        assert path.read_bytes() == b"precious"
+    assert sorted(tmp_path.iterdir()) == paths  # nothing is left beside them
 
 
 def test_a_record_that_cannot_be_written_is_an_error(

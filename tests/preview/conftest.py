@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.preview.waiting import SIZE, wait
+from tests.preview.waiting import SIZE, environment, wait
 from translucent.preview import worker
 from translucent.preview.document import Display, Document, Model
 from translucent.preview.worker import Pool
@@ -75,8 +75,7 @@ def preview(display: str, tmp_path: Path) -> Preview:
         (tmp_path / "script.toml").write_text(script or '[[action]]\ndo = "frame"\n')
         command = [sys.executable, "-m", "translucent", "preview", *arguments, "--size", "640x480", "--json"]
         command += ["--script", str(tmp_path / "script.toml"), "--screenshot", str(tmp_path / "window.png")]
-        folders = dict.fromkeys(("XDG_CONFIG_HOME", "XDG_CACHE_HOME"), str(tmp_path))
-        environment = {**os.environ, "DISPLAY": display, **folders}
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment, check=False)
+        own = environment(display, tmp_path)
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, env=own, check=False)
 
     return run

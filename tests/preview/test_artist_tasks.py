@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
+
+from tests.preview.waiting import environment
 
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "preview_tasks.py"
 NAMES = ("distance in mm", "find a key")
 
 
 def test_a_distance_is_typed_and_a_key_found(display: str, tmp_path: Path) -> None:
-    folders = dict.fromkeys(("XDG_CONFIG_HOME", "XDG_CACHE_HOME"), str(tmp_path))
     command = [sys.executable, str(TOOL), *NAMES, "--folder", str(tmp_path), "--size", "1000x700"]
-    done = subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        env={**os.environ, "DISPLAY": display, **folders},
-        check=False,
-    )
+    own = environment(display, tmp_path)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=own, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert [line[:22].strip() for line in done.stdout.splitlines()] == list(NAMES)

@@ -24,6 +24,7 @@ from translucent.preview.document import Model
 from translucent.preview.measuring import crossing
 from translucent.preview.stage import Stage
 from translucent.preview.tasks import Task
+from translucent.preview.timing import Pace
 from translucent.preview.workspace import Workspace
 
 
@@ -70,6 +71,7 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     usual = stage.plans[0].interfaces
     assert usual == tl.TracedInterfaces(depth=12)
     monkeypatch.setattr(stages, "BUDGET", 0.0 if slow else 1e9)
+    monkeypatch.setattr(Pace, "stride", lambda *_: 4 if slow else 1)  # not 256 steps for a picture
     drawn: list[RenderPlan] = []
     draw = stage.renderer.draw
 
@@ -125,7 +127,8 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(stage: Stage, work: Workspac
 def test_a_picture_that_takes_long_to_be_shown_has_frames_for_that(
     stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stages, "BUDGET", 0.0)  # steps of 16 x 16
+    monkeypatch.setattr(stages, "BUDGET", 0.0)
+    monkeypatch.setattr(Pace, "stride", lambda *_: 4)  # steps of 4 x 4: in fewer frames than the 16 x 16 of that budget
     work.do(Change("display.antialias", False))
     finish(stage, work)
     whole = pixels(stage)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +13,13 @@ from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
 
 SIZE = (160, 96)
+
+
+def environment(display: str, folder: Path) -> dict[str, str]:
+    """Variables of a window with folders of its own, but for shaders, which need not be compiled for each again."""
+    own = {"DISPLAY": display, "XDG_CONFIG_HOME": str(folder), "XDG_CACHE_HOME": str(folder)}
+    shaders = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return {"MESA_SHADER_CACHE_DIR": shaders, **os.environ, **own}
 
 
 def wait(work: Workspace, done: Callable[[], object], seconds: float = 60.0) -> None:
