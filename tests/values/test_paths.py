@@ -68,9 +68,7 @@ def test_a_folder_that_takes_nothing_is_found_at_once(
         raise OSError(errno.EROFS, "Read-only file system")
 
     monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(
-        tl.RenderError, match=r"asked; it cannot be written \(Read-only file system\)"
-    ):
+    with pytest.raises(tl.RenderError, match=r"asked; it cannot be written \(Read-only file system\)"):
         require_folder(directory / name, "asked")
 
 
