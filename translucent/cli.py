@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import sys
@@ -43,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         command = context.command_path if context else "translucent"
-        message = _below_zero(error, given) or error.format_message().rstrip(".")
+        message = _below_zero(error, given) or _dashed_file(error, given) or error.format_message().rstrip(".")
         return _failed(f"{message}{_quoting(error)}; see '{command} --help'", 2)
     except TranslucentError as error:
         if "--debug" in given:
@@ -64,6 +65,14 @@ def _below_zero(error: click.ClickException, given: list[str]) -> str | None:
         return None
     word = next((word for word in given if error.option_name in word), error.option_name)
     return f"{word!r}; a number below 0, where none is taken; give one above 0"
+
+
+def _dashed_file(error: click.ClickException, given: list[str]) -> str | None:
+    """The message for a file whose name begins with a dash, which was read as an option."""
+    if not isinstance(error, click.NoSuchOption):
+        return None
+    word = next((word for word in given if word.startswith(error.option_name) and os.path.exists(word)), None)
+    return word and f"{word!r}; it is a file, but words that begin with a dash are options; write ./{word}"
 
 
 def _quoting(error: click.ClickException) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -136,3 +138,28 @@ def test_a_hex_color_is_srgb(run: Run) -> None:
     told = strict_json(run("extinction", "#808080", "1", "--json").out)
     linear = ((128 / 255 + 0.055) / 1.055) ** 2.4
     assert told["extinction"] == pytest.approx([-math.log(linear)] * 3, rel=1e-14)
+
+
+def test_a_file_whose_name_begins_with_a_dash(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("-lid.obj").touch()
+    assert "'-lid.obj'; it is a file" in (line := one_error_line(run("explain", "-lid.obj")))
+    assert "write ./-lid.obj" in line
+    assert "No such option" in one_error_line(run("explain", "-lad.obj"))
+
+
+@pytest.mark.parametrize("verb", ["presets", "doctor"])
+def test_a_standard_output_that_is_closed(run: Run, monkeypatch: pytest.MonkeyPatch, verb: str) -> None:
+    monkeypatch.setattr(sys, "stdout", None)
+    assert run(verb)[::2] == (0, "")
+
+
+def test_a_standard_output_that_is_full(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(text: str, *, err: bool = False, **_: object) -> None:
+        if not err:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        sys.stderr.write(f"{text}\n")
+
+    monkeypatch.setattr("translucent.commands.console.click.echo", full)
+    line = one_error_line(run("presets"), 1)
+    assert "standard output; it cannot be written (No space left on device)" in line

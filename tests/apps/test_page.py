@@ -130,6 +130,18 @@ def test_bad_input_is_told_and_leaves_nothing(
     assert sorted(tmp_path.iterdir()) == before
 
 
+def test_a_viewer_that_was_not_built_is_told_before_anything_is_rendered(
+    run: Run, cube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(name: str) -> Path:
+        raise tl.InputError(f"the script {name!r} for browsers", "not there", "run `make web`")
+
+    monkeypatch.setattr("translucent.page.write.web_path", missing)
+    monkeypatch.setattr("translucent.page.write.poster_of", lambda *_: pytest.fail("a poster was rendered"))
+    line = one_error_line(run(str(cube), "-o", tmp_path / "cube.html", "--preset", "gummy"))
+    assert line.endswith("run `make web`")
+
+
 def test_colors_are_told_at_the_distance_of_the_panel(run: Run, cube: Path, tmp_path: Path) -> None:
     plain = ("-o", str(tmp_path / "cube.html"), "--poster", "none", "--stage", "none")
     told = run(str(cube), *plain, "--color", "#7b1e3a", "--distance", "7mm").out

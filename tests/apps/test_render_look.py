@@ -65,6 +65,7 @@ def test_the_names_of_tone_curves_are_those_there_are() -> None:
         (["--exposure", "nan"], "exposure nan; not within 100 stops"),
         (["--tone", "filmic"], "Invalid value for '--tone'"),
         (["--turntable", "1"], "Invalid value for '--turntable'"),
+        (["--fps", "12"], "--fps 12; only --turntable takes it; add --turntable, or leave it out"),
         (["--turntable", "4", "--fps", "0"], "0.0 pictures per second; not in 1 to 100"),
         (["--turntable", "4"], "animation 'a.png'; suffix '.png'; use .webp, .gif, .mp4, or a folder"),
         (["--turntable", "4", "--aov", "aovs", "-o", "a.gif"], "--turntable 4; --aov is given, too"),

@@ -12,6 +12,7 @@ import translucent as tl
 from translucent.bake.padding import pad
 from translucent.bake.surface import Surface
 from translucent.bake.texels import Atlas
+from translucent.bake.unwrap import unwrap
 from translucent.geometry.solids import Box, Sphere
 
 SQUARE = [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]]]
@@ -155,6 +156,12 @@ def test_no_texture_coordinates_and_no_xatlas(monkeypatch: pytest.MonkeyPatch) -
     wanted = r"new texture coordinates for '.*'; the package xatlas is not installed; .*\[bake\]', or unwrap it"
     with pytest.raises(tl.RenderError, match=wanted):
         tl.bake_thickness(Box().tessellate(), 16)
+
+
+def test_a_mesh_without_area_gets_no_texture_coordinates() -> None:
+    line = tl.Mesh([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)], name="line")
+    with pytest.raises(tl.InputError, match=r"mesh 'line'; no face has an area; export the mesh again"):
+        unwrap(line, 64, None)
 
 
 def test_new_texture_coordinates_come_with_the_mesh() -> None:

@@ -211,6 +211,7 @@ def test_the_faintest_light_does_not_underflow_aloud() -> None:
         ({"sheet_thickness": 0}, "sheet_thickness 0 of 'box'; not above 0"),
         ({"sheet_thickness": -1e-3}, "sheet_thickness -0.001 of 'box'; not above 0"),
         ({"sheet_thickness": NAN}, "sheet_thickness nan of 'box'; not above 0"),
+        ({"priority": "high"}, "priority of an object 'high'; of type str; give a whole number, such as 1"),
     ],
 )
 def test_there_is_no_such_object(options: dict[str, Any], message: str) -> None:

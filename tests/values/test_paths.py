@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import stat
@@ -56,6 +57,19 @@ def test_a_name_that_cannot_be_used_is_refused(
         check(directory / name, "what was asked")
     assert str(error.value).startswith("what was asked; ")
     assert str(error.value).endswith(message)
+
+
+@pytest.mark.parametrize("name", [".", "made/below"])
+def test_a_folder_that_takes_nothing_is_found_at_once(
+    directory: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    def refuse(path: Path, mode: str) -> None:
+        assert (path.parent, mode) == (directory, "x+b")
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(tl.RenderError, match=r"asked; it cannot be written \(Read-only file system\)"):
+        require_folder(directory / name, "asked")
 
 
 @pytest.mark.parametrize(

@@ -82,6 +82,9 @@ def in_tile(uv: Array, tile: int) -> npt.NDArray[np.bool_]:
 def _new_uv(mesh: Mesh, size: int) -> tuple[Mesh, Integers]:
     xatlas = require_package("xatlas", f"new texture coordinates for {mesh.name!r}", "unwrap it in a modelling tool")
     mesh.require_finite()
+    one, two, three = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    if not np.cross(two - one, three - one).any():
+        raise InputError(f"mesh {mesh.name!r}", "no face has an area", "export the mesh again")
     unit = ((mesh.vertices - mesh.center) / (0.5 * mesh.diagonal)).astype(np.float32)
     gap = max(1, min(CHART_GAP, round(GAP_SHARE * size)))
     atlas, options = xatlas.Atlas(), xatlas.PackOptions()

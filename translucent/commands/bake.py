@@ -15,7 +15,7 @@ import click
 from translucent.commands.bake_options import FORMATS, bake_options, read_job
 from translucent.commands.bake_scatter import SCATTER, bake_scatter, refuse_scatter_options
 from translucent.commands.common import common_options, overwrite_option
-from translucent.commands.console import echo
+from translucent.commands.console import echo, is_terminal
 from translucent.commands.model import mesh_file
 from translucent.errors import InputError, RenderError, TranslucentError, printable
 from translucent.extras import require_package
@@ -107,7 +107,7 @@ def _bake_one(job: Job, check: bool, as_json: bool) -> None:
 @contextlib.contextmanager
 def _progress(label: str) -> Iterator[Progress | None]:
     """A bar with the rate and the time left on a terminal, and nothing elsewhere."""
-    if not sys.stderr.isatty():
+    if not is_terminal(sys.stderr):
         yield None
         return
     began = time.perf_counter()

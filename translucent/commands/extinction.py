@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,7 +22,7 @@ from translucent.commands.common import (
     refuse_overwriting,
     triple_text,
 )
-from translucent.commands.console import echo
+from translucent.commands.console import echo, takes_colors
 from translucent.commands.fitting import fit_options, fitted, is_table
 from translucent.commands.on_model import doubts_on, report_on, thickness_on, told_on
 from translucent.errors import InputError, TranslucentError
@@ -300,7 +299,7 @@ def _report(told: dict[str, Any]) -> str:
         f"                light has the color at {distance:g} m, 1/e (37 %) at a mean free path, half at a half-value",
         _td_line(told["transmission_distance"]),
     ]
-    if sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb":
+    if takes_colors(sys.stdout):
         if "on" in told:
             parts = [told["on"]["average_color"], *(part["color"] for part in told["on"]["parts"])]
             lines.append(f"on the model    {terminal_strip(parts)}")

@@ -27,6 +27,9 @@ LARGE = 1 << 23
 #: Width and height up to which OpenGL draws a picture at once, and pixels of the largest picture.
 MOST_SIDE, MOST_PIXELS = 1 << 14, 1 << 30
 
+#: Pictures per second of a turntable for which none are given.
+FPS = 24.0
+
 #: Bytes of memory that each pixel of a picture takes that is not rendered in tiles, at least: its arrays, read back.
 _PIXEL_BYTES = 100
 
@@ -41,8 +44,12 @@ class Pictures(NamedTuple):
     exposure: float
     tone: str
     turntable: int | None
-    fps: float
+    fps: float | None
     aov: Path | None
+
+    @property
+    def _rate(self) -> float:
+        return FPS if self.fps is None else self.fps
 
     def tiled(self, size: tuple[int, int]) -> bool:
         """True if a picture of this size is so large that it is rendered and written in tiles."""
@@ -64,9 +71,11 @@ class Pictures(NamedTuple):
         if self.aov is not None:
             require_folder(self.aov, f"--aov {str(self.aov)!r}")
         if self.turntable is None:
+            if self.fps is not None:
+                raise InputError(f"--fps {self.fps:g}", "only --turntable takes it", "add --turntable, or leave it out")
             check_output(self.output)
             return
-        check_animation(self.output, self.fps)
+        check_animation(self.output, self._rate)
         if self.aov is not None:
             raise InputError(f"--turntable {self.turntable}", "--aov is given, too", "render one picture for it")
 
@@ -124,7 +133,7 @@ class Pictures(NamedTuple):
             for frame in chain([first], map(draw, views)):
                 yield frame.to_srgb8(self.exposure, self.tone)
 
-        write_animation(self.output, pictures(), self.fps)
+        write_animation(self.output, pictures(), self._rate)
         return first
 
 
@@ -137,7 +146,7 @@ def picture_options(command: Callable[..., None]) -> Callable[..., None]:
         help="Also write pictures of thickness, transmittance and validity into this folder.",
     )(command)
     command = click.option(
-        "--fps", type=float, default=24.0, show_default=True, help="Pictures per second of a --turntable."
+        "--fps", type=float, metavar="N", help=f"Pictures per second of a --turntable. Default: {FPS:g}."
     )(command)
     return click.option(
         "--turntable",

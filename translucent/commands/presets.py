@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import sys
 from collections.abc import Iterable
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from translucent.commands.common import common_options, triple_text
-from translucent.commands.console import echo
+from translucent.commands.console import echo, takes_colors
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ def presets(context: click.Context, group: str | None, search: str | None, as_js
         rows = [{key: one.summary()[key] for key in _LISTED} for one in found]
         echo(json.dumps({"presets": rows}))
         return
-    echo(_table(found), color=_colorful())
+    echo(_table(found), color=takes_colors(sys.stdout))
 
 
 def _listed(group: str | None, search: str | None) -> list[Preset]:
@@ -81,15 +80,15 @@ def show(context: click.Context, name: str, as_json: bool) -> None:
     if as_json or above.get("as_json"):
         echo(json.dumps(one.summary()))
         return
-    echo(_details(one), color=_colorful())
+    echo(_details(one), color=takes_colors(sys.stdout))
 
 
 def _table(found: list[Preset]) -> str:
     wide = max(len(one.name) for one in found)
     # A swatch and a space go before each hex color.
-    pad = 3 if _colorful() else 0
+    pad = 3 if takes_colors(sys.stdout) else 0
     head = "  ".join(f"{text:<{7 + pad}}" for text in (*found[0].colors(), "thick"))
-    cards = "on white, black  " if _colorful() else ""
+    cards = "on white, black  " if takes_colors(sys.stdout) else ""
     lines = [f"{'name':<{wide}}  {'kind':<9}  {'regime':<20}  {head}  {cards}source"]
     lines += [
         f"{one.name:<{wide}}  {one.kind:<9}  {one.regime:<20}  "
@@ -103,7 +102,7 @@ def _table(found: list[Preset]) -> str:
 
 def _slab_strip(one: Preset) -> str:
     """Swatches of slabs on a white and on a black card, or nothing where colors cannot be shown."""
-    if not _colorful():
+    if not takes_colors(sys.stdout):
         return ""
     strips = ("".join(map(_cell, row.values())) for row in one.slab_colors().values())
     return f"{' '.join(strips)}    "  # as wide as its heading: two times three cells
@@ -151,14 +150,9 @@ def _coefficients(per_metre: Iterable[float]) -> str:
     return f"{triple_text(1e-3 * v for v in values)} 1/mm  {triple_text(values)} 1/m"
 
 
-def _colorful() -> bool:
-    """True if colors can be shown: on a terminal, unless it is a dumb one or NO_COLOR asks for none."""
-    return sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-
-
 def _swatch(color: str) -> str:
     """Two columns of a hex color and a space, or nothing where colors cannot be shown."""
-    return f"{_cell(color)} " if _colorful() else ""
+    return f"{_cell(color)} " if takes_colors(sys.stdout) else ""
 
 
 def _cell(color: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 
-from translucent.commands.console import echo, overwrite
+from translucent.commands.console import echo, is_terminal, overwrite
 
 #: Seconds before anything is told, and between two tellings: in a terminal, and in a file.
 TERMINAL, FILE = (1.0, 0.5), (10.0, 30.0)
@@ -24,7 +24,7 @@ class Progress:
         self._what = what
         self._begun: tuple[float, float] | None = None
         self._told = 0.0
-        self._terminal = sys.stderr.isatty()
+        self._terminal = is_terminal(sys.stderr)
         self._width = 0
 
     def __call__(self, share: float) -> None:

@@ -159,7 +159,7 @@ def render(
     opaque_with: str | None,
     transparent: bool,
     turntable: int | None,
-    fps: float,
+    fps: float | None,
     aov: Path | None,
     backend: str | None,
     as_json: bool,

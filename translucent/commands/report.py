@@ -22,7 +22,7 @@ from translucent.commands.common import (
     read_size,
     unit_option,
 )
-from translucent.commands.console import echo
+from translucent.commands.console import echo, is_terminal
 from translucent.commands.model import read_scene, require_translucent
 from translucent.errors import InputError, RenderError
 
@@ -164,7 +164,7 @@ def _measured(
             write_report(part, output / "report.json")
 
     # Where nobody watches, the bar would be an empty line before an error.
-    shown_in = sys.stderr if sys.stderr.isatty() else io.StringIO()
+    shown_in = sys.stderr if is_terminal(sys.stderr) else io.StringIO()
     with click.progressbar(length=1, file=shown_in, item_show_func=str) as bar:
 
         def progress(what: str, done: int, parts: int) -> None:

@@ -65,12 +65,7 @@ def require_output(path: Path, asked: str) -> None:
         raise InputError(asked, f"no folder {str(folder)!r}", "make the folder first")
     if os.path.isdir(path):
         raise InputError(asked, "a folder of that name is there", "choose another name")
-    try:  # rights do not tell: disks may be read-only, and full
-        temporary, held = _temporary_file(Path(os.path.realpath(path)))
-    except OSError as error:
-        raise RenderError(asked, f"it cannot be written ({error.strerror})", "check the folder") from error
-    held.close()
-    temporary.unlink(missing_ok=True)
+    _require_writable(path, asked)
 
 
 def require_folder(path: Path, asked: str) -> None:
@@ -86,10 +81,25 @@ def require_folder(path: Path, asked: str) -> None:
     ------
     InputError
         If the name, or that of a folder above, is one of a file.
+    RenderError
+        If nothing can be made in it, or in the folder that it has to be made in.
     """
     there = next((folder for folder in (path, *path.parents) if os.path.lexists(folder)), None)
-    if there is not None and not os.path.isdir(there):
+    if there is None:
+        return
+    if not os.path.isdir(there):
         raise InputError(asked, f"{str(there)!r} is no folder", "choose another one")
+    _require_writable(there / path.name, asked)
+
+
+def _require_writable(path: Path, asked: str) -> None:
+    """Raise `RenderError` unless a file can be made beside the path."""
+    try:  # rights do not tell: disks may be read-only, and full
+        temporary, held = _temporary_file(Path(os.path.realpath(path)))
+    except OSError as error:
+        raise RenderError(asked, f"it cannot be written ({error.strerror})", "check the folder") from error
+    held.close()
+    temporary.unlink(missing_ok=True)
 
 
 def same_file(one: Path, other: Path) -> bool:

@@ -54,6 +54,9 @@ STORAGE_BINDINGS = {
     "light_ends": 6,
 }
 
+#: Bodies that a traced ray can be in at once.
+RECORD_SIZE = 8
+
 #: Bits of the width of the textures that hold hierarchies, in texels: every OpenGL has that.
 HIERARCHY_WIDTH_BITS = 12
 
@@ -120,7 +123,7 @@ CONSTANTS: dict[str, str] = {
     "FILM_ORDERS": str(FILM_ORDERS),
     "HIERARCHY_WIDTH_BITS": str(HIERARCHY_WIDTH_BITS),
     "HIERARCHY_STEPS": "32767.5",  # of the grid of bounds, from the middle of a hierarchy to its end
-    "RECORD_SIZE": "8",  # bodies that a ray can be in
+    "RECORD_SIZE": str(RECORD_SIZE),
     "MIRROR_TOLERANCE": "1e-3",  # from a ground to where a rasterizer may see it, as a share of the scene
     "MIRROR_MARGIN": "1e-4",  # from a ground to where its mirrored rays start, as a share of the scene
     "PHOTON_WIDTH": f"{PHOTON_WIDTH}u",

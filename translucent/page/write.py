@@ -115,10 +115,11 @@ def write_page(
 
 
 def check_output(path: Path) -> None:
-    """Raise `InputError` before any work is done if no page can be written to the path."""
+    """Raise `InputError` before any work is done if no page can be written to the path, or its viewer was not built."""
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"page {str(path)!r}", "not an .html file", "name it for example viewer.html")
     require_output(path, f"page {str(path)!r}")
+    web_path("page.js")
 
 
 def check_page_size(size: tuple[int, int]) -> tuple[int, int]:

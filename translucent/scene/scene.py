@@ -94,6 +94,7 @@ class Object(Frozen):
         object.__setattr__(self, "transform", matrix)
         if (largest := float(np.abs(self.bounds).max())) > MAX_COORDINATE:
             raise InputError(where, f"it puts the mesh {largest:.3g} m away", f"stay within {MAX_COORDINATE:g} m")
+        _require_type("priority of an object", self.priority, (int, float, np.number), "give a whole number, such as 1")
         if self.sheet_thickness is not None and not 0 < self.sheet_thickness <= MAX_COORDINATE:
             raise InputError(
                 f"sheet_thickness {self.sheet_thickness} of {self.mesh.name!r}",
