@@ -151,7 +151,7 @@ def test_results_that_are_told_are_let_go(make_jobs: Any) -> None:
 FAULTS = """
 import resource
 import numpy as np
-from translucent.bake.memory import reuse_freed_memory
+from translucent.bake.memory import reuse_freed_memory_if_fixed
 
 def faults():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
@@ -160,7 +160,7 @@ def faults():
     return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
 
 before = faults()
-reuse_freed_memory()
+reuse_freed_memory_if_fixed()
 faults()
 print(before, faults())
 """

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 from translucent.bake.bake_file import bake_file
 from translucent.bake.jobs import Job, check_job, content_hash, is_done
 from translucent.bake.local_pool import in_processes
-from translucent.bake.memory import reuse_freed_memory
+from translucent.bake.memory import reuse_freed_memory_if_fixed
 from translucent.bake.record import Record, files_of, parts_of, read_record
 from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentError
@@ -173,7 +173,7 @@ def run_job(job: Job, version: str | None = None) -> Record:
     A `version` is that of who asks: on another machine there may be another one, whose maps are not the same.
     """
     started = time.perf_counter()
-    reuse_freed_memory()
+    reuse_freed_memory_if_fixed()
     if version not in (None, VERSION):
         return _entry(job, "failed", 0.0, error=f"its worker has version {VERSION}, and not {version}; install that")
     try:

@@ -1,4 +1,4 @@
-"""Memory that freed arrays leave, where the environment would have each of them fetched from the system anew."""
+"""Memory that freed arrays leave: processes that bake keep it for the next ones."""
 
 from __future__ import annotations
 
@@ -14,15 +14,24 @@ MOST_REUSED = 32 << 20
 
 @cache  # once for a process
 def reuse_freed_memory() -> None:
-    """Let arrays reuse the memory of freed ones, if ``MALLOC_TRIM_THRESHOLD_`` is set, as it is in workers of Dask.
+    """Let arrays reuse the memory of freed ones; for processes that do nothing but bake.
 
-    glibc learns from what is freed that such sizes are needed again, unless one of its thresholds is set: then each
-    array of more than 128 KB is mapped anew, and its pages are cleared when they are first written. That is a tenth of
-    the time of a bake. Afterwards it is as if glibc had learned; larger arrays go back to the system as before.
+    glibc gives memory back to the system when arrays are freed, and the system clears each page anew for the next ones.
+    It learns from their sizes to do so less, but for some sizes of maps that still takes a twentieth of a bake. Larger
+    arrays than 32 MB go back as before. Other C libraries stay as they are.
     """
-    if sys.platform != "linux" or "MALLOC_TRIM_THRESHOLD_" not in os.environ:
+    if sys.platform != "linux":
         return
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # other C libraries have none
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
         mallopt(M_MMAP_THRESHOLD, MOST_REUSED)
         mallopt(M_TRIM_THRESHOLD, 2 * MOST_REUSED)
+
+
+def reuse_freed_memory_if_fixed() -> None:
+    """`reuse_freed_memory` where ``MALLOC_TRIM_THRESHOLD_`` is set, as it is in workers of Dask.
+
+    With that, glibc learns nothing: each array of more than 128 KB is mapped anew, which takes an eighth of a bake.
+    """
+    if "MALLOC_TRIM_THRESHOLD_" in os.environ:
+        reuse_freed_memory()
