@@ -8,7 +8,8 @@ Dask, of which all but one come when a tenth of the assets is done, and one is k
 with ``--dask steady`` all are there from the beginning. ``share_of_workers`` is beside Embree in as many threads as
 there were workers at each time, from when the scheduler knows a worker to when it has lost it. ``processor_share`` is
 of processor time, which other work on the machine changes less than the clock; it counts all processes, the scheduler
-and what a killed worker had not finished as well. Dask's own profiler, which takes a twentieth, is off.
+and what a killed worker had not finished as well. Dask's own profiler, which takes a twentieth, is off, and
+its clock of event loops, which takes a fiftieth, ticks once a second.
 """
 
 from __future__ import annotations
@@ -171,7 +172,7 @@ def _on_dask(jobs: list[Job], workers: int, *, steady: bool) -> tuple[BatchRepor
     logging.getLogger("distributed").setLevel(logging.ERROR)
     done, presence = 0, Presence()
     with (
-        dask.config.set({"distributed.worker.profile.enabled": False}),
+        dask.config.set({"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s"}),
         LocalCluster(n_workers=0, threads_per_worker=1, dashboard_address=None, memory_limit=0) as cluster,
         Client(cluster) as client,
     ):
