@@ -4,8 +4,12 @@ Run it with ``python tools/bake_throughput.py [MESH] [--size 1024] [--rays 64] [
 
 ``--batch 200`` bakes so many assets instead, each another size of MESH with UVs of its own, in ``--threads`` processes,
 from start to end: processes that start, models that are read, maps that are written. ``--dask`` does so on workers of
-Dask, of which all but one come when a tenth of the assets is done, and one is killed, and another comes, at a third.
-``processor_share`` is of processor time, which other work on the machine changes less than the clock.
+Dask, of which all but one come when a tenth of the assets is done, and one is killed, and another comes, at a third;
+with ``--dask steady`` all are there from the beginning. ``share_of_workers`` is beside Embree in as many threads as
+there were workers at each time, from when the scheduler knows a worker to when it has lost it. ``processor_share`` is
+of processor time, which other work on the machine changes less than the clock; it counts all processes, the scheduler
+and what a killed worker had not finished as well. Dask's own profiler, which takes a twentieth, is off, and
+its clock of event loops, which takes a fiftieth, ticks once a second.
 """
 
 from __future__ import annotations
@@ -98,14 +102,15 @@ def _embree_alone(unwrapped: Unwrapped, size: int, rays: int, threads: int) -> C
     return trace
 
 
-def batch(mesh: Mesh, count: int, size: int, rays: int, workers: int, dask: bool) -> dict[str, Any]:
+def batch(mesh: Mesh, count: int, size: int, rays: int, workers: int, dask: str | None) -> dict[str, Any]:
     """A batch from start to end, beside Embree alone before and after it.
 
     Returns
     -------
     dict of str to float
         ``embree`` and ``bake`` in millions of rays a second by the clock, ``share`` of the second in the first, and
-        ``processor_share``; ``jobs``: seconds of all jobs together, and of these ``bakes``, from mesh to padded map.
+        ``processor_share``; ``jobs``: seconds of all jobs together, and of these ``bakes``, from mesh to padded map;
+        on Dask ``share_of_workers``.
     """
     unwrapped = unwrap(mesh, size, None)
     trace = _embree_alone(unwrapped, size, rays, workers)
@@ -118,7 +123,11 @@ def batch(mesh: Mesh, count: int, size: int, rays: int, workers: int, dask: bool
             output = str(path.with_suffix(".exr"))
             jobs.append({"model": str(path), "output": output, "settings": {"size": size, "rays": rays}})
         alone, used, started = [trace()], _used(), time.perf_counter()
-        report = _on_dask(jobs, workers) if dask else bake_many(jobs, workers=workers)
+        present = 0.0
+        if dask:
+            report, present = _on_dask(jobs, workers, steady=dask == "steady")
+        else:
+            report = bake_many(jobs, workers=workers)
         seconds, used = time.perf_counter() - started, _used() - used
         alone.append(trace())
         records = [read_record(Path(str(job["output"]))) or {} for job in jobs]
@@ -130,6 +139,7 @@ def batch(mesh: Mesh, count: int, size: int, rays: int, workers: int, dask: bool
         "bake": traced / seconds,
         "share": traced / seconds / clock,
         "processor_share": traced / used / processor,
+        **({"share_of_workers": traced / present / (clock / workers)} if dask else {}),
         "seconds": seconds,
         "jobs": sum(asset["seconds"] for asset in report.assets),
         "bakes": bakes,
@@ -143,26 +153,45 @@ def _used() -> float:
     return sum(one.ru_utime + one.ru_stime for one in found)
 
 
-def _on_dask(jobs: list[Job], workers: int) -> BatchReport:
-    """A batch on workers that come and go."""
-    from distributed import Client, LocalCluster
+def _on_dask(jobs: list[Job], workers: int, *, steady: bool) -> tuple[BatchReport, float]:
+    """A batch on workers, which come and go unless they are `steady`; and for how many seconds they were there."""
+    import dask
+    from distributed import Client, LocalCluster, SchedulerPlugin
+
+    class Presence(SchedulerPlugin):
+        """Seconds of workers: those that are there have begun, those that have gone have ended."""
+
+        seconds = 0.0
+
+        def add_worker(self, scheduler: Any, worker: str) -> None:
+            self.seconds -= time.perf_counter()
+
+        def remove_worker(self, scheduler: Any, worker: str, **_: Any) -> None:
+            self.seconds += time.perf_counter()
 
     logging.getLogger("distributed").setLevel(logging.ERROR)
-    done = 0
+    done, presence = 0, Presence()
     with (
-        LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, memory_limit=0) as cluster,
+        dask.config.set({"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s"}),
+        LocalCluster(n_workers=0, threads_per_worker=1, dashboard_address=None, memory_limit=0) as cluster,
         Client(cluster) as client,
     ):
+        cluster.scheduler.add_plugin(presence)
+        cluster.scale(workers if steady else 1)
 
         def changed(_: object) -> None:
             nonlocal done
             done += 1
+            if steady:
+                return
             if done == max(len(jobs) // 10, 1):
                 cluster.scale(workers)
             if done == len(jobs) // 3:
                 os.kill(next(iter(client.run(os.getpid).values())), signal.SIGKILL)
 
-        return bake_many(jobs, client.get_executor(), progress=changed)
+        report = bake_many(jobs, client.get_executor(), progress=changed)
+        left = len(client.scheduler_info(n_workers=-1)["workers"])
+        return report, presence.seconds + left * time.perf_counter()
 
 
 def _some_points(surface: Surface, unwrapped: Unwrapped, size: int, most: int) -> Points:
@@ -193,9 +222,15 @@ def _prepared(measure: Measure, points: Points) -> list[tuple[npt.NDArray[np.flo
 @click.option("--threads", type=int, help="Default: as many as there are processors.")
 @click.option("--rounds", default=3, show_default=True, help="Of both; the medians are printed.")
 @click.option("--batch", "assets", type=int, metavar="N", help="Bake a batch of so many assets instead.")
-@click.option("--dask", is_flag=True, help="Of --batch: on Dask, with workers that come and go.")
+@click.option(
+    "--dask",
+    type=click.Choice(["changing", "steady"]),
+    is_flag=False,
+    flag_value="changing",
+    help="Of --batch: on Dask, with workers that come and go (default), or that are there all the time.",
+)
 def main(
-    mesh: Path | None, size: int, rays: int, threads: int | None, rounds: int, assets: int | None, dask: bool
+    mesh: Path | None, size: int, rays: int, threads: int | None, rounds: int, assets: int | None, dask: str | None
 ) -> None:
     """Rays a second of a bake of MESH (default: the bear of the toolkit), and of Embree alone."""
     model = load_mesh(mesh or mesh_path("bear"))

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from functools import partial
@@ -130,6 +131,49 @@ def test_a_worker_of_another_version_bakes_nothing(make_jobs: Any) -> None:
     assert entry["error"] == f"its worker has version {tl.__version__}, and not 0.0.0; install that"
     assert not Path(job["output"]).exists()
     assert run_job(job, tl.__version__)["status"] == "baked"
+
+
+def test_results_that_are_told_are_let_go(make_jobs: Any) -> None:
+    """Dask would make those of a lost worker again for whoever still holds them."""
+
+    class Watched(Serial):
+        def submit(self, task: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
+            future = super().submit(task, *arguments, **named)
+            held.add(future)
+            return future
+
+    held: weakref.WeakSet[Future[Any]] = weakref.WeakSet()
+    counts: list[int] = []
+    bake_many(make_jobs(4), Watched(), progress=lambda _: counts.append(len(held)))
+    assert counts == [4, 3, 2, 1]  # the one that is told, and those to come
+
+
+FAULTS = """
+import resource
+import numpy as np
+from translucent.bake.memory import reuse_freed_memory_if_fixed
+
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(20):
+        np.ones(1 << 18)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+before = faults()
+reuse_freed_memory_if_fixed()
+faults()
+print(before, faults())
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="of glibc")
+def test_arrays_reuse_memory_on_workers_of_dask() -> None:
+    asked = {**os.environ, "MALLOC_TRIM_THRESHOLD_": "65536"}
+    found = subprocess.run([sys.executable, "-c", FAULTS], env=asked, check=True, capture_output=True, text=True).stdout
+    before, after = map(int, found.split())
+    if before < 20:
+        pytest.skip("this C library keeps memory whatever the variable says, or pages are huge")
+    assert after < before / 10, found  # 20 arrays of 512 pages each
 
 
 def test_a_mesh_that_was_inside_out_is_told(make_ball: Any, tmp_path: Path) -> None:
@@ -357,7 +401,9 @@ def test_no_scheduler_is_a_plain_error(tmp_path: Path, capsys: pytest.CaptureFix
     pytest.importorskip("distributed", reason="the package distributed is not installed")
     from translucent.cli import main
 
+    before = set(threading.enumerate())
     assert main(["bake", "bear", "--out-dir", str(tmp_path), "--dask", "not an address"]) == 1
+    assert set(threading.enumerate()) <= before  # no loop goes on
     assert capsys.readouterr().err.startswith("error: --dask not an address; no scheduler answers")
 
 

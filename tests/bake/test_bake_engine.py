@@ -13,7 +13,7 @@ import pytest
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.bake import canvas, measure, strips
-from translucent.bake.directions import Directions
+from translucent.bake.directions import DIGITS, Directions, _sobol_digits
 from translucent.bake.modes import RayMean, block_edges
 from translucent.bake.settings import BakeSettings
 from translucent.geometry.solids import Box, Sphere, Torus
@@ -92,6 +92,13 @@ def test_the_standard_error_is_an_upper_estimate(weighting: str, rays: int) -> N
         assert values.std() <= 1.1 * np.sqrt((errors**2).mean())
         # And it is of use: no more than what as many independent rays would have.
         assert np.sqrt((errors**2).mean()) <= 1.2 * length.std() / np.sqrt(rays)
+
+
+def test_points_before_scrambling_are_those_of_scipy() -> None:
+    qmc = pytest.importorskip("scipy.stats.qmc")
+    with pytest.warns(UserWarning, match="balance"):
+        plain = qmc.Sobol(2, scramble=False, bits=DIGITS).random(10_000)
+    assert np.array_equal(_sobol_digits(10_000), plain * 2**DIGITS)
 
 
 def test_directions_have_the_density_that_is_said() -> None:

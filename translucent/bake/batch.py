@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args
 from translucent.bake.bake_file import bake_file
 from translucent.bake.jobs import Job, check_job, content_hash, is_done
 from translucent.bake.local_pool import in_processes
+from translucent.bake.memory import reuse_freed_memory_if_fixed
 from translucent.bake.record import Record, files_of, parts_of, read_record
 from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentError
@@ -147,7 +148,7 @@ def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
     futures = {executor.submit(run_job, {"threads": 1, **job}, VERSION): job for job in jobs}
     try:
         for future in as_completed(futures):
-            job = futures[future]
+            job = futures.pop(future)  # Dask makes results of a lost worker again as long as anybody holds them
             try:
                 yield future.result()
             except Exception as error:  # noqa: BLE001 - lost workers, other versions: each executor raises its own kinds
@@ -172,6 +173,7 @@ def run_job(job: Job, version: str | None = None) -> Record:
     A `version` is that of who asks: on another machine there may be another one, whose maps are not the same.
     """
     started = time.perf_counter()
+    reuse_freed_memory_if_fixed()
     if version not in (None, VERSION):
         return _entry(job, "failed", 0.0, error=f"its worker has version {VERSION}, and not {version}; install that")
     try:

@@ -15,6 +15,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
+from translucent.bake.memory import reuse_freed_memory
+
 #: Seconds that a worker process has for cleaning up when the work is canceled.
 PATIENCE = 5.0
 
@@ -111,6 +113,7 @@ def _begin() -> None:
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_follow_parent, daemon=True).start()
     warnings.simplefilter("ignore")  # results tell their warnings
+    reuse_freed_memory()
 
 
 def _follow_parent() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import sys
@@ -22,12 +23,16 @@ from translucent.extras import require_package
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+    from types import ModuleType
 
     from translucent.bake.jobs import Job, Progress, Results
     from translucent.bake.record import Record
 
 #: Steps of a progress bar.
 STEPS = 1000
+
+#: Seconds that a Dask scheduler has for an answer.
+CONNECT_SECONDS = 10
 
 
 @click.command(epilog="Example: translucent bake bear -o thickness.exr --size 128 --rays 16")
@@ -253,9 +258,18 @@ def _executor(address: str | None) -> Iterator[Executor | None]:
         return
     distributed = require_package("distributed", f"--dask {address}", "leave it out to bake on this machine")
     try:
-        client = distributed.Client(address, timeout="10s")
+        # A client that cannot connect leaves its loop running, with nothing to close it by.
+        asyncio.run(_knock(distributed, address))
+        client = distributed.Client(address, timeout=CONNECT_SECONDS)
     except (OSError, ValueError) as error:
         found = f"no scheduler answers ({error or type(error).__name__})"
         raise RenderError(f"--dask {address}", found, "check the address") from error
     with client:
         yield client.get_executor()
+
+
+async def _knock(distributed: ModuleType, address: str) -> None:
+    """Connect to a Dask scheduler, and leave; raises OSError or ValueError if none answers."""
+    security = distributed.Security().get_connection_args("client")
+    connection = await distributed.comm.connect(address, timeout=CONNECT_SECONDS, **security)
+    await connection.close()
