@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
@@ -413,6 +414,7 @@ def test_no_scheduler_is_a_plain_error(tmp_path: Path, capsys: pytest.CaptureFix
 #: The command line, which tells when its first rays are traced: then it is interrupted.
 TELLING = """
 import sys
+import threading
 from translucent.bake.strips import Strips
 from translucent.cli import main
 

@@ -13,9 +13,10 @@ import pytest
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.bake import canvas, measure, strips
-from translucent.bake.directions import DIGITS, Directions, _sobol_digits
+from translucent.bake.directions import Directions, _plain_sobol
 from translucent.bake.modes import RayMean, block_edges
 from translucent.bake.settings import BakeSettings
+from translucent.formulas.sampling import MOST_POINTS
 from translucent.geometry.solids import Box, Sphere, Torus
 
 MEDIUM = tl.Medium(absorption=(10.0, 20.0, 40.0))
@@ -94,11 +95,12 @@ def test_the_standard_error_is_an_upper_estimate(weighting: str, rays: int) -> N
         assert np.sqrt((errors**2).mean()) <= 1.2 * length.std() / np.sqrt(rays)
 
 
-def test_points_before_scrambling_are_those_of_scipy() -> None:
-    qmc = pytest.importorskip("scipy.stats.qmc")
-    with pytest.warns(UserWarning, match="balance"):
-        plain = qmc.Sobol(2, scramble=False, bits=DIGITS).random(10_000)
-    assert np.array_equal(_sobol_digits(10_000), plain * 2**DIGITS)
+def test_points_before_scrambling_go_on_beyond_the_stored_ones() -> None:
+    """A sequence of 5,000 points begins with the stored 4,096, and each of its blocks of 8 is in 8 different rows."""
+    points = _plain_sobol(5000)
+    assert np.array_equal(points[:MOST_POINTS], _plain_sobol(MOST_POINTS))
+    rows = np.floor(8 * points).astype(int).reshape(-1, 8, 2)
+    assert (np.sort(rows, axis=1) == np.arange(8)[:, None]).all()
 
 
 def test_directions_have_the_density_that_is_said() -> None:

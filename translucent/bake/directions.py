@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from translucent.arrays import Array, Floats
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points
+from translucent.formulas.sampling import MOST_POINTS, sobol_points
 from translucent.geometry.normals import CREASE
 
 #: Number of independently scrambled sets, and largest number of values in all of them.
@@ -94,7 +96,7 @@ def _sobol(count: int, sets: int, seed: int) -> Array:
     SciPy scrambles by a linear map and a shift, which leave blocks of the sequence so alike that they may have equal
     means; nested scrambling, in which each digit is turned or not by a coin of all digits before it, does not.
     """
-    digits = _sobol_digits(count)
+    digits = np.round(_plain_sobol(count) * 2**DIGITS).astype(np.uint64)
     keys = _mix(np.arange(2 * sets, dtype=np.uint64) + _mix(np.full(2 * sets, seed, dtype=np.uint64)))
     coins = keys.reshape(sets, 1, 2)
     scrambled = np.zeros((sets, count, 2), dtype=np.uint64)
@@ -109,22 +111,16 @@ def _sobol(count: int, sets: int, seed: int) -> Array:
     return found
 
 
-def _sobol_digits(count: int) -> npt.NDArray[np.uint64]:
-    """(count, 2): the first `DIGITS` binary digits of the first points of the plain Sobol sequence.
+def _plain_sobol(count: int) -> Array:
+    """(count, 2): the first points in 0..1 of the Sobol sequence: stored ones, as SciPy's statistics load slowly."""
+    if count <= MOST_POINTS:
+        return sobol_points(count)
+    from scipy.stats import qmc
 
-    In the order of Gray codes (Antonov and Saleev 1979), with the direction numbers of the first two dimensions of Joe
-    and Kuo (2008): those of `scipy.stats.qmc.Sobol`, whose import takes half as long as a small map.
-    """
-    index = np.arange(count, dtype=np.uint64)
-    gray = index ^ (index >> np.uint64(1))
-    digits = np.zeros((count, 2), dtype=np.uint64)
-    second = 1
-    for digit in range(DIGITS):
-        own = (gray >> np.uint64(digit)) & np.uint64(1)
-        digits[:, 0] ^= own << np.uint64(DIGITS - 1 - digit)
-        digits[:, 1] ^= own * np.uint64(second << (DIGITS - 1 - digit))
-        second ^= second << 1  # the recurrence of the primitive polynomial x + 1
-    return digits
+    with warnings.catch_warnings():
+        # SciPy warns that numbers other than powers of 2 lose the balance of the sequence; they are still well spread.
+        warnings.simplefilter("ignore", UserWarning)
+        return np.asarray(qmc.Sobol(2, scramble=False).random(count))
 
 
 def _in_cone(points: Array, half_angle: float, weighting: str) -> Floats:
