@@ -16,10 +16,11 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 from translucent.arrays import Array
 from translucent.diffusion.cells import CellSystem
 from translucent.diffusion.densities import cell_means
+from translucent.diffusion.dimming import path_inside
 from translucent.diffusion.entering import DIRECTIONS, environment_parts, even_directions, nearest_parts
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.photon_fluence import FineCells
-from translucent.diffusion.sweeps import swept
+from translucent.diffusion.sweeps import condensed, swept
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffusion_coefficient
 from translucent.formulas.lights import cone_attenuation
@@ -33,6 +34,9 @@ ORDINATES = 48
 
 #: Rounds, and the change at which they are enough.
 MOST_ROUNDS, ENOUGH = 8, 2e-2
+
+#: Largest share of a round's change that the next one may have.
+MOST_SHARE = 0.9
 
 #: Optical depth across a cell beyond which its medium counts as no denser.
 MOST_DEPTH = 2.0
@@ -109,6 +113,7 @@ class VolumeGrid:
         self.grid: BodyGrid = body_grid(body, step)
         self.density = self.grid.cells.inside * cell_means(body, self.grid)
         self.thickness = body.mean_thickness
+        self.body = body
 
     @property
     def inside(self) -> npt.NDArray[np.bool_]:
@@ -137,6 +142,8 @@ class DiffusingVolume:
         # Sweeps are right in cells that light gets through; in others diffusion is, and rounds would not end.
         self._resolved = 1.0 / (1.0 + (self._extinction * volume.grid.cells.step) ** 2)
         self._directions = even_directions(ORDINATES)
+        self._swept = condensed(self._extinction, self._directions, volume.grid.cells.step)
+        self._turned = self._swept - self._density[..., None] * np.asarray(medium.absorption)
         self._solid_angles = nearest_parts(self._directions)[1]
         self._systems = [
             None if scattering == 0.0 else _system(volume, self._density, absorption, scattering)
@@ -152,10 +159,10 @@ class DiffusingVolume:
         volume, medium = self._volume, self._medium
         sky = self._sky(scene)
         stops = None if photons is None else photons.stops
-        unturned, ahead = _from_lights(volume.grid, self._density, scene, medium, stops)
+        unturned, ahead = _from_lights(volume, self._density, scene, medium, stops)
         bent = 0.0 if photons is None else photons.cells.coarse(photons.fluence)
         emission = 4.0 * np.pi * self._density[..., None] * np.asarray(medium.emission)
-        scattered, steps = self._scattered(sky + unturned + bent, emission)
+        scattered, steps = self._scattered(sky, unturned + bent, emission)
         # Light that is scattered back more than ahead gets less deep than reduced coefficients say: what they add twice
         # is taken away, and no more than there is.
         found = np.maximum(sky + scattered + (1.0 - medium.anisotropy) * ahead, 0.0)
@@ -177,23 +184,32 @@ class DiffusingVolume:
         if not radiance.any():
             return np.zeros(self._extinction.shape)
         nothing = np.zeros(self._extinction.shape)
-        return swept(self._extinction, nothing, radiance, directions, solid_angles, self._volume.grid.cells.step)
+        return swept(self._swept, nothing, radiance, directions, solid_angles, self._volume.grid.cells.step)
 
-    def _scattered(self, first: Array, emission: Array) -> tuple[Array, int]:
+    def _scattered(self, sky: Array, unturned: Array, emission: Array) -> tuple[Array, int]:
         """Fluence of light that has been scattered or emitted, (x, y, z, 3), and steps of the solver."""
-        step, density = self._volume.grid.cells.step, self._density[..., None]
+        step = self._volume.grid.cells.step
         dark = np.zeros((ORDINATES, 3))
-        fluence, steps = self._diffused(density * self._reduced * first + emission)
+        first = self._turned * sky + self._density[..., None] * self._reduced * unturned + emission
+        fluence, steps = self._diffused(first)
+        before = np.zeros_like(fluence)
         for _ in range(MOST_ROUNDS):
-            source = density * self._reduced * (first + fluence) + emission
-            better = swept(self._extinction, source / (4.0 * np.pi), dark, self._directions, self._solid_angles, step)
-            changed = self._resolved * (better - fluence)
+            source = (first + self._turned * fluence) / (4.0 * np.pi)
+            found = swept(self._swept, source, dark, self._directions, self._solid_angles, step)
+            changed = self._resolved * (found - fluence)
             # What the round has changed scatters again: diffusion finds where that goes.
-            rest, taken = self._diffused(density * self._reduced * changed)
-            better = np.maximum(fluence + changed + rest, 0.0)
-            change = np.abs(better - fluence).max(initial=0.0)
-            fluence, steps = better, steps + taken
-            if change <= ENOUGH * fluence.max(initial=0.0):
+            rest, taken = self._diffused(self._turned * changed)
+            steps += taken
+            change = changed + rest
+            # Of what changed the last time this share changes now, in each channel: so much is still to come, as light
+            # in a hollow, of which diffusion does not know, goes to and fro.
+            share = (change * before).sum(axis=(0, 1, 2)) / np.maximum((before**2).sum(axis=(0, 1, 2)), _STILL**2)
+            share = np.clip(share, 0.0, MOST_SHARE)
+            better = np.maximum(fluence + change / (1.0 - share), 0.0)
+            before = np.where(share > 0.0, 0.0, change)
+            left = np.abs(better - fluence).max(initial=0.0)
+            fluence = better
+            if left <= ENOUGH * fluence.max(initial=0.0):
                 break
         return fluence, steps
 
@@ -233,12 +249,13 @@ def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: flo
 
 
 def _from_lights(
-    grid: BodyGrid, density: Array, scene: Scene, medium: Medium, stops: EmbreeMesh | None = None
+    volume: VolumeGrid, density: Array, scene: Scene, medium: Medium, stops: EmbreeMesh | None = None
 ) -> tuple[Array, Array]:
     """(x, y, z, 3) twice: fluence of lights that nothing has turned aside, and of that what was scattered ahead.
 
     `stops` are surfaces that none of it passes.
     """
+    grid, body = volume.grid, volume.body
     unturned, ahead = np.zeros((2, *density.shape, 3))
     reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
     cells, inside = grid.cells, grid.number >= 0
@@ -259,7 +276,8 @@ def _from_lights(
         # From the edge of the cell on, the mean over it: of what lets nothing through, all that gets in.
         way = np.abs(place - points)
         own = density[inside] * cells.step * np.linalg.norm(way, axis=1) / np.maximum(way.max(axis=1), _STILL)
-        before = np.maximum(_column(grid, density, points, place) - 0.5 * own, 0.0)
+        column = _column(grid, density, points, place) if body.density is not None else _way_inside(body, points, place)
+        before = np.maximum(column - 0.5 * own, 0.0)
         turned, all_turned = (
             power * optics.transmittance(sigma * before[:, None]) * optics.mean_transmittance(sigma * own[:, None])
             for sigma in (reduced, np.asarray(medium.extinction))
@@ -285,6 +303,13 @@ def _mean_shares(light: SpotLight, points: Array, step: float) -> Array:
         way = points + offset - np.asarray(light.position)
         total += cone_attenuation(way / np.maximum(np.linalg.norm(way, axis=1), _STILL * step)[:, None], light.cone)
     return np.asarray(total / _BEAM_PLACES**3)
+
+
+def _way_inside(body: Object, points: Array, places: Array) -> Array:
+    """(k,): metres in a body between points (k, 3) and places (k, 3): a grid would smear its surface."""
+    way = places - points
+    distance = np.linalg.norm(way, axis=1)
+    return path_inside(body, points, way / np.maximum(distance, np.finfo(np.float64).tiny)[:, None], distance)
 
 
 def _column(grid: BodyGrid, density: Array, points: Array, places: Array) -> Array:
