@@ -33,10 +33,10 @@ from translucent.scene.scene import Object, Scene
 ORDINATES = 48
 
 #: Rounds, and the change at which they are enough.
-MOST_ROUNDS, ENOUGH = 8, 2e-2
+MOST_ROUNDS, ENOUGH = 8, 1e-2
 
-#: Largest share of a round's change that the next one may have.
-MOST_SHARE = 0.9
+#: Rounds before the last one of which the next start is a mixture.
+MIXED = 2
 
 #: Optical depth across a cell beyond which its medium counts as no denser.
 MOST_DEPTH = 2.0
@@ -192,7 +192,7 @@ class DiffusingVolume:
         dark = np.zeros((ORDINATES, 3))
         first = self._turned * sky + self._density[..., None] * self._reduced * unturned + emission
         fluence, steps = self._diffused(first)
-        before = np.zeros_like(fluence)
+        mixed = _Mixed()
         for _ in range(MOST_ROUNDS):
             source = (first + self._turned * fluence) / (4.0 * np.pi)
             found = swept(self._swept, source, dark, self._directions, self._solid_angles, step)
@@ -200,16 +200,10 @@ class DiffusingVolume:
             # What the round has changed scatters again: diffusion finds where that goes.
             rest, taken = self._diffused(self._turned * changed)
             steps += taken
-            change = changed + rest
-            # Of what changed the last time this share changes now, in each channel: so much is still to come, as light
-            # in a hollow, of which diffusion does not know, goes to and fro.
-            share = (change * before).sum(axis=(0, 1, 2)) / np.maximum((before**2).sum(axis=(0, 1, 2)), _STILL**2)
-            share = np.clip(share, 0.0, MOST_SHARE)
-            better = np.maximum(fluence + change / (1.0 - share), 0.0)
-            before = np.where(share > 0.0, 0.0, change)
-            left = np.abs(better - fluence).max(initial=0.0)
+            better = np.maximum(mixed.next(fluence, changed + rest), 0.0)
+            change = np.abs(better - fluence).max(initial=0.0)
             fluence = better
-            if left <= ENOUGH * fluence.max(initial=0.0):
+            if change <= ENOUGH * fluence.max(initial=0.0):
                 break
         return fluence, steps
 
@@ -222,6 +216,32 @@ class DiffusingVolume:
                 fluence[inside, channel] = found
                 steps += taken
         return fluence, steps
+
+
+class _Mixed:
+    """Starts of rounds, mixed from those of before so that what the last one changes would be least (Anderson 1965).
+
+    Light in a hollow, of which diffusion does not know, goes to and fro many times: by itself each round follows it
+    once.
+    """
+
+    def __init__(self) -> None:
+        self._rounds: list[tuple[Array, Array]] = []
+
+    def next(self, start: Array, change: Array) -> Array:
+        """Start (x, y, z, 3) of the next round, after one that has changed its own by this."""
+        found = start + change
+        if self._rounds:
+            for channel in range(3):
+                own, changed = start[..., channel].ravel(), change[..., channel].ravel()
+                starts, changes = (
+                    np.stack([last - each[k][..., channel].ravel() for each in self._rounds], axis=1)
+                    for k, last in enumerate((own, changed))
+                )
+                shares = np.linalg.lstsq(changes, changed)[0]
+                found[..., channel] -= ((starts + changes) @ shares).reshape(found.shape[:3])
+        self._rounds = [*self._rounds, (start, change)][-MIXED:]
+        return found
 
 
 def _finer(values: Array, times: int) -> Array:
@@ -274,9 +294,13 @@ def _from_lights(
         if stops is not None:
             power = np.where(_in_the_way(stops, points, place)[:, None], 0.0, power)
         # From the edge of the cell on, the mean over it: of what lets nothing through, all that gets in.
-        way = np.abs(place - points)
-        own = density[inside] * cells.step * np.linalg.norm(way, axis=1) / np.maximum(way.max(axis=1), _STILL)
-        column = _column(grid, density, points, place) if body.density is not None else _way_inside(body, points, place)
+        own = density[inside] * cells.step
+        if body.density is None:
+            column = _way_inside(body, points, place)
+        else:
+            way = np.abs(place - points)
+            own = own * np.linalg.norm(way, axis=1) / np.maximum(way.max(axis=1), _STILL)
+            column = _column(grid, density, points, place)
         before = np.maximum(column - 0.5 * own, 0.0)
         turned, all_turned = (
             power * optics.transmittance(sigma * before[:, None]) * optics.mean_transmittance(sigma * own[:, None])
