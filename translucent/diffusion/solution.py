@@ -18,11 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from translucent.arrays import Array
 from translucent.diffusion.cells import CellSystem
 from translucent.diffusion.densities import Densities, even_densities
-from translucent.diffusion.first_events import Beam, FirstEvents, Layer, Ways, diffuse_ways, ways_of
+from translucent.diffusion.first_events import Beam, FirstEvents, Layer, Ways, diffuse_ways, scattered_shares, ways_of
 from translucent.diffusion.grid import BodyGrid
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient
@@ -33,6 +34,9 @@ MOST_BOUNCES, ENOUGH = 24, 1e-3
 
 #: Largest share of the light that may come back to the surface: of what would, a hundred times as much is to come.
 MOST_SHARE = 0.99
+
+#: Samples over which the correction by uniform light is found together, and its bounds.
+TOGETHER, LEAST_CORRECTION, MOST_CORRECTION = 6, 0.5, 2.0
 
 #: Least share of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
@@ -156,7 +160,7 @@ class _Channel:
         self._exit_share = interface.exit_share
         self._mirrored = (1.0 - diffuse_interface(ior).entering) / interface.entering
         extinction = absorption + scattering
-        self._albedo = scattering / extinction
+        self._albedo, self._extinction, self._dense = scattering / extinction, extinction, dense
         d = float(diffusion_coefficient(absorption, scattering))
         self._read, depth = grid.below[0], dense.depth
         layer = Layer(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
@@ -176,6 +180,26 @@ class _Channel:
         absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
         absorbed = absorption * dense.cells * absorbing
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
+        self._correction = self._by_uniform_light(ior, absorption, interface.entering)
+
+    def _by_uniform_light(self, ior: float, absorption: float, entering: float) -> Array:
+        """(s,): factors of the fluence that make uniform light what it is.
+
+        In a body as warm as a black room all light has the same radiance, whatever its shape (Kirchhoff 1860): of what
+        leaves, the albedo's share has been scattered last, but for what comes straight through. Diffusion sends too
+        much of it out of parts no thicker than a free path, and too little out of folds.
+        """
+        flux, emission = np.pi * entering, 4.0 * np.pi * absorption * ior**2 * self._albedo
+        even = np.full(len(self._grid.points), flux)
+        cells, _ = self._cells.solved(self._into_cells @ even + emission * self._glow_cells)
+        found = (self._read @ cells) * self._attenuated + self._near * even + emission * self._glow_near
+        wanted = scattered_shares(self._grid, self._dense, ior, self._extinction)
+        nearest = cKDTree(self._grid.points).query(self._grid.points, min(TOGETHER, len(even)))[1]
+        found, wanted = (np.reshape(values[nearest], (len(even), -1)).mean(axis=1) for values in (found, wanted))
+        # What leaves in all is right: corrections for half-spaces have seen to that.
+        least = np.finfo(np.float64).tiny
+        share = wanted / max(wanted.sum(), least) * found.sum() / np.maximum(found, least)
+        return np.asarray(np.clip(share, LEAST_CORRECTION, MOST_CORRECTION))
 
     def beamed(self, channel: int, beams: Sequence[Beam], ways: Sequence[Ways]) -> _Beamed:
         """First events of beams, of which each goes its ways."""
@@ -206,6 +230,7 @@ class _Channel:
             cells, taken = self._cells.solved(self._into_cells @ flux + inside)
             steps += taken
             fluence = np.maximum((self._read @ cells) * self._attenuated + self._near * flux + glow, 0.0)
+            fluence *= self._correction
             # What the surface mirrors goes on as if it was diffuse.
             leaving = self._exit_share * fluence + self._mirrored * flux + straight.mirrored
             change = entering + from_itself @ leaving - flux
