@@ -16,7 +16,7 @@ from scipy import sparse
 
 from translucent.arrays import Array, Integers
 from translucent.diffusion.densities import Densities
-from translucent.diffusion.grid import BodyGrid, box_points, other_plane_points
+from translucent.diffusion.grid import BodyGrid, box_points
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
     diffuse_interface,
@@ -27,12 +27,6 @@ from translucent.formulas.diffuse_interface import (
 
 #: First events above the depth at which the fluence is read, and below it, for each sample.
 EVENTS, DEEP_EVENTS = 4, 2
-
-#: Ways below each sample on which it is measured what leaves unscattered.
-MEASURED_WAYS = 4
-
-#: Distance from the surface, in cells, up to which all ways are inside.
-_NEXT = 0.7
 
 #: Share of the light below which no first events are looked for.
 _NOTHING = 1e-3
@@ -135,7 +129,7 @@ class Ways:
 
 def diffuse_ways(grid: BodyGrid, dense: Densities, ior: float) -> Ways:
     """One way below each sample, as uniform light from outside has them."""
-    directions, samples = first_ways(grid, ior), np.arange(len(grid.points))
+    directions, samples = grid.ways(ior), np.arange(len(grid.points))
     return Ways(samples, directions, diffuse_interface(ior).mean_cosine, True, dense.lengths(samples, directions))
 
 
@@ -268,38 +262,10 @@ def tails(samples: int) -> Array:
 def scattered_shares(grid: BodyGrid, dense: Densities, ior: float, extinction: float) -> Array:
     """(s,): share of uniform light that is scattered before it leaves, of what enters at each sample of a body.
 
-    As much of what leaves there has been scattered: ways are the same in both directions. `EVENTS` on each of
-    `MEASURED_WAYS`.
+    As much of what leaves there has been scattered: ways are the same in both directions.
     """
-    count = len(grid.points)
-    shift, samples = np.arange(count) * 0.7548776662466927, np.arange(count)
-    shares = np.zeros(count)
-    for number in range(MEASURED_WAYS):
-        ways = first_ways(grid, ior, number)
-        length = dense.lengths(samples, ways)
-        for part in range(EVENTS):
-            quantile = ((shift + 0.37 * number) % 1.0 + part) / EVENTS
-            metres = length(-np.log1p(-quantile) / extinction)
-            _, inside = grid.cell_at(grid.points + metres[:, None] * ways)
-            # Next to where it has come in a cell is no answer.
-            shares += (inside > 0.5) | (metres < _NEXT * grid.cells.step)
-    return shares / (MEASURED_WAYS * EVENTS)
-
-
-def first_ways(grid: BodyGrid, ior: float, number: int = 0) -> Array:
-    """(s, 3): a direction inside for each sample, as uniform light from outside has them; others for each number."""
-    # Not the numbers by which the samples lie on large triangles: there, light would come from one side alone.
-    first, second = other_plane_points(len(grid.points)).T
-    first, second = (first + number / MEASURED_WAYS) % 1.0, (second + 0.618 * number) % 1.0
-    cosine = optics.refracted_cosine(np.sqrt(first), ior)
-    normal = grid.face_normals
-    aside = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    across = np.cross(normal, aside)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    along = np.cross(normal, across)
-    angle, level = 2.0 * np.pi * second, np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-    sideways = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * along
-    return np.asarray(level[:, None] * sideways - cosine[:, None] * normal)
+    ways, metres = grid.crossings(ior)
+    return np.mean([optics.opacity(extinction * dense.along(way, to)) for way, to in zip(ways, metres, strict=True)], 0)
 
 
 def half_space_excess(albedo: float, ior: float, cosine: Array | None = None) -> Array | float:

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from translucent.arrays import Array
 from translucent.diffusion.cells import CellSystem
@@ -26,7 +25,7 @@ from translucent.diffusion.densities import Densities, even_densities
 from translucent.diffusion.first_events import Beam, FirstEvents, Layer, Ways, diffuse_ways, scattered_shares, ways_of
 from translucent.diffusion.grid import BodyGrid
 from translucent.formulas import optics
-from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient
+from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient, half_space_reflectance
 from translucent.media.medium import Medium
 
 #: Largest number of times that light of the body falls on the body again, and the change at which it is enough.
@@ -35,8 +34,8 @@ MOST_BOUNCES, ENOUGH = 24, 1e-3
 #: Largest share of the light that may come back to the surface: of what would, a hundred times as much is to come.
 MOST_SHARE = 0.99
 
-#: Samples over which the correction by uniform light is found together, and its bounds.
-TOGETHER, LEAST_CORRECTION, MOST_CORRECTION = 6, 0.5, 2.0
+#: Bounds of the correction by uniform light.
+LEAST_CORRECTION, MOST_CORRECTION = 0.5, 2.0
 
 #: Least share of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
@@ -155,12 +154,14 @@ class _Channel:
         dense: Densities,
         ways: Ways,
         anisotropy: float = 0.0,
+        *,
+        uneven: bool = True,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
         self._exit_share = interface.exit_share
         self._mirrored = (1.0 - diffuse_interface(ior).entering) / interface.entering
         extinction = absorption + scattering
-        self._albedo, self._extinction, self._dense = scattering / extinction, extinction, dense
+        self._albedo = scattering / extinction
         d = float(diffusion_coefficient(absorption, scattering))
         self._read, depth = grid.below[0], dense.depth
         layer = Layer(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
@@ -180,23 +181,25 @@ class _Channel:
         absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
         absorbed = absorption * dense.cells * absorbing
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
-        self._correction = self._by_uniform_light(ior, absorption, interface.entering)
+        self._correction = np.ones(len(depth))
+        if uneven:
+            lossless = _Channel(grid, ior, roughness, 0.0, extinction, dense, ways, uneven=False)
+            # What half-spaces absorb has not been in the body long enough to get to other parts of it.
+            share = half_space_reflectance(round(self._albedo, 6), ior)
+            found = lossless.by_uniform_light(scattered_shares(grid, dense, ior, extinction))
+            self._correction = 1.0 + share * (found - 1.0)
 
-    def _by_uniform_light(self, ior: float, absorption: float, entering: float) -> Array:
-        """(s,): factors of the fluence that make uniform light what it is.
+    def by_uniform_light(self, scattered: Array) -> Array:
+        """(s,): factors of the fluence that make uniform light around a lossless body what it is.
 
-        In a body as warm as a black room all light has the same radiance, whatever its shape (Kirchhoff 1860): of what
-        leaves, the albedo's share has been scattered last, but for what comes straight through. Diffusion sends too
-        much of it out of parts no thicker than a free path, and too little out of folds.
+        Such a body is invisible, whatever its shape: of what leaves, all has been `scattered` (s,) but for what comes
+        straight through. Diffusion sends too much of it out of parts no thicker than a free path, and too little out
+        of folds.
         """
-        flux, emission = np.pi * entering, 4.0 * np.pi * absorption * ior**2 * self._albedo
-        even = np.full(len(self._grid.points), flux)
-        cells, _ = self._cells.solved(self._into_cells @ even + emission * self._glow_cells)
-        found = (self._read @ cells) * self._attenuated + self._near * even + emission * self._glow_near
-        wanted = scattered_shares(self._grid, self._dense, ior, self._extinction)
-        nearest = cKDTree(self._grid.points).query(self._grid.points, min(TOGETHER, len(even)))[1]
-        found, wanted = (np.reshape(values[nearest], (len(even), -1)).mean(axis=1) for values in (found, wanted))
-        # What leaves in all is right: corrections for half-spaces have seen to that.
+        even = np.ones(len(self._grid.points))
+        found = (self._read @ self._cells.rough(self._into_cells @ even)) * self._attenuated + self._near * even
+        found, wanted = (values[self._grid.nearest].mean(axis=1) for values in (found, scattered))
+        # What leaves in all is right.
         least = np.finfo(np.float64).tiny
         share = wanted / max(wanted.sum(), least) * found.sum() / np.maximum(found, least)
         return np.asarray(np.clip(share, LEAST_CORRECTION, MOST_CORRECTION))
