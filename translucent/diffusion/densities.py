@@ -62,7 +62,9 @@ class Densities:
         cells = self._grid.cells
         start = (self._grid.points - cells.low) / cells.step - 0.5
         places = (start + (share * metres / cells.step)[:, None] * ways for share in _WAY_PLACES)
-        return np.asarray(metres * np.mean([map_coordinates(self._means, at.T, order=1, mode="nearest") for at in places], axis=0))
+        return np.asarray(
+            metres * np.mean([map_coordinates(self._means, at.T, order=1, mode="nearest") for at in places], axis=0)
+        )
 
     def lengths(self, samples: Integers, ways: Array) -> Callable[[Array], Array]:
         """Function from integrals of the density (k,), in m, on ways (k, 3) from samples (k,), to metres (k,)."""

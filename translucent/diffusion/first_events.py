@@ -265,7 +265,8 @@ def scattered_shares(grid: BodyGrid, dense: Densities, ior: float, extinction: f
     As much of what leaves there has been scattered: ways are the same in both directions.
     """
     ways, metres = grid.crossings(ior)
-    return np.mean([optics.opacity(extinction * dense.along(way, to)) for way, to in zip(ways, metres, strict=True)], 0)
+    shares = [optics.opacity(extinction * dense.along(way, to)) for way, to in zip(ways, metres, strict=True)]
+    return np.asarray(np.mean(shares, axis=0))
 
 
 def half_space_excess(albedo: float, ior: float, cosine: Array | None = None) -> Array | float:

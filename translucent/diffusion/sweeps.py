@@ -64,9 +64,9 @@ def condensed(extinction: Array, directions: Array, step: float) -> Array:
     crosses n edges of cells of a depth x with E[n] = m / x and E[n^2] = coth(x / 2 m) m / x, and is moved aside by t
     cells, or by 1 with that chance, at each. The mean square of the way, in cells, is E[n^2] / m^2 + E[n] sum t (1 - t),
     so that the diffusion coefficient, x / 6 times as much, is (2 / x + S + B x) / 6 up to x^2, with the means
-    S of m sum t (1 - t) and B of 1 / 6 m^2 over the directions. It has to be 1 / 3 tau, where tau is the true depth of a
-    cell. Then light that starts anywhere has the right power, and the right mean square of its way, whatever is absorbed.
-    From about tau = 1.2 on there is no such depth: then the one with the shortest ways is it.
+    S of m sum t (1 - t) and B of 1 / 6 m^2 over the directions. It has to be 1 / 3 tau, where tau is the true depth of
+    a cell. Then light that starts anywhere has the right power, and the right mean square of its way, whatever is
+    absorbed. From about tau = 1.2 on there is no such depth: then the one with the shortest ways is it.
 
     The same is done for lattice gases (Henon 1987, "Viscosity of a lattice gas").
     """
