@@ -81,8 +81,8 @@ def test_lossless_bodies_vanish_in_white_light(
 
     Not to 1e-3: the formula of the light that leaves is right in its sum over directions, and for each of them within
     1.2 % for this index. Measured, mean and worst: .7 % and 1.6 %, 0 and .7 % for balls; -1.4 % and 13 %, 0 and .9 %,
-    .1 % and .8 % for bears. Of those as deep as a few mean free paths the ears are the worst: 17 % before the light that
-    leaves was corrected by what uniform light is.
+    .1 % and .8 % for bears. Of those as deep as a few mean free paths the ears are the worst: 17 % before the light
+    that leaves was corrected by what uniform light is.
     """
     shape = BALL if mesh == "ball" else tl.load_mesh(mesh_path("bear"))
     white = tl.Medium(scattering=2 * depth / shape.diagonal, ior=1.4)

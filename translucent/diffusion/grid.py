@@ -94,7 +94,7 @@ class BodyGrid:
         return np.reshape(cKDTree(self.points).query(self.points, min(TOGETHER, count))[1], (count, -1))
 
     def crossings(self, ior: float) -> tuple[Array, Array]:
-        """(w, s, 3), (w, s): ways below each sample, as uniform light from outside has them, and metres to their ends."""
+        """(w, s, 3), (w, s): `ways` below each sample, and metres to where they leave the body."""
         if ior not in self._crossings:
             start = self.points - START * self.cells.step * self.face_normals
             into, embree = np.linalg.inv(self.body.matrix), embree_mesh(self.body.mesh)

@@ -61,8 +61,8 @@ def condensed(extinction: Array, directions: Array, step: float) -> Array:
 
     In a sweep light is scattered on from anywhere in the cell where it was scattered, and gets into several cells of
     each slice: from event to event it goes too far. Along a direction of largest component m, with tangents t aside, it
-    crosses n edges of cells of a depth x with E[n] = m / x and E[n^2] = coth(x / 2 m) m / x, and is moved aside by t
-    cells, or by 1 with that chance, at each. The mean square of the way, in cells, is E[n^2] / m^2 + E[n] sum t (1 - t),
+    crosses n edges of cells of a depth x with E[n] = m / x and E[n^2] = coth(x / 2 m) m / x, and is moved aside
+    by 1 with a chance t at each. The mean square of the way, in cells, is E[n^2] / m^2 + E[n] sum t (1 - t),
     so that the diffusion coefficient, x / 6 times as much, is (2 / x + S + B x) / 6 up to x^2, with the means
     S of m sum t (1 - t) and B of 1 / 6 m^2 over the directions. It has to be 1 / 3 tau, where tau is the true depth of
     a cell. Then light that starts anywhere has the right power, and the right mean square of its way, whatever is
