@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from translucent.diffusion.entering import even_directions, nearest_parts
-from translucent.diffusion.sweeps import swept
+from translucent.diffusion.sweeps import condensed, swept
 
 STEP = 0.25
 SHAPE = (6, 5, 7)
@@ -66,3 +66,37 @@ def test_a_turned_grid_has_turned_light() -> None:
     grids = [np.flip(values.transpose(*order, 3), (1, 2)) for values in (extinction, emission, plain)]
     found = swept(grids[0], grids[1], arriving, turned, weights, STEP)
     np.testing.assert_allclose(found, grids[2], rtol=ROUNDING)
+
+
+@np.errstate(under="ignore")
+def test_all_that_is_sent_out_is_taken_somewhere() -> None:
+    """Within matter that lets nothing out of the grid, however uneven it is inside."""
+    rng = np.random.default_rng(4)
+    extinction = np.full((9, 9, 9, 3), 200.0)
+    extinction[2:7, 2:7, 2:7] = rng.uniform(0.0, 3.0, (5, 5, 5, 3))
+    emission = np.zeros_like(extinction)
+    emission[3:6, 3:6, 3:6] = rng.uniform(0.0, 1.0, (3, 3, 3, 3))
+    directions = even_directions(48)
+    weights = nearest_parts(directions)[1]
+    found = swept(extinction, emission, np.zeros((48, 3)), directions, weights, STEP)
+    sent = 4.0 * np.pi * emission.sum(axis=(0, 1, 2))
+    np.testing.assert_allclose((extinction * found).sum(axis=(0, 1, 2)), sent, rtol=1e-4)
+
+
+@pytest.mark.parametrize("depth", [0.3, 1.0])
+@np.errstate(under="ignore")
+def test_light_gets_as_far_as_it_does(depth: float) -> None:
+    """From event to event, the mean square of a way is 2 / sigma^2; where events are closer, that much less."""
+    directions = even_directions(48)
+    weights = nearest_parts(directions)[1]
+    middle = 15 if depth > 0.5 else 30
+    sigma = np.full((1, 1, 1, 3), depth / STEP)
+    events = float(condensed(sigma, directions, STEP)[0, 0, 0, 0])
+    extinction = np.full((2 * middle + 1,) * 3 + (3,), events)
+    emission = np.zeros_like(extinction)
+    emission[middle, middle, middle] = 1.0
+    found = swept(extinction, emission, np.zeros((48, 3)), directions, weights, STEP)[..., 0]
+    place = STEP * (np.arange(2 * middle + 1) - middle)
+    square = sum(axis**2 for axis in np.meshgrid(place, place, place))
+    assert (found * square).sum() / found.sum() == pytest.approx(2.0 / (events * depth / STEP), rel=0.02)
+    assert condensed(np.zeros(3), directions, STEP).max() == 0.0

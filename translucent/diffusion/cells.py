@@ -14,6 +14,9 @@ from translucent.errors import RenderError
 #: Relative residual at which a solution is good enough: far below what diffusion itself gets wrong.
 TOLERANCE = 1e-4
 
+#: The same for factors that are near 1.
+ROUGH = 1e-3
+
 #: Steps after which conjugate gradients are given up.
 MOST_STEPS = 4000
 
@@ -46,24 +49,31 @@ class CellSystem:
         RenderError
             If the solver does not get there.
         """
+        wanted = source * self._scale
+        found, steps = self._found(wanted, self._known.nearest(wanted), TOLERANCE)
+        if steps:
+            self._known.add(found)
+        return np.asarray(found * self._scale), steps
+
+    def rough(self, source: Array) -> Array:
+        """Fluence (cells,) for powers (cells,), to a hundredth, from which no other solution starts."""
+        return np.asarray(self._found(source * self._scale, None, ROUGH)[0] * self._scale)
+
+    def _found(self, wanted: Array, near: Array | None, tolerance: float) -> tuple[Array, int]:
         steps = 0
 
         def count(_: Array) -> None:
             nonlocal steps
             steps += 1
 
-        wanted = source * self._scale
-        near = self._known.nearest(wanted)
-        found, failed = cg(self._matrix, wanted, x0=near, rtol=TOLERANCE, maxiter=MOST_STEPS, callback=count)
+        found, failed = cg(self._matrix, wanted, x0=near, rtol=tolerance, maxiter=MOST_STEPS, callback=count)
         if failed:
             raise RenderError(
                 "diffusion in a body",
-                f"the solver is not there after {MOST_STEPS} steps in {len(source)} cells",
+                f"the solver is not there after {MOST_STEPS} steps in {len(wanted)} cells",
                 "render with scattering=tl.ScatteringLayer()",
             )
-        if steps:
-            self._known.add(found)
-        return np.asarray(found * self._scale), steps
+        return np.asarray(found), steps
 
 
 def _balance(grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> sparse.csr_array:

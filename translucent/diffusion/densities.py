@@ -22,6 +22,9 @@ _PLACES = (0.25, 0.75)
 #: Places between the surface and the depth of reading at which the density is looked at.
 _LAYER_PLACES = (np.arange(4) + 0.5) / 4
 
+#: Places on a way through the body at which the density is looked at.
+_WAY_PLACES = (np.arange(12) + 0.5) / 12
+
 #: Pieces of each way of entering light, from the surface to the end of the grid.
 _PIECES = 48
 
@@ -51,6 +54,17 @@ class Densities:
         """(cells,): diffusion coefficients in m of a medium that has `d` where the density is 1."""
         densest = float(self.cells.max(initial=0.0))
         return np.asarray(d / np.maximum(self.cells, min(d / self.longest, densest or np.inf)))
+
+    def along(self, ways: Array, metres: Array) -> Array:
+        """(s,): integral of the density in m on ways (s, 3) from all samples, up to metres (s,)."""
+        if self._means is None:
+            return metres
+        cells = self._grid.cells
+        start = (self._grid.points - cells.low) / cells.step - 0.5
+        places = (start + (share * metres / cells.step)[:, None] * ways for share in _WAY_PLACES)
+        return np.asarray(
+            metres * np.mean([map_coordinates(self._means, at.T, order=1, mode="nearest") for at in places], axis=0)
+        )
 
     def lengths(self, samples: Integers, ways: Array) -> Callable[[Array], Array]:
         """Function from integrals of the density (k,), in m, on ways (k, 3) from samples (k,), to metres (k,)."""

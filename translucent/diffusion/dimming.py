@@ -40,7 +40,7 @@ def light_passed(bodies: Sequence[Object], points: Array, directions: Array, dis
     depth = np.zeros((len(points), 3))
     for body in bodies:
         assert body.medium is not None
-        depth += _path(body, points, directions, distance)[:, None] * np.asarray(body.medium.extinction)
+        depth += path_inside(body, points, directions, distance)[:, None] * np.asarray(body.medium.extinction)
     return optics.transmittance(depth)
 
 
@@ -52,7 +52,7 @@ def sky_paths(body: Object, points: Array, directions: Array, seen: Mask) -> spa
     near = (towards**2).sum(axis=1)[:, None] - along**2 <= radius**2
     within = (towards**2).sum(axis=1) <= radius**2
     sample, direction = np.nonzero(seen & near & ((along > 0.0) | within[:, None]))
-    metres = _path(body, points[sample], directions[direction], np.full(len(sample), np.inf))
+    metres = path_inside(body, points[sample], directions[direction], np.full(len(sample), np.inf))
     crossed = metres > 0.0
     return sparse.csr_array((metres[crossed], (sample[crossed], direction[crossed])), seen.shape)
 
@@ -64,7 +64,7 @@ def _bounding_ball(body: Object) -> tuple[Array, float]:
     return center, float(np.sqrt(((corners - center) ** 2).sum(axis=1).max()))
 
 
-def _path(body: Object, points: Array, directions: Array, distance: Array) -> Array:
+def path_inside(body: Object, points: Array, directions: Array, distance: Array) -> Array:
     """(k,): metres inside a body on ways, from where faces are crossed: exits are ahead of every start inside."""
     mesh = body.mesh
     embree = embree_mesh(mesh)

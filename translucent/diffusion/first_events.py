@@ -16,7 +16,7 @@ from scipy import sparse
 
 from translucent.arrays import Array, Integers
 from translucent.diffusion.densities import Densities
-from translucent.diffusion.grid import BodyGrid, box_points, other_plane_points
+from translucent.diffusion.grid import BodyGrid, box_points
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
     diffuse_interface,
@@ -129,7 +129,7 @@ class Ways:
 
 def diffuse_ways(grid: BodyGrid, dense: Densities, ior: float) -> Ways:
     """One way below each sample, as uniform light from outside has them."""
-    directions, samples = first_ways(grid, ior), np.arange(len(grid.points))
+    directions, samples = grid.ways(ior), np.arange(len(grid.points))
     return Ways(samples, directions, diffuse_interface(ior).mean_cosine, True, dense.lengths(samples, directions))
 
 
@@ -259,19 +259,14 @@ def tails(samples: int) -> Array:
     return np.asarray((np.arange(DEEP_EVENTS)[:, None] + shift) / DEEP_EVENTS)
 
 
-def first_ways(grid: BodyGrid, ior: float) -> Array:
-    """(s, 3): a direction inside for each sample, as uniform light from outside has them."""
-    # Not the numbers by which the samples lie on large triangles: there, light would come from one side alone.
-    first, second = other_plane_points(len(grid.points)).T
-    cosine = optics.refracted_cosine(np.sqrt(first), ior)
-    normal = grid.face_normals
-    aside = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    across = np.cross(normal, aside)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    along = np.cross(normal, across)
-    angle, level = 2.0 * np.pi * second, np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-    sideways = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * along
-    return np.asarray(level[:, None] * sideways - cosine[:, None] * normal)
+def scattered_shares(grid: BodyGrid, dense: Densities, ior: float, extinction: float) -> Array:
+    """(s,): share of uniform light that is scattered before it leaves, of what enters at each sample of a body.
+
+    As much of what leaves there has been scattered: ways are the same in both directions.
+    """
+    ways, metres = grid.crossings(ior)
+    shares = [optics.opacity(extinction * dense.along(way, to)) for way, to in zip(ways, metres, strict=True)]
+    return np.asarray(np.mean(shares, axis=0))
 
 
 def half_space_excess(albedo: float, ior: float, cosine: Array | None = None) -> Array | float:

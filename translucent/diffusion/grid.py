@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Integers, Mask
+from translucent.diffusion.dimming import embree_mesh
+from translucent.formulas import optics
 from translucent.geometry.normals import corner_normals
 from translucent.geometry.voxels import Voxels, voxels
 from translucent.scene.scene import Object
@@ -29,6 +32,12 @@ LEAST_AROUND = 0.55
 
 #: Shortest distance between the centers of two cells, and least depth, in cells.
 LEAST_LENGTH, LEAST_DEPTH = 0.3, 0.1
+
+#: Ways below each sample on which it is measured what leaves unscattered, and their start below it, in cells.
+WAYS, START = 8, 1e-4
+
+#: Samples next to each other for which something is found together.
+TOGETHER = 6
 
 #: Places in each layer between the surface and the depth of reading at which its volume is counted.
 _LAYER_PLACES = (np.arange(4) + 0.5) / 4
@@ -66,6 +75,7 @@ class BodyGrid:
         Sample points on the surface, spread evenly.
     area : float
         Of the surface, that each sample stands for, in m^2.
+    body : Object
     """
 
     cells: Voxels
@@ -74,6 +84,45 @@ class BodyGrid:
     face_normals: Array
     normals: Array
     area: float
+    body: Object
+    _crossings: dict[float, tuple[Array, Array]] = field(default_factory=dict)
+
+    @cached_property
+    def nearest(self) -> Integers:
+        """(s, `TOGETHER`): each sample and those next to it."""
+        count = len(self.points)
+        return np.reshape(cKDTree(self.points).query(self.points, min(TOGETHER, count))[1], (count, -1))
+
+    def crossings(self, ior: float) -> tuple[Array, Array]:
+        """(w, s, 3), (w, s): `ways` below each sample, and metres to where they leave the body."""
+        if ior not in self._crossings:
+            start = self.points - START * self.cells.step * self.face_normals
+            into, embree = np.linalg.inv(self.body.matrix), embree_mesh(self.body.mesh)
+            origins = (start @ into[:3, :3].T + into[:3, 3] - embree.center) / embree.radius
+            ways = np.stack([self.ways(ior, number) for number in range(WAYS)])
+            metres = np.zeros(ways.shape[:2])
+            for number, way in enumerate(ways @ into[:3, :3].T):
+                length = np.linalg.norm(way, axis=1)
+                face, distance = embree.first_hits(origins, way / length[:, None])
+                metres[number] = np.where(face >= 0, distance * embree.radius / length, 0.0)
+            self._crossings.clear()
+            self._crossings[ior] = ways, metres
+        return self._crossings[ior]
+
+    def ways(self, ior: float, number: int = 0) -> Array:
+        """(s, 3): a direction inside for each sample, as uniform light from outside has them; of `WAYS` others."""
+        # Not the numbers by which the samples lie on large triangles: there, light would come from one side alone.
+        first, second = other_plane_points(len(self.points)).T
+        first, second = (first + number / WAYS) % 1.0, (second + 0.618 * number) % 1.0
+        cosine = optics.refracted_cosine(np.sqrt(first), ior)
+        normal = self.face_normals
+        aside = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+        across = np.cross(normal, aside)
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        along = np.cross(normal, across)
+        angle, level = 2.0 * np.pi * second, np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+        sideways = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * along
+        return np.asarray(level[:, None] * sideways - cosine[:, None] * normal)
 
     @cached_property
     def count(self) -> int:
@@ -211,7 +260,7 @@ def body_grid(body: Object, step: float) -> BodyGrid:
     normals = np.einsum("sc,sci->si", weights, at_corners[face]) @ np.linalg.inv(matrix)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), face_normals)
-    return BodyGrid(cells, number, points, face_normals, normals, area)
+    return BodyGrid(cells, number, points, face_normals, normals, area, body)
 
 
 def _surface_samples(triangles: Array, density: float) -> tuple[Array, Array, Integers, Array, float]:

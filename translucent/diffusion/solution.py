@@ -22,10 +22,10 @@ from scipy import sparse
 from translucent.arrays import Array
 from translucent.diffusion.cells import CellSystem
 from translucent.diffusion.densities import Densities, even_densities
-from translucent.diffusion.first_events import Beam, FirstEvents, Layer, Ways, diffuse_ways, ways_of
+from translucent.diffusion.first_events import Beam, FirstEvents, Layer, Ways, diffuse_ways, scattered_shares, ways_of
 from translucent.diffusion.grid import BodyGrid
 from translucent.formulas import optics
-from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient
+from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient, half_space_reflectance
 from translucent.media.medium import Medium
 
 #: Largest number of times that light of the body falls on the body again, and the change at which it is enough.
@@ -33,6 +33,9 @@ MOST_BOUNCES, ENOUGH = 24, 1e-3
 
 #: Largest share of the light that may come back to the surface: of what would, a hundred times as much is to come.
 MOST_SHARE = 0.99
+
+#: Bounds of the correction by uniform light.
+LEAST_CORRECTION, MOST_CORRECTION = 0.5, 2.0
 
 #: Least share of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
@@ -151,6 +154,8 @@ class _Channel:
         dense: Densities,
         ways: Ways,
         anisotropy: float = 0.0,
+        *,
+        uneven: bool = True,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
         self._exit_share = interface.exit_share
@@ -176,6 +181,28 @@ class _Channel:
         absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
         absorbed = absorption * dense.cells * absorbing
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
+        self._correction = np.ones(len(depth))
+        if uneven:
+            lossless = _Channel(grid, ior, roughness, 0.0, extinction, dense, ways, uneven=False)
+            # What half-spaces absorb has not been in the body long enough to get to other parts of it.
+            share = half_space_reflectance(round(self._albedo, 6), ior)
+            found = lossless.by_uniform_light(scattered_shares(grid, dense, ior, extinction))
+            self._correction = 1.0 + share * (found - 1.0)
+
+    def by_uniform_light(self, scattered: Array) -> Array:
+        """(s,): factors of the fluence that make uniform light around a lossless body what it is.
+
+        Such a body is invisible, whatever its shape: of what leaves, all has been `scattered` (s,) but for what comes
+        straight through. Diffusion sends too much of it out of parts no thicker than a free path, and too little out
+        of folds.
+        """
+        even = np.ones(len(self._grid.points))
+        found = (self._read @ self._cells.rough(self._into_cells @ even)) * self._attenuated + self._near * even
+        found, wanted = (values[self._grid.nearest].mean(axis=1) for values in (found, scattered))
+        # What leaves in all is right.
+        least = np.finfo(np.float64).tiny
+        share = wanted / max(wanted.sum(), least) * found.sum() / np.maximum(found, least)
+        return np.asarray(np.clip(share, LEAST_CORRECTION, MOST_CORRECTION))
 
     def beamed(self, channel: int, beams: Sequence[Beam], ways: Sequence[Ways]) -> _Beamed:
         """First events of beams, of which each goes its ways."""
@@ -206,6 +233,7 @@ class _Channel:
             cells, taken = self._cells.solved(self._into_cells @ flux + inside)
             steps += taken
             fluence = np.maximum((self._read @ cells) * self._attenuated + self._near * flux + glow, 0.0)
+            fluence *= self._correction
             # What the surface mirrors goes on as if it was diffuse.
             leaving = self._exit_share * fluence + self._mirrored * flux + straight.mirrored
             change = entering + from_itself @ leaving - flux

@@ -16,10 +16,11 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 from translucent.arrays import Array
 from translucent.diffusion.cells import CellSystem
 from translucent.diffusion.densities import cell_means
+from translucent.diffusion.dimming import path_inside
 from translucent.diffusion.entering import DIRECTIONS, environment_parts, even_directions, nearest_parts
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.photon_fluence import FineCells
-from translucent.diffusion.sweeps import swept
+from translucent.diffusion.sweeps import condensed, swept
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffusion_coefficient
 from translucent.formulas.lights import cone_attenuation
@@ -32,7 +33,10 @@ from translucent.scene.scene import Object, Scene
 ORDINATES = 48
 
 #: Rounds, and the change at which they are enough.
-MOST_ROUNDS, ENOUGH = 8, 2e-2
+MOST_ROUNDS, ENOUGH = 8, 1e-2
+
+#: Rounds before the last one of which the next start is a mixture.
+MIXED = 2
 
 #: Optical depth across a cell beyond which its medium counts as no denser.
 MOST_DEPTH = 2.0
@@ -109,6 +113,7 @@ class VolumeGrid:
         self.grid: BodyGrid = body_grid(body, step)
         self.density = self.grid.cells.inside * cell_means(body, self.grid)
         self.thickness = body.mean_thickness
+        self.body = body
 
     @property
     def inside(self) -> npt.NDArray[np.bool_]:
@@ -137,6 +142,8 @@ class DiffusingVolume:
         # Sweeps are right in cells that light gets through; in others diffusion is, and rounds would not end.
         self._resolved = 1.0 / (1.0 + (self._extinction * volume.grid.cells.step) ** 2)
         self._directions = even_directions(ORDINATES)
+        self._swept = condensed(self._extinction, self._directions, volume.grid.cells.step)
+        self._turned = self._swept - self._density[..., None] * np.asarray(medium.absorption)
         self._solid_angles = nearest_parts(self._directions)[1]
         self._systems = [
             None if scattering == 0.0 else _system(volume, self._density, absorption, scattering)
@@ -152,10 +159,10 @@ class DiffusingVolume:
         volume, medium = self._volume, self._medium
         sky = self._sky(scene)
         stops = None if photons is None else photons.stops
-        unturned, ahead = _from_lights(volume.grid, self._density, scene, medium, stops)
+        unturned, ahead = _from_lights(volume, self._density, scene, medium, stops)
         bent = 0.0 if photons is None else photons.cells.coarse(photons.fluence)
         emission = 4.0 * np.pi * self._density[..., None] * np.asarray(medium.emission)
-        scattered, steps = self._scattered(sky + unturned + bent, emission)
+        scattered, steps = self._scattered(sky, unturned + bent, emission)
         # Light that is scattered back more than ahead gets less deep than reduced coefficients say: what they add twice
         # is taken away, and no more than there is.
         found = np.maximum(sky + scattered + (1.0 - medium.anisotropy) * ahead, 0.0)
@@ -177,22 +184,25 @@ class DiffusingVolume:
         if not radiance.any():
             return np.zeros(self._extinction.shape)
         nothing = np.zeros(self._extinction.shape)
-        return swept(self._extinction, nothing, radiance, directions, solid_angles, self._volume.grid.cells.step)
+        return swept(self._swept, nothing, radiance, directions, solid_angles, self._volume.grid.cells.step)
 
-    def _scattered(self, first: Array, emission: Array) -> tuple[Array, int]:
+    def _scattered(self, sky: Array, unturned: Array, emission: Array) -> tuple[Array, int]:
         """Fluence of light that has been scattered or emitted, (x, y, z, 3), and steps of the solver."""
-        step, density = self._volume.grid.cells.step, self._density[..., None]
+        step = self._volume.grid.cells.step
         dark = np.zeros((ORDINATES, 3))
-        fluence, steps = self._diffused(density * self._reduced * first + emission)
+        first = self._turned * sky + self._density[..., None] * self._reduced * unturned + emission
+        fluence, steps = self._diffused(first)
+        mixed = _Mixed()
         for _ in range(MOST_ROUNDS):
-            source = density * self._reduced * (first + fluence) + emission
-            better = swept(self._extinction, source / (4.0 * np.pi), dark, self._directions, self._solid_angles, step)
-            changed = self._resolved * (better - fluence)
+            source = (first + self._turned * fluence) / (4.0 * np.pi)
+            found = swept(self._swept, source, dark, self._directions, self._solid_angles, step)
+            changed = self._resolved * (found - fluence)
             # What the round has changed scatters again: diffusion finds where that goes.
-            rest, taken = self._diffused(density * self._reduced * changed)
-            better = np.maximum(fluence + changed + rest, 0.0)
+            rest, taken = self._diffused(self._turned * changed)
+            steps += taken
+            better = np.maximum(mixed.next(fluence, changed + rest), 0.0)
             change = np.abs(better - fluence).max(initial=0.0)
-            fluence, steps = better, steps + taken
+            fluence = better
             if change <= ENOUGH * fluence.max(initial=0.0):
                 break
         return fluence, steps
@@ -206,6 +216,32 @@ class DiffusingVolume:
                 fluence[inside, channel] = found
                 steps += taken
         return fluence, steps
+
+
+class _Mixed:
+    """Starts of rounds, mixed from those of before so that what the last one changes would be least (Anderson 1965).
+
+    Light in a hollow, of which diffusion does not know, goes to and fro many times: by itself each round follows it
+    once.
+    """
+
+    def __init__(self) -> None:
+        self._rounds: list[tuple[Array, Array]] = []
+
+    def next(self, start: Array, change: Array) -> Array:
+        """Start (x, y, z, 3) of the next round, after one that has changed its own by this."""
+        found = start + change
+        if self._rounds:
+            for channel in range(3):
+                own, changed = start[..., channel].ravel(), change[..., channel].ravel()
+                starts, changes = (
+                    np.stack([last - each[k][..., channel].ravel() for each in self._rounds], axis=1)
+                    for k, last in enumerate((own, changed))
+                )
+                shares = np.linalg.lstsq(changes, changed)[0]
+                found[..., channel] -= ((starts + changes) @ shares).reshape(found.shape[:3])
+        self._rounds = [*self._rounds, (start, change)][-MIXED:]
+        return found
 
 
 def _finer(values: Array, times: int) -> Array:
@@ -233,12 +269,13 @@ def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: flo
 
 
 def _from_lights(
-    grid: BodyGrid, density: Array, scene: Scene, medium: Medium, stops: EmbreeMesh | None = None
+    volume: VolumeGrid, density: Array, scene: Scene, medium: Medium, stops: EmbreeMesh | None = None
 ) -> tuple[Array, Array]:
     """(x, y, z, 3) twice: fluence of lights that nothing has turned aside, and of that what was scattered ahead.
 
     `stops` are surfaces that none of it passes.
     """
+    grid, body = volume.grid, volume.body
     unturned, ahead = np.zeros((2, *density.shape, 3))
     reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
     cells, inside = grid.cells, grid.number >= 0
@@ -257,9 +294,14 @@ def _from_lights(
         if stops is not None:
             power = np.where(_in_the_way(stops, points, place)[:, None], 0.0, power)
         # From the edge of the cell on, the mean over it: of what lets nothing through, all that gets in.
-        way = np.abs(place - points)
-        own = density[inside] * cells.step * np.linalg.norm(way, axis=1) / np.maximum(way.max(axis=1), _STILL)
-        before = np.maximum(_column(grid, density, points, place) - 0.5 * own, 0.0)
+        own = density[inside] * cells.step
+        if body.density is None:
+            column = _way_inside(body, points, place)
+        else:
+            way = np.abs(place - points)
+            own = own * np.linalg.norm(way, axis=1) / np.maximum(way.max(axis=1), _STILL)
+            column = _column(grid, density, points, place)
+        before = np.maximum(column - 0.5 * own, 0.0)
         turned, all_turned = (
             power * optics.transmittance(sigma * before[:, None]) * optics.mean_transmittance(sigma * own[:, None])
             for sigma in (reduced, np.asarray(medium.extinction))
@@ -285,6 +327,13 @@ def _mean_shares(light: SpotLight, points: Array, step: float) -> Array:
         way = points + offset - np.asarray(light.position)
         total += cone_attenuation(way / np.maximum(np.linalg.norm(way, axis=1), _STILL * step)[:, None], light.cone)
     return np.asarray(total / _BEAM_PLACES**3)
+
+
+def _way_inside(body: Object, points: Array, places: Array) -> Array:
+    """(k,): metres in a body between points (k, 3) and places (k, 3): a grid would smear its surface."""
+    way = places - points
+    distance = np.linalg.norm(way, axis=1)
+    return path_inside(body, points, way / np.maximum(distance, np.finfo(np.float64).tiny)[:, None], distance)
 
 
 def _column(grid: BodyGrid, density: Array, points: Array, places: Array) -> Array:
