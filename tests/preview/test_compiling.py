@@ -233,7 +233,7 @@ def test_who_does_not_wait_has_the_window_compile(stage: Stage, work: Workspace,
     near.clear()
     work.do(ChoosePreset("whole_milk"))
     assert stage.draw(work, SIZE)
-    for _ in range(20):
+    for _ in range(60):
         for task in work.busy:
             task.cancel()
         near.set()
