@@ -36,7 +36,7 @@ BUDGET = 0.045
 PREPARING = 0.5
 
 #: Factors by which a picture is coarser while it moves.
-FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 16.0)
 
 #: Largest such factor for traced interfaces: beyond it, those of the screen show more of what moves.
 COARSEST_TRACED = 3.0
@@ -156,11 +156,11 @@ class Stage:
         if held is None:
             begun = time.perf_counter()
             self.ways.choose(workspace, scene, methods[0], self.renderer)
-            spent = time.perf_counter() - begun  # light may be solved for in the frame
-            if self._begun and spent > PREPARING * self._budget:
+            spent = time.perf_counter() - begun
+            if self.ways.solved and spent > PREPARING * self._budget:
                 self._held = scene  # the next frame draws this one, or what moves all the time would not be drawn
                 return True
-            self._budget -= spent
+            self._budget -= min(spent, PREPARING * self._budget)
         scattering, interfaces = self.ways.scattering, self.ways.interfaces
         second = methods[1] if both else None
         wanted = (scene, methods[0], second, scattering, interfaces, self.viewport.size, self.renderer)
