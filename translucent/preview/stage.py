@@ -23,7 +23,7 @@ from translucent.preview.scenes import method_of
 from translucent.preview.staging import tone_of
 from translucent.preview.strides import Strides, samples_of
 from translucent.preview.tasks import Lane, Task
-from translucent.preview.timing import FrameBudget, Pace, Timing
+from translucent.preview.timing import COARSEST_TRACED, FACTORS, PREPARING, FrameBudget, Pace, Timing
 from translucent.preview.ways import SCREEN, Ways
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
@@ -31,15 +31,6 @@ from translucent.scene.scene import Scene
 
 #: Largest time of a step in seconds, where the rest of the window takes little.
 BUDGET = 0.045
-
-#: Share of it after which a frame that makes what a picture needs leaves the drawing to the next one.
-PREPARING = 0.5
-
-#: Factors by which a picture is coarser while it moves.
-FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 16.0)
-
-#: Largest such factor for traced interfaces: beyond it, those of the screen show more of what moves.
-COARSEST_TRACED = 3.0
 
 #: Picture that stays on show while the wanted one is prepared.
 LAST = "the last picture, until the new one is prepared"
