@@ -128,7 +128,7 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(
 def test_light_that_takes_long_to_solve_for_is_drawn_in_the_next_frame(
     stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """That light, though others are wanted by then: what moves in every frame is drawn in every second one."""
+    """Solve in one frame and draw that light in the next, though another is wanted by then: what moves is drawn."""
     work.do(ChoosePreset("whole_milk"))
     work.do(Change("look.light", True))
     finish(stage, work)
