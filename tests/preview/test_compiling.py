@@ -132,6 +132,46 @@ def test_what_stands_in_for_a_scene_is_drawn_with_its_programs(name: str) -> Non
             assert after == before, method
 
 
+def test_a_frame_that_has_made_enough_draws_nothing() -> None:
+    ledger = Ledger(postpones=True)
+    ledger.begin_frame(-1.0)
+    ledger.leave_room()  # there was nothing to make
+    ledger.enter(None)
+    with pytest.raises(PostponedError):
+        ledger.leave_room()
+    ledger.begin_frame(60.0)
+    ledger.enter(None)
+    ledger.leave_room()
+
+
+def test_programs_are_compiled_elsewhere_for_each_kind_of_texture() -> None:
+    """Drivers compile a program once more for textures whose sides are powers of two, as those of bakes are."""
+
+    def painted(side: int) -> tl.Scene:
+        plain = Sphere(radius=0.02).tessellate(8)
+        ball = Mesh(plain.vertices, plain.faces, np.zeros((len(plain.vertices), 2)))
+        surface = tl.Surface(color_texture=Texture(np.ones((side, side, 3), np.float32)))
+        return tl.Scene([tl.Object(ball, GLASS, surface=surface)], showcase(ball).camera)
+
+    with tl.Renderer() as renderer:
+        gl = renderer.gpu.context.gl
+        gl.extra = ledger = Ledger()
+
+        def draw(side: int) -> None:
+            scene = painted(side)
+            plan = renderer.plan(scene, interfaces=tl.ScreenInterfaces())
+            ledger.begin_frame(60.0)
+            renderer.gpu.draw(scene, gl.simple_framebuffer(SIZE), plan, 0.0, "none")
+
+        with renderer.gpu.context.current():
+            draw(60)
+            ledger.postpones, ledger.elsewhere = True, set(ledger.needed)
+            draw(100)
+            with pytest.raises(PostponedError) as postponed:
+                draw(64)
+            assert postponed.value.program is not None
+
+
 def test_normals_of_a_large_mesh_come_from_another_process(
     stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -235,7 +275,7 @@ def test_who_does_not_wait_has_the_window_compile(stage: Stage, work: Workspace,
     near.clear()
     work.do(ChoosePreset("whole_milk"))
     assert stage.draw(work, SIZE)
-    for _ in range(20):
+    for _ in range(60):
         for task in work.busy:
             task.cancel()
         near.set()

@@ -16,7 +16,7 @@ import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
 from translucent.planning.render_plan import RenderPlan
-from translucent.preview import presenting
+from translucent.preview import diffusing, presenting
 from translucent.preview import stage as stages
 from translucent.preview.actions import Change, ChoosePreset, Turn
 from translucent.preview.diffusing import SMALL
@@ -94,8 +94,11 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     assert np.abs(pixels(stage) - frame.to_srgb8().astype(int)).mean() < 1.0
 
 
-def test_light_diffuses_as_soon_as_it_is_solved_for(stage: Stage, work: Workspace) -> None:
+def test_light_diffuses_as_soon_as_it_is_solved_for(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Until then, and in every picture for which it is not known, bodies are layers; a camera may move."""
+    monkeypatch.setattr(stages, "PREPARING", 1e9)  # what is solved for in a frame is drawn in it
     work.do(ChoosePreset("whole_milk"))
     assert stage.draw(work, SIZE)
     assert "until its diffusion is solved for" in stage.ways.told[1]
@@ -122,6 +125,29 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(stage: Stage, work: Workspac
     work.do(Change("display.scattering", "single"))
     finish(stage, work)
     assert not stage.plans[0].given_back
+
+
+def test_light_that_takes_long_to_solve_for_is_drawn_in_the_next_frame(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Solve in one frame and draw that light in the next, though another is wanted by then: what moves is drawn."""
+    work.do(ChoosePreset("whole_milk"))
+    work.do(Change("look.light", True))
+    finish(stage, work)
+    monkeypatch.setattr(stages, "PREPARING", 0.0)
+    monkeypatch.setattr(diffusing, "LONGEST", 1e9)
+    drawn: list[tl.Scene] = []
+    draw = stage.renderer.draw
+    monkeypatch.setattr(stage.renderer, "draw", lambda scene, *a, **k: (drawn.append(scene), draw(scene, *a, **k))[1])
+    scenes = []
+    for yaw in range(1, 7):
+        work.do(Change("look.light_yaw", float(yaw)))
+        scenes.append(work.scene())
+        assert stage.draw(work, SIZE)
+    assert [id(scene) for scene in drawn] == [id(scene) for scene in scenes[::2]]
+    assert work.lanes["diffuse"].task is None
+    finish(stage, work)
+    assert stage.ways.told[1] == ""
 
 
 def test_a_picture_that_takes_long_to_be_shown_has_frames_for_that(

@@ -72,6 +72,7 @@ class MeshBuffers:
     def _flat_faces(self, mesh: Mesh) -> moderngl.Buffer:
         """Unshared vertices of all faces, with flat normals."""
         if self._flat is None:
+            before_making(self._gl)
             offsets = mesh.vertices - mesh.center
 
             def rows(part: slice) -> npt.NDArray[np.float32]:

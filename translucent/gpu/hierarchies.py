@@ -69,8 +69,12 @@ class SceneHierarchies:
     """
 
     def __init__(self, gl: moderngl.Context, meshes: Sequence[Mesh], objects: int) -> None:
-        before_making(gl)
         _require_room(gl, meshes)
+        for mesh in meshes:
+            if not has_packed(mesh):
+                before_making(gl)
+                packed_mesh(mesh)
+        before_making(gl)
         self._rows = -(-8 * 2 * objects // _WIDTH)
         self._spans: dict[int, _Span] = {}
         packed = [packed_mesh(mesh) for mesh in meshes]

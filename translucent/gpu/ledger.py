@@ -11,6 +11,9 @@ import moderngl
 #: Key of a program, the same in every process: its files, and its switches.
 ProgramName: TypeAlias = tuple[tuple[str, str], tuple[tuple[str, int], ...]]
 
+#: Kinds of the textures that a program reads, by the names of their samplers.
+Kinds: TypeAlias = tuple[tuple[str, int], ...]
+
 
 class PostponedError(Exception):
     """Signal that a frame is left unfinished, as it would exceed the compile budget.
@@ -52,13 +55,16 @@ class Ledger:
         """Begin a frame with a compile budget in seconds."""
         self._until, self._made = time.perf_counter() + seconds, False
 
+    def leave_room(self) -> None:
+        """Raise `PostponedError` if what the frame has made has taken its compile budget: the next one draws."""
+        if self.postpones and self._made and time.perf_counter() > self._until:
+            raise PostponedError(None)
+
     def enter(self, program: ProgramName | None) -> None:
         """Record a program that is about to be made, or raise `PostponedError`."""
         if self.postpones and program is not None and program not in self.elsewhere:
             raise PostponedError(program)
-        # Every frame makes something, or none would ever be done.
-        if self.postpones and self._made and time.perf_counter() > self._until:
-            raise PostponedError(None)
+        self.leave_room()  # every frame makes something, or none would ever be done
         self._made = True
         if program is not None:
             self.needed.add(program)
@@ -68,3 +74,20 @@ def before_making(gl: moderngl.Context, program: ProgramName | None = None) -> N
     """Ask the context's ledger whether a program, or another cached object that takes time, may be made now."""
     if isinstance(gl.extra, Ledger):
         gl.extra.enter(program)
+
+
+def before_drawing(gl: moderngl.Context) -> None:
+    """Ask the context's ledger whether the frame has time left to draw with what it has made."""
+    if isinstance(gl.extra, Ledger):
+        gl.extra.leave_room()
+
+
+def before_drawing_with(program: moderngl.Program, kinds: Kinds) -> None:
+    """Ask the context's ledger whether a program may be used now with textures of these kinds, when it first is:
+    drivers then compile it once more.
+    """
+    ledger, name = program.ctx.extra, program.extra
+    if isinstance(ledger, Ledger) and name is not None:
+        files, switches = name
+        if (used := (files, (*switches, *kinds))) not in ledger.needed:
+            ledger.enter(used)

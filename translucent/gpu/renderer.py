@@ -20,6 +20,7 @@ from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import GpuContext, adopt_context, open_context, require_own_process
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
+from translucent.gpu.ledger import before_drawing, before_making
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.caustics import CausticsPass
 from translucent.gpu.passes.path_trace import PathTracePass, PathTracer
@@ -205,6 +206,7 @@ class GpuRenderer:
         for spec in job.plan.passes:
             if (geometry_only and not spec.geometry_passes) or spec.name in leave_out:
                 continue
+            before_drawing(self.context.gl)
             step = self._pass(PASSES[spec.name])  # compiles on first use, which is no part of the frame
             with self._timer.measure(spec.name):
                 step.run(job, spec)
@@ -271,6 +273,7 @@ class GpuRenderer:
 
     def _pass(self, kind: type[Pass]) -> Pass:
         if kind not in self._passes:
+            before_making(self.context.gl)
             self._passes[kind] = kind(self.context.gl)
         return self._passes[kind]
 

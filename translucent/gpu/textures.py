@@ -9,7 +9,7 @@ import numpy as np
 
 from translucent.errors import RenderError
 from translucent.formulas.brdf_table import brdf_table
-from translucent.gpu.ledger import before_making
+from translucent.gpu.ledger import before_drawing_with, before_making
 from translucent.gpu.shaders import set_uniform
 from translucent.scene.surface import TEXTURE_FIELDS, Surface
 from translucent.scene.texture import Texture
@@ -28,6 +28,17 @@ def unlike_powers(side: int) -> int:
     while side & (side - 1) == 0:
         side += 1
     return side
+
+
+def kind_of(texture: Texture) -> int:
+    """Number of the kind of a texture: drivers compile other code for those of another kind.
+
+    Of sides that are powers of two or 1, and of what repeats (llvmpipe's ``lp_static_texture_state``).
+    """
+    found = 0
+    for side, wrap in zip(texture.pixels.shape[1::-1], texture.wrap, strict=True):
+        found = 6 * found + 3 * (wrap == "repeat") + (2 if side == 1 else side & (side - 1) == 0)
+    return found
 
 
 def texture_units(first: int) -> dict[str, int]:
@@ -57,8 +68,12 @@ class TextureCache:
     def bind(self, surface: Surface, program: moderngl.Program, first_unit: int) -> None:
         """Bind a surface's textures for a program that includes ``shade/surface_textures.glsl``."""
         rows = []
-        for unit, name in enumerate(TEXTURE_FIELDS, first_unit):
-            texture = getattr(surface, name) or (_STRAIGHT if name == "normal_texture" else _WHITE)
+        chosen = {
+            name: getattr(surface, name) or (_STRAIGHT if name == "normal_texture" else _WHITE)
+            for name in TEXTURE_FIELDS
+        }
+        before_drawing_with(program, tuple((name, kind_of(texture)) for name, texture in chosen.items()))
+        for unit, texture in enumerate(chosen.values(), first_unit):
             self[texture].use(unit)
             rows += [tuple(row) for row in texture.rows]
         # Compilers cut an array off behind the last element that a program uses.

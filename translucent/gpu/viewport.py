@@ -19,6 +19,7 @@ from translucent.formulas.tone import TONES
 from translucent.frames.aovs import EMPTY, SEEN, WRONG, false_colors
 from translucent.frames.frame import Frame
 from translucent.gpu.job import FrameJob
+from translucent.gpu.ledger import before_making
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import build_program, set_uniform
 from translucent.gpu.strides import STRIDES, phases, shifts
@@ -260,8 +261,7 @@ class Viewport:
         other = first if second is None or not second.step else second
         for unit, texture in enumerate([*first.textures, *other.textures, self._colors]):
             texture.use(unit)
-        right = RIGHT_SIDES.index(shown.right_side) if other is not first else 0
-        program, fullscreen = self._variant(MODES.index(shown.mode), right, TONES.index(shown.tone))
+        program, fullscreen = self._variant(self._variant_of(shown))
         values: dict[str, object] = {
             "shift_a": STRIDES.index(first.stride),
             "known_a": first.known(),
@@ -280,8 +280,16 @@ class Viewport:
         self._gl.enable_only(moderngl.NOTHING)
         fullscreen.render(moderngl.TRIANGLES, vertices=3)
 
-    def _variant(self, mode: int, right: int, tone: int) -> tuple[moderngl.Program, moderngl.VertexArray]:
-        key = mode, right, tone if mode in (0, 3) else 0
+    def presents_at_once(self, shown: Shown) -> bool:
+        """True if nothing is to be compiled to show the samples so."""
+        return self._variant_of(shown) in self._variants
+
+    def _variant_of(self, shown: Shown) -> tuple[int, int, int]:
+        mode, second = MODES.index(shown.mode), self._sides[1]
+        right = RIGHT_SIDES.index(shown.right_side) if second is not None and second.step else 0
+        return mode, right, TONES.index(shown.tone) if mode in (0, 3) else 0
+
+    def _variant(self, key: tuple[int, int, int]) -> tuple[moderngl.Program, moderngl.VertexArray]:
         if key not in self._variants:
             names = ("light_a", "depths_a", "trust_a", "light_b", "depths_b", "trust_b", "false_colors")
             units = {name: i for i, name in enumerate(names)}
@@ -355,6 +363,7 @@ class Viewport:
         side = self._sides[number]
         if side is None or side.size != size:
             self._rest.use()
+            before_making(self._gl)
             if side is not None:
                 side.release()
                 self._sides[number] = None

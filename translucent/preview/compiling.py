@@ -297,4 +297,4 @@ def _environment_like(environment: Environment) -> Environment:
 
 
 def _side_like(side: int) -> int:
-    return SIDES[math.log2(side).is_integer()]
+    return 1 if side == 1 else SIDES[math.log2(side).is_integer()]

@@ -45,10 +45,12 @@ class Diffusing:
     ----------
     told : str
         How such light is shown while it is not known, or nothing.
+    solved : bool
+        It has just been solved for on the small grid, in the frame.
     """
 
     def __init__(self) -> None:
-        self.told = ""
+        self.told, self.solved = "", False
         self._solving: _Solving | None = None
         self._insoluble: Hashable = None
         self._last: Hashable = None
@@ -73,7 +75,7 @@ class Diffusing:
         lane : Lane
             For the search.
         """
-        self.told = ""
+        self.told, self.solved = "", False
         if not back.solved:
             return asked
         instead: Scattering = ScatteringLayer() if back.diffused else SingleScattering()
@@ -116,6 +118,7 @@ class Diffusing:
             return False
         begun = time.perf_counter()
         cache.solve(marked, SMALL)
+        self.solved = True
         if time.perf_counter() - begun > LONGEST:
             self._cut = None
         return True

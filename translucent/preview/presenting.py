@@ -13,7 +13,7 @@ from translucent.preview.workspace import Workspace
 from translucent.scene.scene import Scene
 
 #: Seconds up to which a presentation is quick: whatever changes is shown at once. Others are as many seconds apart, and
-#: have frames of their own.
+#: have frames of their own, as the first of each kind has, which is compiled.
 QUICK, APART = 0.006, 0.25
 
 
@@ -62,11 +62,12 @@ class Presenting:
         )
         self._wanted = shown, key
         waits = self._wanted != self.shown or (self._pending and time.perf_counter() - self._when > APART)
-        self._alone = waits and self._seconds > QUICK and viewport.steps(0) > 0
+        first = self._is_first(viewport)
+        self._alone = (first or (waits and self._seconds > QUICK)) and viewport.steps(0) > 0
         return self._alone
 
-    def present(self, viewport: Viewport, *, changed: bool, last: bool) -> None:
-        """Show the samples so far, unless they are on show, or more of them can be shown later.
+    def present(self, viewport: Viewport, *, changed: bool, last: bool) -> bool:
+        """Show the samples so far, unless they are on show, or can be shown later; returns whether they have to be.
 
         Parameters
         ----------
@@ -80,9 +81,16 @@ class Presenting:
         self._pending = self._pending or changed
         now = self._alone or last or self._seconds <= QUICK
         if self._wanted == self.shown and not (self._pending and now):
-            return
+            return False
+        if not self._alone and self._is_first(viewport):
+            return True
         begun = time.perf_counter()
         viewport.present(self._wanted[0])
         viewport.engine.context.gl.finish()
         self.shown, self._pending, self._when = self._wanted, False, time.perf_counter()
         self._seconds = self._when - begun
+        return False
+
+    def _is_first(self, viewport: Viewport) -> bool:
+        """True if nothing has been shown so before."""
+        return self._wanted is not None and not viewport.presents_at_once(self._wanted[0])

@@ -23,7 +23,7 @@ from translucent.preview.scenes import method_of
 from translucent.preview.staging import tone_of
 from translucent.preview.strides import Strides, samples_of
 from translucent.preview.tasks import Lane, Task
-from translucent.preview.timing import FrameBudget, Pace, Timing
+from translucent.preview.timing import COARSEST_TRACED, FACTORS, PREPARING, FrameBudget, Pace, Timing
 from translucent.preview.ways import SCREEN, Ways
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
@@ -31,12 +31,6 @@ from translucent.scene.scene import Scene
 
 #: Largest time of a step in seconds, where the rest of the window takes little.
 BUDGET = 0.045
-
-#: Factors by which a picture is coarser while it moves.
-FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
-
-#: Largest such factor for traced interfaces: beyond it, those of the screen show more of what moves.
-COARSEST_TRACED = 3.0
 
 #: Picture that stays on show while the wanted one is prepared.
 LAST = "the last picture, until the new one is prepared"
@@ -95,6 +89,7 @@ class Stage:
         self.problem = self.shader_problem = self.simpler = self.state = ""
         self.drawing, self._begun = 0.0, False
         self._moving: RenderPlan | None = None
+        self._held: Scene | None = None
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
         self._asked: Task | None = None
@@ -118,7 +113,7 @@ class Stage:
         started = time.perf_counter()
         self._budget = self._frame_budget.begin(BUDGET)
         if self._compiler is not None:
-            self._compiler.ledger.begin_frame(self._budget)
+            self._compiler.ledger.begin_frame(PREPARING * self._budget)
         with self.current():
             try:
                 more = self._draw(workspace, size)
@@ -142,15 +137,21 @@ class Stage:
         self.viewport.draw_into(self._window, part)
 
     def _draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
-        scene, display = workspace.scene(), workspace.document.display
+        held, self._held = self._held, None
+        scene, display = held or workspace.scene(), workspace.document.display
         self.viewport.resize(size)
         if scene is None:
             return False
         material, both = workspace.document.material, display.compare == "method"
         methods = [method_of(display.method, material), method_of(display.method_b, material)]
-        begun = time.perf_counter()
-        self.ways.choose(workspace, scene, methods[0], self.renderer)
-        self._budget -= min(time.perf_counter() - begun, 0.5 * self._budget)  # light may be solved for in the frame
+        if held is None:
+            begun = time.perf_counter()
+            self.ways.choose(workspace, scene, methods[0], self.renderer)
+            spent = time.perf_counter() - begun
+            if self.ways.solved and spent > PREPARING * self._budget:
+                self._held = scene  # the next frame draws this one, or what moves all the time would not be drawn
+                return True
+            self._budget -= min(spent, PREPARING * self._budget)
         scattering, interfaces = self.ways.scattering, self.ways.interfaces
         second = methods[1] if both else None
         wanted = (scene, methods[0], second, scattering, interfaces, self.viewport.size, self.renderer)
@@ -194,8 +195,7 @@ class Stage:
             more, drawn = self._light_by_photons(scene, methods[0], display.antialias, workspace.lanes["diffuse"])
             if self.photons.light is None and not more:  # there are no photons to follow
                 more = drawn = self._step(0, scene, display.antialias)
-        self._presenting.present(self.viewport, changed=drawn, last=not more)
-        return more
+        return self._presenting.present(self.viewport, changed=drawn, last=not more) or more
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
@@ -316,9 +316,9 @@ class Stage:
 
     def _postpone(self, workspace: Workspace, wanted: tuple[object, ...], program: ProgramName | None = None) -> None:
         """Request missing programs; until they are there, the same picture is not tried again."""
-        compiler, scene = self._compiler, workspace.scene()
+        compiler, scene = self._compiler, wanted[0]
         assert compiler is not None
-        assert scene is not None
+        assert isinstance(scene, Scene)
         self._postponed, self._shown = wanted, ()
         self.state = LAST
         if self._asked is not None and self._asked.cancelled:

@@ -23,6 +23,16 @@ OVERDRAWN = 1.5
 #: least share of its budget that drawing keeps.
 RECENT, FREE, LEAST_SHARE = 16, 0.010, 1.0 / 3.0
 
+#: Share of its budget after which a frame that makes what a picture needs leaves the drawing to the next one.
+PREPARING = 0.5
+
+#: Factors by which a picture is coarser while it moves; the largest where rays are traced or shadows drawn, and nobody
+#: knows yet for how long.
+FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 16.0)
+
+#: Largest such factor for traced interfaces: beyond it, those of the screen show more of what moves.
+COARSEST_TRACED = 3.0
+
 
 class FrameBudget:
     """Seconds that drawing may take of a frame: less of it where the rest of the window takes long, as large ones do.

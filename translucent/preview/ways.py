@@ -52,6 +52,11 @@ class Ways:
         """Remarks on what is shown more simply until something is known; empty if it is."""
         return self._tracing.told, self._diffusing.told
 
+    @property
+    def solved(self) -> bool:
+        """True if the last choice took the time to solve for light."""
+        return self._diffusing.solved
+
     def choose(self, workspace: Workspace, scene: Scene, method: Method | None, renderer: Renderer) -> None:
         """Choose the ways in which to draw now, and request what better ones need."""
         asked = scattering_of(workspace.document.display.scattering)

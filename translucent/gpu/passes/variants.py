@@ -43,7 +43,9 @@ class Variants:
         key = tuple(sorted((name, int(value)) for name, value in switches.items()))
         if key not in self._programs:
             before_making(self._gl, (self._files, key))
-            self._programs[key] = build_program(self._gl, *self._files, dict(key), self._version, **self._samplers)
+            made = build_program(self._gl, *self._files, dict(key), self._version, **self._samplers)
+            made.extra = self._files, key
+            self._programs[key] = made
         return self._programs[key]
 
     def draw_fullscreen(self, program: moderngl.Program) -> None:
