@@ -17,13 +17,12 @@ from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.formulas.tone import tone_curve
 from translucent.frames.frame import Frame, check_exposure
 from translucent.gpu.backdrop import TextureBackdrop
-from translucent.gpu.constants import RECORD_SIZE
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
 from translucent.planning.caustics import Caustics, check_caustics
 from translucent.planning.choices import RenderChoices
 from translucent.planning.interface_choice import check_interfaces
-from translucent.planning.interfaces import Interfaces, TracedInterfaces
+from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan, plan_over_backdrop
@@ -386,19 +385,10 @@ def _check_backdrop(backdrop: Backdrop | TextureBackdrop | None, size: tuple[int
         raise InputError(asked, f"the frame is {size[0]}x{size[1]}", "draw both in the same size")
 
 
-def invalid_text(plan: RenderPlan, invalid: int, covered: int) -> str:
-    """Warning of so many pixels that cannot be trusted."""
-    unbalanced = "a surface that does not balance"
-    if isinstance(plan.interfaces, TracedInterfaces):
-        unbalanced += f", or more than {RECORD_SIZE} bodies over one another, where rays are traced"
-    why = "; ".join(plan.limits) or unbalanced
-    return f"{invalid} pixels are not valid ({covered} are covered): {why}"
-
-
 def _warn(frame: Frame) -> None:
     for effect in frame.plan.unmodelled:
         if effect.kind is NoteKind.LIGHTS_LEFT_OUT:
             warnings.warn(str(effect), TranslucentWarning, stacklevel=3)
     if not frame.valid.all():
-        text = invalid_text(frame.plan, *(int(np.count_nonzero(kind)) for kind in (~frame.valid, frame.coverage)))
+        text = frame.plan.invalid_text(*(int(np.count_nonzero(kind)) for kind in (~frame.valid, frame.coverage)))
         warnings.warn(text, TranslucentWarning, stacklevel=3)

@@ -17,7 +17,7 @@ from translucent.frames.frame import Frame
 from translucent.frames.tiled import Tile
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.renderer import Renderer, invalid_text
+from translucent.renderer import Renderer
 from translucent.scene.camera import Window, check_size
 from translucent.scene.scene import Scene
 
@@ -93,7 +93,7 @@ def render_tiles(
     if progress is not None:
         progress(1.0)
     if invalid:
-        warnings.warn(invalid_text(frame.plan, invalid, covered), TranslucentWarning, stacklevel=2)
+        warnings.warn(frame.plan.invalid_text(invalid, covered), TranslucentWarning, stacklevel=2)
 
 
 @dataclass

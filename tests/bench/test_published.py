@@ -72,7 +72,7 @@ def cells(header: str, title: str) -> str:
 
 
 def differences(where: str, text: str, values: Sequence[float | None]) -> list[str]:
-    """What is written otherwise than measured, by more than half of the last digit that is written."""
+    """Figures that are written otherwise than measured, by more than half of the last digit that is written."""
     found = list(NUMBER.finditer(text))
     values = [value for value in values if value is not None]
     if len(found) != len(values):

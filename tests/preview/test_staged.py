@@ -132,7 +132,7 @@ def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch
     assert stage.state.startswith("moving")
     staged.do(Change("look.rotation", 20.0))  # which takes new maps
     stage.draw(staged, SIZE)
-    assert stage._moving.shadows.directions == 2
+    assert stage._moving.shadows.directions == 4
     stage.close()
 
 
@@ -155,7 +155,7 @@ def test_maps_that_take_several_frames_are_those_of_one(staged: Workspace, monke
                 break
             except PostponedError:
                 continue
-    assert asked == 22, "a map for each of 17 lights, and 5 frames that ended before one"
+    assert asked == 13, "maps of a lamp and of 9 directions, those above the ground, and 3 frames that ended early"
     np.testing.assert_array_equal(found, expected)
 
 
@@ -276,7 +276,7 @@ def test_stages_that_are_none_are_refused(
 
 
 def test_quick_shadows_need_no_more_maps_than_they_read(staged: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Maps of all directions, if these are there; and else of a few, so that an environment can be turned."""
+    """Maps of all directions above the ground, if these are there; else of a few: environments can be turned."""
     scene, quick, made = plain(staged), tl.ShadowMaps(directions=4), []
     add_up = shadow_maps.ShadowMapsPass._add_up
     monkeypatch.setattr(shadow_maps.ShadowMapsPass, "_add_up", lambda *given: made.append(1) or add_up(*given))
@@ -284,12 +284,12 @@ def test_quick_shadows_need_no_more_maps_than_they_read(staged: Workspace, monke
     with tl.Renderer() as renderer:
         pictures = []
         for shown, shadows, count in (
-            (scene, quick, 5),
+            (scene, quick, 3),
             (scene, quick, 0),
-            (scene, None, 17),
+            (scene, None, 10),
             (scene, quick, 0),
-            (turned, quick, 5),
-            (turned, None, 17),
+            (turned, quick, 3),
+            (turned, None, 10),
         ):
             made.clear()
             pictures.append(renderer.render(shown, SMALL, shadows=shadows).radiance)

@@ -88,6 +88,14 @@ def test_shadow_of_a_cap_converges(name):
     assert errors[1] <= 0.7 * errors[0]
 
 
+@pytest.mark.parametrize("count", [100, 128])
+def test_every_16th_direction_comes_from_all_sides(count):
+    """As many even points on a sphere have a mean near its center; a slice of it has one near its surface."""
+    directions, _ = shadow_directions(tl.Environment.constant((1.0, 1.0, 1.0)), count)
+    for first in range(16):
+        assert np.linalg.norm(directions[first::16].mean(axis=0)) < 0.5
+
+
 def test_every_normal_has_directions():
     normals = _unit(2000)
     for environment in ENVIRONMENTS.values():

@@ -33,6 +33,7 @@ from translucent.formulas.tone import (
     NEUTRAL_F90,
     NEUTRAL_START,
 )
+from translucent.planning.interfaces.traced import RECORD_SIZE
 from translucent.planning.methods.ray_marched import LEAST_SEEN, Quadrature
 
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
@@ -53,9 +54,6 @@ STORAGE_BINDINGS = {
     "light_media": 5,
     "light_ends": 6,
 }
-
-#: Bodies that a traced ray can be in at once.
-RECORD_SIZE = 8
 
 #: Bits of the width of the textures that hold hierarchies, in texels: every OpenGL has that.
 HIERARCHY_WIDTH_BITS = 12

@@ -82,11 +82,11 @@ def before_drawing(gl: moderngl.Context) -> None:
         gl.extra.leave_room()
 
 
-def before_drawing_with(program: moderngl.Program, kinds: Kinds) -> None:
+def before_drawing_with(gl: moderngl.Context, program: moderngl.Program, kinds: Kinds) -> None:
     """Ask the context's ledger whether a program may be used now with textures of these kinds, when it first is:
     drivers then compile it once more.
     """
-    ledger, name = program.ctx.extra, program.extra
+    ledger, name = gl.extra, program.extra
     if isinstance(ledger, Ledger) and name is not None:
         files, switches = name
         if (used := (files, (*switches, *kinds))) not in ledger.needed:

@@ -72,7 +72,7 @@ class TextureCache:
             name: getattr(surface, name) or (_STRAIGHT if name == "normal_texture" else _WHITE)
             for name in TEXTURE_FIELDS
         }
-        before_drawing_with(program, tuple((name, kind_of(texture)) for name, texture in chosen.items()))
+        before_drawing_with(self._gl, program, tuple((name, kind_of(texture)) for name, texture in chosen.items()))
         for unit, texture in enumerate(chosen.values(), first_unit):
             self[texture].use(unit)
             rows += [tuple(row) for row in texture.rows]

@@ -35,7 +35,8 @@ def black_bodies(scene: Scene) -> tuple[Note, ...]:
         # As thick as the whole scene: if anything passes that, no body is black.
         if medium is None or medium.emits or _passes(medium, scene.diagonal) + given_back(scene, medium) >= BLACK:
             continue
-        shares = luminance(medium.transmittance([_chord(body) for body in bodies])).tolist()
+        with np.errstate(under="ignore"):
+            shares = luminance(medium.transmittance([_chord(body) for body in bodies])).tolist()
         black += [(share, body) for share, body in zip(shares, bodies, strict=True) if share < BLACK]
     if not black:
         return ()
@@ -70,7 +71,8 @@ def _chord(body: Object) -> float:
 
 
 def _passes(medium: Medium, distance: float) -> float:
-    return float(luminance(medium.transmittance(distance)))
+    with np.errstate(under="ignore"):
+        return float(luminance(medium.transmittance(distance)))
 
 
 def _distance(medium: Medium, share: float) -> float:

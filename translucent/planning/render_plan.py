@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from translucent.planning.caustics import Caustics
-from translucent.planning.interfaces import Interfaces
+from translucent.planning.interfaces import Interfaces, TracedInterfaces
+from translucent.planning.interfaces.traced import RECORD_SIZE
 from translucent.planning.methods import Method, PathTraced
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
@@ -124,6 +125,14 @@ class RenderPlan:
     def says(self, kind: NoteKind) -> bool:
         """True if the plan has a note of this kind: a limit, an effect that it does not model, or a remark."""
         return any(note.kind is kind for note in (*self.limits, *self.unmodelled, *self.remarks))
+
+    def invalid_text(self, invalid: int, covered: int) -> str:
+        """Warning of so many pixels that cannot be trusted."""
+        unbalanced = "a surface that does not balance"
+        if isinstance(self.interfaces, TracedInterfaces):
+            unbalanced += f", or more than {RECORD_SIZE} bodies over one another, where rays are traced"
+        why = "; ".join(map(str, self.limits)) or unbalanced
+        return f"{invalid} pixels are not valid ({covered} are covered): {why}"
 
     def summary(self) -> dict[str, object]:
         """Plan as values that JSON can hold."""

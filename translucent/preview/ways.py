@@ -21,8 +21,8 @@ SCREEN = ScreenInterfaces()
 MANY = 1_000_000
 
 #: Shadows of a picture that moves: those of a few directions of the environment; and of fewer for many triangles, and
-#: while lights move, which takes new maps for every picture.
-QUICK_SHADOWS, QUICKER_SHADOWS = ShadowMaps(directions=8), ShadowMaps(directions=2)
+#: while lights move, which takes new maps for every picture. Pictures of two would be further off than without any.
+QUICK_SHADOWS, QUICKER_SHADOWS = ShadowMaps(directions=8), ShadowMaps(directions=4)
 
 
 class Ways:

@@ -50,7 +50,7 @@ def shadow_directions(environment: Environment, count: int) -> tuple[Array, Arra
     Returns
     -------
     directions : (count, 3) float64
-        Unit vectors in the world. The same for the same environment; read-only.
+        Unit vectors in the world. The same for the same environment; read-only. Every n-th of them are spread as all.
     irradiance : (count, 3) float64
         In W/m^2, on a surface that faces the direction: w_i. Their sum is the integral of radiance over all directions.
     """
@@ -97,13 +97,27 @@ def _shares(light: Array, solid_angles: Array) -> Array:
 
 def _drawn(share: Array, count: int) -> Integers:
     """(count,): pixels by their shares, row first and then column, from low-discrepancy points."""
-    points = sobol_points(count, scrambled=True)
+    points = sobol_points(count, scrambled=True)[_strided(count)]
     table = share.reshape(SIZE)
     rows = np.cumsum(table.sum(axis=1))
     row = np.minimum(np.searchsorted(rows, points[:, 0] * rows[-1], side="right"), SIZE[0] - 1)
     columns = np.cumsum(table[row], axis=1)
     column = np.minimum((columns <= points[:, 1:] * columns[:, -1:]).sum(axis=1), SIZE[1] - 1)
     return np.asarray(row * SIZE[1] + column)
+
+
+def _strided(count: int) -> Integers:
+    """(count,): order of the points of a Sobol sequence in which every n-th of them are as even as points in a row.
+
+    In a row each of 2^k points is in another of 2^k slices of the square, and every 2^k-th is in the same one. With
+    the digits of their numbers reversed (van der Corput 1935) it is the other way round.
+    """
+    digits = max(count - 1, 1).bit_length()
+    number = np.arange(1 << digits)
+    reverse = np.zeros_like(number)
+    for digit in range(digits):
+        reverse |= ((number >> digit) & 1) << (digits - 1 - digit)
+    return reverse[reverse < count]
 
 
 def _centered(directions: Array, ways: Array, share: Array) -> Array:

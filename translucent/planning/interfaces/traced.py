@@ -18,6 +18,9 @@ from translucent.scene.scene import Scene, object_names
 #: Largest number of interfaces that a ray may meet: each takes a walk through the meshes.
 MAX_DEPTH = 64
 
+#: Bodies that a traced ray can be in at once.
+RECORD_SIZE = 8
+
 #: Largest number of forks: rays multiply with each.
 MAX_FORKS = 4
 
