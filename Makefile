@@ -46,7 +46,7 @@ lint: ## check style, types and the layers of the imports
 	$(BIN)/lint-imports
 	@$(BIN)/python tools/build_web.py --if-npm --types
 
-bench: ## measure speed and error of every method into out/report/, in a quarter of an hour; BENCH_ARGS=--quick: in one or two minutes
+bench: ## measure speed and error of every method into out/report/, in half an hour; BENCH_ARGS=--quick: in one or two minutes
 	$(BOOTSTRAP) --group test
 	$(BIN)/translucent report -o out/report $(BENCH_ARGS)
 

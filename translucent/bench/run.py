@@ -82,7 +82,7 @@ def measure_all(
     methods : sequence of str
         Names or families of what to measure, ``"SignedDepth"`` or ``"signed-depth"``; default: all.
     quick : bool
-        Fewer cases, methods and repetitions: a minute instead of a quarter of an hour.
+        Fewer cases, methods and repetitions: a minute instead of half an hour.
     backend : str, optional
         Of the renderer; default: what works here.
     effort : Effort, optional
