@@ -56,7 +56,7 @@ class CellSystem:
         return np.asarray(found * self._scale), steps
 
     def rough(self, source: Array) -> Array:
-        """Fluence (cells,) for powers (cells,), to a hundredth, from which no other solution starts."""
+        """Fluence (cells,) for powers (cells,) up to a residual of `ROUGH`; no other solution starts from it."""
         return np.asarray(self._found(source * self._scale, None, ROUGH)[0] * self._scale)
 
     def _found(self, wanted: Array, near: Array | None, tolerance: float) -> tuple[Array, int]:
