@@ -12,7 +12,8 @@ import pytest
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.bake import canvas, measure, strips
+from translucent.bake import canvas, directions, measure, strips
+from translucent.bake import rays as following
 from translucent.bake.directions import Directions, _plain_sobol
 from translucent.bake.modes import RayMean, block_edges
 from translucent.bake.settings import BakeSettings
@@ -54,6 +55,9 @@ def test_the_same_bits_in_any_number_of_threads_and_chunks(
     for texels, rays in ((24, 16), (24 * 7, 1001), (1 << 20, 1 << 20)):
         monkeypatch.setattr(strips, "STRIP_TEXELS", texels)
         monkeypatch.setattr(measure, "CHUNK_RAYS", rays)
+        monkeypatch.setattr(directions, "CACHED_RAYS", rays // 3)
+        monkeypatch.setattr(following, "CACHED_RAYS", rays // 3)
+        monkeypatch.setattr(following, "FOLLOWED_RAYS", rays // 5)
         assert same(one, tl.bake_thickness(bear, 24, rays=16, threads=2, **asked))
 
 

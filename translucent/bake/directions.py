@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Floats
+from translucent.bake.rays import CACHED_RAYS
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points
 from translucent.formulas.sampling import MOST_POINTS, sobol_points
@@ -75,17 +76,21 @@ class Directions:
         """(3, k, end - begin): world directions of rays `begin` to `end` of each point."""
         sets = self.table.shape[1]
         chosen = _hash(points.exact, self.seed, sets) if sets > 1 else np.zeros(len(points), dtype=np.int64)
-        local = np.take(self.table[:, :, begin:end], chosen, axis=1)
         inward = -points.normal
-        tangent, bitangent = (axis.astype(np.float32) for axis in _tangents(inward))
-        normal = inward.astype(np.float32)
-        world = np.empty_like(local)
-        product = np.empty(local.shape[1:], dtype=np.float32)
-        for axis in range(3):
-            np.multiply(local[0], tangent[:, axis, None], out=world[axis])
-            for component, frame in ((1, bitangent), (2, normal)):
-                np.multiply(local[component], frame[:, axis, None], out=product)
-                world[axis] += product
+        frame = [axis.astype(np.float32) for axis in (*_tangents(inward), inward)]
+        table, rays = self.table[:, :, begin:end], end - begin
+        world = np.empty((3, len(points), rays), dtype=np.float32)
+        step = max(1, CACHED_RAYS // rays)
+        for first in range(0, len(points), step):
+            some = slice(first, first + step)
+            local = np.take(table, chosen[some], axis=1)
+            product = np.empty(local.shape[1:], dtype=np.float32)
+            for axis in range(3):
+                into = world[axis, some]
+                np.multiply(local[0], frame[0][some, axis, None], out=into)
+                for component in (1, 2):
+                    np.multiply(local[component], frame[component][some, axis, None], out=product)
+                    into += product
         return world
 
 

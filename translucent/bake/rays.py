@@ -30,9 +30,11 @@ GRAZING = 1e-6
 #: Distance behind the start within which a face is at it: rounding of float64, for all but the flattest angles.
 BEHIND = 1e-10
 
-
 #: Number of rays whose distances are computed at a time: their arrays stay in the cache of a processor.
-CACHED_RAYS = 1 << 14
+CACHED_RAYS = 1 << 16
+
+#: Number of rays that are followed face by face at a time: each has 120 bytes and more.
+FOLLOWED_RAYS = 1 << 17
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +71,10 @@ class Rays:
         shaped, leaving, faces = self.first(points, directions)
         distance, leaves, face = shaped.reshape(-1), leaving.reshape(-1), faces.reshape(-1)
         settled = leaves if self.gaps == "first-exit" else (distance >= self.reach) & (face >= 0)
-        ray = np.flatnonzero(~settled)
+        left = np.flatnonzero(~settled)
         traced = len(face)
-        if ray.size:
+        for begin in range(0, len(left), FOLLOWED_RAYS):
+            ray = left[begin : begin + FOLLOWED_RAYS]
             walk = _Walk.of(points.start[ray // rays], directions.reshape(3, -1)[:, ray].T.astype(np.float64))
             walk.pass_exit(leaves[ray], distance[ray], face[ray])
             traced += self._follow(walk)
@@ -105,17 +108,21 @@ class Rays:
         leaves: npt.NDArray[np.bool_],
     ) -> None:
         """Write distances (k, r) to the planes of faces (k, r), and whether rays leave there."""
-        # Index -1 takes some face.
-        plane = np.take(self.surface.planes, face, axis=0, mode="clip")
-        np.copyto(distance, plane[..., 3])
-        cosine = plane[..., 0] * directions[0]
-        product = np.multiply(plane[..., 0], start[:, 0, None])
-        distance -= product
+        columns, chosen = self.surface.plane_columns, face.astype(np.intp)
+        # Index -1 takes some face. Arrays stay contiguous and of one type, which NumPy multiplies twice as fast.
+        np.take(columns[3], chosen, mode="clip", out=distance)
+        normal, product = np.take(columns[0], chosen, mode="clip"), np.empty(face.shape)
+        cosine = directions[0].astype(np.float64)
+        cosine *= normal
+        normal *= start[:, 0, None]
+        distance -= normal
         for axis in (1, 2):
-            np.multiply(plane[..., axis], directions[axis], out=product)
+            np.take(columns[axis], chosen, mode="clip", out=normal)
+            np.copyto(product, directions[axis])
+            product *= normal
             cosine += product
-            np.multiply(plane[..., axis], start[:, axis, None], out=product)
-            distance -= product
+            normal *= start[:, axis, None]
+            distance -= normal
         distance /= cosine
         np.greater(cosine, GRAZING, out=leaves)
 

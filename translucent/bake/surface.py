@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -112,6 +113,11 @@ class Surface:
     def radius(self) -> float:
         """Metres per unit of length."""
         return self.embree.radius
+
+    @cached_property
+    def plane_columns(self) -> Array:
+        """(4, m): `planes`, of which one number of each is taken at a time."""
+        return np.ascontiguousarray(self.planes.T)
 
     def points(self, face: Integers, barycentric: Array) -> Points:
         """Points of faces (k,) with barycentric weights (k, 3)."""
