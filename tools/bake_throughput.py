@@ -34,7 +34,7 @@ from translucent.bake.bake import bake_thickness
 from translucent.bake.batch import BatchReport, bake_many
 from translucent.bake.gltf.export import mesh_file
 from translucent.bake.jobs import Job
-from translucent.bake.measure import CHUNK_RAYS, Measure
+from translucent.bake.measure import Measure
 from translucent.bake.record import parts_of, read_record
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points, Surface
@@ -47,6 +47,8 @@ from translucent.mesh_files import load_mesh
 
 #: Rays that Embree alone traces in a round: enough for some seconds, and little memory.
 SAMPLE = 1 << 23
+#: Of these, rays that a thread takes at a time: so few that threads end together.
+PORTION = 1 << 17
 
 
 def throughput(
@@ -204,9 +206,9 @@ def _some_points(surface: Surface, unwrapped: Unwrapped, size: int, most: int) -
 
 
 def _prepared(measure: Measure, points: Points) -> list[tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]]:
-    """Origins and directions (n, 3) of the rays of points, in the portions that a bake traces at a time."""
+    """Origins and directions (n, 3) of the rays of points, in portions, in the order in which a bake traces them."""
     rays = measure.settings.rays
-    step, parts = max(1, CHUNK_RAYS // rays), []
+    step, parts = max(1, PORTION // rays), []
     for begin in range(0, len(points), step):
         some = points[begin : begin + step]
         origins = np.repeat(measure.rays.starts(some), rays, axis=0)
