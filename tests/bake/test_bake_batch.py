@@ -438,7 +438,7 @@ def test_ctrl_c_leaves_nothing(many: bool, ball_glb: Path, tmp_path: Path) -> No
     where = ["--out-dir", str(folder)] if many else ["-o", str(folder / "ball.exr")]
     # Spawned processes run the script, too, but for its end.
     (tmp_path / "bake.py").write_text(TELLING)
-    # Sixteen strips: the first two end, each after a second of a core, and most of the others would take seconds.
+    # Twelve seconds of a core in all, in sixteen strips: what has begun ends soon, and most has not begun.
     options = ["--rays", "512", "--size", "512"]
     command = [sys.executable, str(tmp_path / "bake.py"), "bake", str(ball_glb), *where, *options]
     # A shell that runs tests in the background has its children ignore what Ctrl-C sends.
