@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import json
 import shutil
@@ -32,6 +33,12 @@ v.validateBytes(new Uint8Array(fs.readFileSync(file)), {externalResourceFunction
 
 settings.register_profile("project", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("project")
+
+
+def pytest_collection_finish() -> None:
+    """Keep what lasts as long as the session, thousands of tests among it, from every later garbage collection."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

@@ -50,12 +50,12 @@ def little(snippet: str) -> str:
 NEW_UV = unwrap._new_uv
 
 #: What xatlas has made, which takes it seconds for a bear.
-UNWRAPPED: dict[tuple[bytes, bytes, int], Any] = {}
+UNWRAPPED: dict[tuple[bytes, bytes], Any] = {}
 
 
 def new_uv(mesh: tl.Mesh, size: int) -> Any:
-    """Texture coordinates, made once for each mesh."""
-    key = mesh.vertices.tobytes(), mesh.faces.tobytes(), size
+    """Texture coordinates, made once for each mesh, for a map of any size: pages need some, not the best."""
+    key = mesh.vertices.tobytes(), mesh.faces.tobytes()
     if key not in UNWRAPPED:
         UNWRAPPED[key] = NEW_UV(mesh, size)
     return UNWRAPPED[key]

@@ -79,16 +79,6 @@ def check(renderer: tl.Renderer, line: int, expected: np.ndarray) -> bool:
     return True
 
 
-@pytest.fixture
-def old_objects_stay() -> Iterator[None]:
-    """Keep what is there before the test from being looked through at each of its garbage collections."""
-    gc.collect()
-    gc.freeze()
-    yield
-    gc.unfreeze()
-
-
-@pytest.mark.usefixtures("old_objects_stay")
 def test_a_frame_that_is_interrupted_anywhere_leaves_a_renderer_that_works() -> None:
     with tl.Renderer() as renderer, tl.Renderer() as other:
         expected = picture(renderer)
