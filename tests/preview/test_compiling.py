@@ -6,6 +6,7 @@ import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from translucent.geometry.normals import corner_normals, drawn_normals, has_draw
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.ledger import Ledger, PostponedError, ProgramName
 from translucent.gpu.packed_meshes import has_packed
+from translucent.gpu.viewport import Viewport
 from translucent.planning.passes import PassName
 from translucent.preview import compiling, tracing
 from translucent.preview import stage as stages
@@ -170,6 +172,31 @@ def test_programs_are_compiled_elsewhere_for_each_kind_of_texture() -> None:
             with pytest.raises(PostponedError) as postponed:
                 draw(64)
             assert postponed.value.program is not None
+
+
+def test_what_adds_samples_is_compiled_in_a_frame_of_its_own() -> None:
+    """What stores the first sample of a pixel, and what blends others with it, are two programs to a driver."""
+    scene, steps = showcase(Sphere().tessellate(8)), list[bool]()
+    with tl.Renderer() as renderer, renderer.gpu.context.current():
+        renderer.gpu.context.gl.extra = ledger = Ledger()
+        viewport, plan = Viewport(renderer.gpu), renderer.plan(scene)
+        viewport.resize(SIZE)
+        ledger.begin_frame(60.0)
+        for _ in range(2):
+            viewport.step(0, scene, plan, 1)
+        wanted = viewport.mean_radiance()
+        viewport.restart()
+        viewport._added.clear()  # all else is there
+        ledger.postpones = True
+        for _ in range(4):
+            ledger.begin_frame(-1.0)
+            before = viewport.steps(0)
+            with suppress(PostponedError):
+                viewport.step(0, scene, plan, 1)
+            steps.append(viewport.steps(0) > before)
+        assert viewport.mean_radiance() == pytest.approx(wanted, rel=1e-6)
+        viewport.release()
+    assert steps == [False, True, False, True]
 
 
 def test_normals_of_a_large_mesh_come_from_another_process(

@@ -140,9 +140,7 @@ def test_a_model_on_a_stage_is_measured_without_it() -> None:
     assert seen.environment_shadows == 0
 
 
-def test_photons_in_media_are_followed_by_a_thread(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_photons_in_media_are_followed_aside(stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
     """Before others; with nothing that these could land on, the picture is one without rounds."""
     if not stage.renderer.gpu.capabilities.shader_storage:
         pytest.skip("this OpenGL has no shader storage buffers, without which nothing marches")
@@ -153,7 +151,7 @@ def test_photons_in_media_are_followed_by_a_thread(
     found, lane = photons.Photons(), work.lanes["diffuse"]
 
     def ready() -> bool:
-        return found.ready(scene, stage.renderer, stage.viewport, None, tl.Diffusion(8), lane, 0.1, 0.0)
+        return found.ready(work, scene, stage.renderer, stage.viewport, None, tl.Diffusion(8), 0.1, 0.0)
 
     with stage.current():
         assert not ready()

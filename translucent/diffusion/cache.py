@@ -95,6 +95,11 @@ class FieldCache:
         with self._lock:
             return _kept(self._scenes, key, make, KEPT_SCENES)
 
+    def keep(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None, fields: Fields) -> None:
+        """Keep the light of a scene that another solver has found."""
+        with self._lock:
+            _kept(self._scenes, diffusion_key(scene, diffusion, caustics), lambda: fields, KEPT_SCENES)
+
     def has(self, key: Hashable) -> bool:
         """True if the light of this `diffusion_key` is known."""
         return key in self._scenes
@@ -119,7 +124,11 @@ class FieldCache:
         place = place_of(body), body.density, places, step
         lit = _kept(self._bodies, place, lambda: lit_body(body, opaque, step), KEPT_BODIES)
         key = (place, medium, roughness)
-        return _kept(self._diffusing, key, lambda: DiffusingBody(lit, medium, roughness), KEPT_BODIES)
+
+        def make() -> DiffusingBody:
+            return DiffusingBody(lit, medium, roughness, corrected=diffusion.corrected)
+
+        return _kept(self._diffusing, key, make, KEPT_BODIES)
 
     def _volume(self, body: Object, medium: Medium, diffusion: Diffusion) -> DiffusingVolume:
         grid, key = self._grid(body, diffusion), (_density_place(body, diffusion), coefficients_of(medium))

@@ -220,14 +220,16 @@ class DiffusingBody:
     medium : Medium
     roughness : float
         Of its surface.
+    corrected : bool
+        By uniform light; see `BodySystem`.
     """
 
     @np.errstate(under="ignore")
-    def __init__(self, lit: LitBody, medium: Medium, roughness: float) -> None:
+    def __init__(self, lit: LitBody, medium: Medium, roughness: float, *, corrected: bool = True) -> None:
         self._lit, self._medium, self._roughness = lit, medium, roughness
         self._interface = diffuse_interface(medium.ior, roughness)
         self._entrance = lit.entrance(medium.ior, roughness)
-        self._system = BodySystem(lit.grid, medium, roughness, lit.densities)
+        self._system = BodySystem(lit.grid, medium, roughness, lit.densities, corrected=corrected)
 
     @np.errstate(under="ignore")
     def field(

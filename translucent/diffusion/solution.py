@@ -75,10 +75,21 @@ class BodySystem:
         Of its surface.
     dense : Densities, optional
         Of the body; default: `even_densities`.
+    corrected : bool
+        What diffusion gets wrong of uniform light around such a body without losses is taken out: it takes as long as
+        all else.
     """
 
     @np.errstate(under="ignore")
-    def __init__(self, grid: BodyGrid, medium: Medium, roughness: float, dense: Densities | None = None) -> None:
+    def __init__(
+        self,
+        grid: BodyGrid,
+        medium: Medium,
+        roughness: float,
+        dense: Densities | None = None,
+        *,
+        corrected: bool = True,
+    ) -> None:
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         self._grid, self._dense = grid, dense or even_densities(grid)
@@ -93,6 +104,7 @@ class BodySystem:
                 self._dense,
                 ways,
                 medium.anisotropy,
+                corrected=corrected,
             )
             for channel, (absorption, scattering) in enumerate(zip(np.asarray(medium.absorption), reduced, strict=True))
             if scattering > 0.0
@@ -155,7 +167,7 @@ class _Channel:
         ways: Ways,
         anisotropy: float = 0.0,
         *,
-        uneven: bool = True,
+        corrected: bool,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
         self._exit_share = interface.exit_share
@@ -182,8 +194,8 @@ class _Channel:
         absorbed = absorption * dense.cells * absorbing
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
         self._correction = np.ones(len(depth))
-        if uneven:
-            lossless = _Channel(grid, ior, roughness, 0.0, extinction, dense, ways, uneven=False)
+        if corrected:
+            lossless = _Channel(grid, ior, roughness, 0.0, extinction, dense, ways, corrected=False)
             # What half-spaces absorb has not been in the body long enough to get to other parts of it.
             share = half_space_reflectance(round(self._albedo, 6), ior)
             found = lossless.by_uniform_light(scattered_shares(grid, dense, ior, extinction))

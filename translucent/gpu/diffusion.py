@@ -118,6 +118,10 @@ class DiffusionCache:
         """Find the light of a scene whose media are marked, to be drawn later. Needs no context: a thread may do it."""
         self._solver(diffusion).of(scene, diffusion, caustics)
 
+    def keep(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None, fields: Fields) -> None:
+        """Keep the light of such a scene that was found elsewhere. Needs no context, either."""
+        self._solver(diffusion).keep(scene, diffusion, caustics, fields)
+
     def release(self) -> None:
         """Free the texture."""
         self._release_last()

@@ -19,7 +19,7 @@ from translucent.formulas.tone import TONES
 from translucent.frames.aovs import EMPTY, SEEN, WRONG, false_colors
 from translucent.frames.frame import Frame
 from translucent.gpu.job import FrameJob
-from translucent.gpu.ledger import before_making
+from translucent.gpu.ledger import before_drawing, before_making
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import build_program, set_uniform
 from translucent.gpu.strides import STRIDES, phases, shifts
@@ -98,6 +98,8 @@ class Viewport:
             gl, vertex, "present/gather.frag", radiance=0, optical_depth=1, thickness=2, flags=3
         )
         self._gathering = gl.vertex_array(self._gather, [])
+        #: Kinds of samples, the first of a pixel or others, that have been added.
+        self._added: set[bool] = set()
         self._draw_part = build_program(gl, "present/window.vert", "present/window.frag", picture=0)
         self._drawing_part = gl.vertex_array(self._draw_part, [])
         self._variants: dict[tuple[int, ...], tuple[moderngl.Program, moderngl.VertexArray]] = {}
@@ -224,6 +226,7 @@ class Viewport:
             job.photon_light = photons, stride, phase
         try:
             job.place(((phase[0] + 0.5 + right) / stride - 0.5, (phase[1] + 0.5 + down) / stride - 0.5))
+            self._make_ready(job, chosen, first=round_ == 0)
             engine.run(job)
             self._add(job, chosen, (phase[0] * size[0], phase[1] * size[1]), first=round_ == 0)
         finally:
@@ -370,18 +373,33 @@ class Viewport:
             side = self._sides[number] = Side(self._gl, size)
         return side
 
+    def _make_ready(self, job: FrameJob, side: Side, *, first: bool) -> None:
+        """Have the driver compile what adds samples, which takes as long as a step: a window has a frame for it."""
+        if first in self._added:
+            return
+        before_making(self._gl)
+        into = side.all if first else side.light
+        into.scissor = 0, 0, 0, 0
+        self._gather_into(into, job, blends=not first)
+        into.scissor = None
+        self._added.add(first)
+        before_drawing(self._gl)
+
     def _add(self, job: FrameJob, side: Side, origin: Size, *, first: bool) -> None:
         """Store the frame of a job: in place of the last one, or added to its radiance."""
+        set_uniform(self._gather, "origin", origin)
+        into = side.all if first else side.light
+        into.viewport = (*origin, *job.targets.size)
+        self._gather_into(into, job, blends=not first)
+
+    def _gather_into(self, into: moderngl.Framebuffer, job: FrameJob, *, blends: bool) -> None:
         result = job.targets.result()
         radiance = job.picture.color_attachments[0]
         for unit, texture in enumerate([radiance, *result.color_attachments[2:5]]):
             texture.use(unit)
-        set_uniform(self._gather, "origin", origin)
-        into = side.all if first else side.light
-        into.viewport = (*origin, *job.targets.size)
         into.use()
-        self._gl.enable_only(moderngl.NOTHING if first else moderngl.BLEND)
-        if not first:
+        self._gl.enable_only(moderngl.BLEND if blends else moderngl.NOTHING)
+        if blends:
             self._gl.blend_equation = moderngl.FUNC_ADD
             self._gl.blend_func = moderngl.ONE, moderngl.ONE
         self._gathering.render(moderngl.TRIANGLES, vertices=3)

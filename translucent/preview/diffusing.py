@@ -1,17 +1,26 @@
-"""Light that is scattered many times: on a small grid while things move, and solved for in a thread when they rest."""
+"""Light that is scattered many times: on a small grid while things move, and solved for in a worker process at rest."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
+from functools import cache as kept
+from functools import partial
+from typing import TYPE_CHECKING
 
 from translucent.diffusion.keys import diffusion_key, place_of
 from translucent.gpu.diffusion import DiffusionCache
+from translucent.planning.caustics import Caustics
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
 from translucent.planning.scattering.choice import GivenBack, given_back, shown
-from translucent.preview.tasks import Lane, Task
+from translucent.preview.tasks import Report, Task
+from translucent.preview.worker import Pool, Urgency
+from translucent.preview.workspace import Workspace
 from translucent.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from translucent.diffusion.cache import FieldCache, Fields
 
 #: Grid on which light is solved for in the frame while things move: in the bear, other lights take 10 ms of processor
 #: time and another medium 20 ms, a fifth of what they take on the usual one. Pixels of milk, jade and wax in bear and
@@ -58,7 +67,7 @@ class Diffusing:
         self._cut: Hashable = None
 
     def scattering(
-        self, scene: Scene, asked: Scattering | None, back: GivenBack, cache: DiffusionCache, lane: Lane
+        self, workspace: Workspace, scene: Scene, asked: Scattering | None, back: GivenBack, cache: DiffusionCache
     ) -> Scattering | None:
         """Scattering to draw with: that asked for if its light is known, else a simpler one, while the search goes on.
 
@@ -66,14 +75,14 @@ class Diffusing:
 
         Parameters
         ----------
+        workspace : Workspace
+            Whose lane and processes search.
         scene : Scene
         asked : Scattering or None
         back : GivenBack
             What the planner makes of that.
         cache : DiffusionCache
             Light that is known.
-        lane : Lane
-            For the search.
         """
         self.told, self.solved = "", False
         if not back.solved:
@@ -91,8 +100,9 @@ class Diffusing:
             self.told = NEVER.format(simply)
             return instead
         small = self._smaller(scene, asked, back)
-        if lane.task is None and not moves:
-            task = lane.start("diffusing light", lambda _: self._solve(scene, small, back, cache), lambda _: None)
+        if (lane := workspace.lanes["diffuse"]).task is None and not moves:
+            solve = partial(self._solve, workspace.pool, scene, small, back, cache)
+            task = lane.start("diffusing light", solve, lambda _: None)
             self._solving = _Solving(key, task)
         if small is not None and self._known(scene, small, cache):
             simply, instead = f"on a small grid, {SMALL} for {diffusion}", SMALL
@@ -123,12 +133,38 @@ class Diffusing:
             self._cut = None
         return True
 
-    def _solve(self, scene: Scene, small: GivenBack | None, back: GivenBack, cache: DiffusionCache) -> None:
-        """Solve for light in a thread: on the small grid if that is new to the bodies, and on the one asked for."""
+    def _solve(
+        self, pool: Pool, scene: Scene, small: GivenBack | None, back: GivenBack, cache: DiffusionCache, task: Task
+    ) -> None:
+        """Solve for light: on the small grid here if that is new to the bodies, on the one asked for in a process."""
         if small is not None and self._cut != (bodies := _bodies(scene, small)):
             cache.solve(shown(scene, small).with_ambient_emitted, SMALL)
             self._cut = bodies
-        cache.solve(shown(scene, back).with_ambient_emitted, back.diffusion)
+        solve_aside(task, pool, cache, shown(scene, back).with_ambient_emitted, back.diffusion)
+
+
+def solve_aside(
+    task: Task, pool: Pool, cache: DiffusionCache, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None
+) -> None:
+    """Find the light of a scene whose media are marked in a worker process, for a cache.
+
+    In a thread, it would share Python's lock with the window, whose frames would take twice as long.
+    """
+    found = pool.call(task, solved_light, scene, diffusion, caustics, urgency=Urgency.PICTURE)
+    cache.keep(scene, diffusion, caustics, found)
+
+
+def solved_light(report: Report, scene: Scene, diffusion: Diffusion, caustics: Caustics | None) -> Fields:
+    """Light of a scene whose media are marked, by the solver of this process, which keeps what it knows of bodies."""
+    report(None, "")
+    return _solver().of(scene, diffusion, caustics)
+
+
+@kept
+def _solver() -> FieldCache:
+    from translucent.diffusion.cache import FieldCache  # with SciPy, which the window does without as long as it can
+
+    return FieldCache()
 
 
 def _bodies(scene: Scene, back: GivenBack) -> Hashable:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from functools import partial
 
 from translucent.diffusion.keys import diffusion_key
 from translucent.errors import InputError
@@ -16,7 +15,9 @@ from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Scattering
 from translucent.planning.scattering.choice import shown
-from translucent.preview.tasks import Lane, Task
+from translucent.preview.diffusing import solve_aside
+from translucent.preview.tasks import Task
+from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
@@ -66,26 +67,26 @@ class Photons:
 
     def ready(
         self,
+        workspace: Workspace,
         scene: Scene,
         renderer: Renderer,
         viewport: Viewport,
         method: Method | None,
         scattering: Scattering | None,
-        lane: Lane,
         seconds: float,
         drawing: float,
     ) -> bool:
         """Follow photons for about so many seconds, unless a picture is being drawn; whether any are to be followed.
 
         Pictures are expected to take `drawing` seconds. Those that light media are followed first, all at once, in a
-        `lane`.
+        worker process.
         """
         try:
             if self._scene is not scene:
                 self.stop(viewport)
                 self._scene = scene
                 self.plan = renderer.plan(scene, method, scattering=scattering, caustics=Caustics(ROUND))
-            if self.plan is None or self.done or not self._media_known(scene, renderer, lane):
+            if self.plan is None or self.done or not self._media_known(workspace, scene, renderer):
                 return False
             if not self.plan.has(PassName.CAUSTICS):
                 return False  # nothing opaque that more could land on
@@ -109,7 +110,7 @@ class Photons:
             self._tell()
         return True
 
-    def _media_known(self, scene: Scene, renderer: Renderer, lane: Lane) -> bool:
+    def _media_known(self, workspace: Workspace, scene: Scene, renderer: Renderer) -> bool:
         """True if the light of photons in media is known, if there is any; else it is searched for."""
         assert self.plan is not None
         back, caustics, cache = self.plan.given_back, self.plan.caustics, renderer.gpu.diffusion
@@ -124,10 +125,10 @@ class Photons:
             return True
         if self._solving is not None and (self._solving.cancelled or self._solving.error is not None):
             self.told = "no caustics: what photons light in media could not be solved for"
-        elif lane.task is None:
+        elif (lane := workspace.lanes["diffuse"]).task is None:
             self.told = "caustics: photons in media first"
-            solve = partial(cache.solve, marked, back.diffusion, caustics)
-            self._solving = lane.start("photons in media", lambda _: solve(), lambda _: None)
+            given = workspace.pool, cache, marked, back.diffusion, caustics
+            self._solving = lane.start("photons in media", lambda task: solve_aside(task, *given), lambda _: None)
         return False
 
     def show_media(self, viewport: Viewport) -> RenderPlan | None:

@@ -22,7 +22,7 @@ from translucent.preview.presenting import Presenting
 from translucent.preview.scenes import method_of
 from translucent.preview.staging import tone_of
 from translucent.preview.strides import Strides, samples_of
-from translucent.preview.tasks import Lane, Task
+from translucent.preview.tasks import Task
 from translucent.preview.timing import COARSEST_TRACED, FACTORS, PREPARING, FrameBudget, Pace, Timing
 from translucent.preview.ways import SCREEN, Ways
 from translucent.preview.workspace import Workspace
@@ -192,7 +192,7 @@ class Stage:
         if display.converges and still and not more:
             more, drawn = self.converging.step(scene, self.renderer, self.viewport, self._budget)
         if lit:
-            more, drawn = self._light_by_photons(scene, methods[0], display.antialias, workspace.lanes["diffuse"])
+            more, drawn = self._light_by_photons(scene, methods[0], display.antialias, workspace)
             if self.photons.light is None and not more:  # there are no photons to follow
                 more = drawn = self._step(0, scene, display.antialias)
         return self._presenting.present(self.viewport, changed=drawn, last=not more) or more
@@ -252,12 +252,16 @@ class Stage:
             self.viewport.restart(side)
         return True
 
-    def _light_by_photons(self, scene: Scene, method: Method | None, antialias: bool, lane: Lane) -> tuple[bool, bool]:
+    def _light_by_photons(
+        self, scene: Scene, method: Method | None, antialias: bool, workspace: Workspace
+    ) -> tuple[bool, bool]:
         """Follow photons, or draw a step of the picture with their light; whether more is to come, and it changed."""
         photons = self.photons
         expected = 0.0 if self.plans[0] is None else self._pace.known(self.plans[0])
         scattering = self.ways.scattering
-        if not photons.ready(scene, self.renderer, self.viewport, method, scattering, lane, self._budget, expected):
+        if not photons.ready(
+            workspace, scene, self.renderer, self.viewport, method, scattering, self._budget, expected
+        ):
             if (plan := photons.show_media(self.viewport)) is not None:
                 self.plans[0], self._strides.of[0] = plan, self._pace.stride(plan, self._budget)
             return False, False

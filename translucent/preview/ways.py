@@ -61,8 +61,7 @@ class Ways:
         """Choose the ways in which to draw now, and request what better ones need."""
         asked = scattering_of(workspace.document.display.scattering)
         back = renderer.plan(scene, method, scattering=asked).given_back
-        cache, lane = renderer.gpu.diffusion, workspace.lanes["diffuse"]
-        self.scattering = self._diffusing.scattering(scene, asked, back, cache, lane)
+        self.scattering = self._diffusing.scattering(workspace, scene, asked, back, renderer.gpu.diffusion)
         self._tracing.told = ""
         traced = renderer.plan(scene, method, scattering=self.scattering).has(PassName.TRACED)
         self.interfaces = None if not traced or self.traceable(workspace, scene) else SCREEN

@@ -35,7 +35,7 @@ from translucent.scene.texture import Texture
 PATIENCE = 0.1
 
 #: Niceness of processes whose work the picture waits for, and of the others, so that the window comes first.
-URGENT_NICENESS, NICENESS = 4, 10
+URGENT_NICENESS, NICENESS = 10, 19
 
 #: Seconds that canceled work has to end, before its process is ended.
 PARTING = 5.0
