@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol, TypeVar, cast
 
 from translucent import reference
 from translucent.bench.scattering.engines import Engine
@@ -29,6 +29,8 @@ from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
 Size = tuple[int, int]
+
+Made = TypeVar("Made")
 
 
 class Drawing(Protocol):
@@ -68,14 +70,17 @@ class Studio:
         self.resources = Resources(self.gl)
         self.timer = PassTimer(self.gl)
         self.clock = time.process_time if is_software(renderer) else time.perf_counter
-        self._passes: dict[type[Pass], Pass] = {}
+        self._own: dict[Callable[[Any], Any], Any] = {}
 
     def step(self, name: PassName) -> Pass:
-        """Pass with this name in plans."""
-        kind = PASSES[name]
-        if kind not in self._passes:
-            self._passes[kind] = kind(self.gl)
-        return self._passes[kind]
+        """Pass with this name in plans: that of the renderer, as another would compile its programs again."""
+        return self.renderer.gpu.step(PASSES[name])
+
+    def own(self, kind: Callable[[Any], Made]) -> Made:
+        """What is in no plan, made of the context alone, and once: its programs are compiled once, too."""
+        if kind not in self._own:
+            self._own[kind] = kind(self.gl)
+        return cast("Made", self._own[kind])
 
     def timed(self, geometry: Callable[[], None], shading: Callable[[], None]) -> Sample:
         """Draw the part that finds thickness, then the rest of the frame; each until the device has finished."""
@@ -93,7 +98,7 @@ class Studio:
     def release(self) -> None:
         """Free all resources."""
         self.resources.release()
-        self._passes.clear()
+        self._own.clear()
 
 
 class _OnGpu:
@@ -144,7 +149,7 @@ class Floor:
         self._staging = (PassSpec(PassName.OPAQUE, "staging", opaque, 1),) if opaque else ()
         self._studio = studio
         self._job = FrameJob(studio.gl, scene, RenderPlan(SignedDepth(), self._staging), targets, studio.resources)
-        self._pass = DepthOnlyPass(studio.gl)
+        self._pass = studio.own(DepthOnlyPass)
 
     def draw(self) -> Sample:
         """Draw the floor."""
