@@ -106,6 +106,7 @@ class CaseRun:
             entry.frame = None
             self._entries.append(entry)
         rows = mark_frontier(self._timed(scene), blank.quantity)
+        self.studio.forget_light()
         return dataclasses.replace(blank, rows=rows, pictures=tuple(pictures))
 
     def _truth(self, scene: Scene, size: Size) -> Truth:
