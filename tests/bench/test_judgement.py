@@ -16,7 +16,18 @@ from translucent.bench.hard.measure import CASES
 from translucent.bench.record import CaseRecord, HardCase, Report, ScalePoint, Series
 from translucent.bench.row import Errors, Ratio, Row, Timing
 from translucent.bench.shadows.record import ShadowCase, ShadowRow, Shadows
-from translucent.bench.timing import FEWEST, FEWEST_UNSURE, MOST, MOST_REPEATED, Sample, interleaved, ratio, timing
+from translucent.bench.timing import (
+    FEWEST,
+    FEWEST_LONG,
+    FEWEST_UNSURE,
+    MOST,
+    MOST_REPEATED,
+    Pace,
+    Sample,
+    interleaved,
+    ratio,
+    timing,
+)
 
 from .test_record import PROVENANCE
 
@@ -282,7 +293,7 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
 
     # A share of 0.1 s: five rounds of 0.01 s with a floor of as much, and four times as many.
     drawings = {"sure": steady(0.01), "unsure": unsteady(0.01)}
-    found = interleaved(steady(0.01), drawings, 0.23, lambda *_: None, patience=4.0)
+    found = interleaved(steady(0.01), drawings, 0.23, lambda *_: None, Pace(patience=4.0))
     assert len(found["sure"].wall) == 5
     assert 19 <= len(found["unsure"].wall) <= 21
     # In haste: three rounds, more only of what is unsure and cheap.
@@ -292,6 +303,14 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
         "sure": FEWEST,
         "unsure": FEWEST_UNSURE,
         "dear": FEWEST,
+    }
+    # A pace for those who wait: two rounds of what is long.
+    drawings = {"sure": steady(0.008), "unsure": unsteady(0.007), "long": unsteady(0.1)}
+    quick = interleaved(steady(0.005), drawings, 0.0, lambda *_: None, Pace(long=0.05, floors=2))
+    assert {name: len(one.wall) for name, one in quick.items()} == {
+        "sure": FEWEST,
+        "unsure": FEWEST_UNSURE,
+        "long": FEWEST_LONG,
     }
     # Sixteen drawings make a sample, whose mean is steady; all of them count as spent.
     tiny = interleaved(steady(2.5e-4), {"tiny": unsteady(1e-4)}, 0.1, lambda *_: None)["tiny"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import get_args
+from typing import NoReturn, get_args
 
+import moderngl
 import numpy as np
 import pytest
 
@@ -30,8 +31,10 @@ from translucent.bench.truth import Truth
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes.depth_only import DepthOnlyPass
 from translucent.gpu.passes.opaque import OpaquePass
+from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.storage import Storage
 from translucent.gpu.targets import Targets
+from translucent.planning.passes import PassName
 
 #: Rounds are few and frames small: what is tested is that there are numbers.
 HASTE = Effort(0.0, 0.0, 0.4)
@@ -67,6 +70,22 @@ def test_rows_have_times_errors_and_pictures(studio: Studio) -> None:
     assert error is not None
     # The picture's error is that of the row, silhouettes aside.
     assert np.nanstd(error.array()) == pytest.approx(constant.thickness.rms, rel=0.2)
+
+
+def test_programs_are_compiled_once_for_all_scenes_and_for_the_renderer(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = ("SignedDepth", "constant thickness", "sphere assumption", "BackFaceDepth")
+    measured(studio, case_of(lying_torus(24)), *names)
+
+    def compiled(*_: object, **__: object) -> NoReturn:
+        raise AssertionError("a program that there is")
+
+    monkeypatch.setattr(moderngl.Context, "program", compiled)
+    again = measured(studio, case_of(lying_torus(20)), *names)
+    assert len(again.rows) >= 8
+    assert not [row.failure for row in again.rows if row.failure]
+    assert studio.step(PassName.SIGNED_DEPTH) is studio.renderer.gpu.step(SignedDepthPass), "one for both"
 
 
 @pytest.fixture

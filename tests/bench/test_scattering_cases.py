@@ -19,6 +19,7 @@ from translucent.bench.scattering.scenes import SCENES, ScatteringScene
 from translucent.bench.scattering.shot import RAYS, cosine_directions, shot_of
 from translucent.bench.scattering.stored import StoredTruth, file_name, stored_truth
 from translucent.bench.truth import Truth
+from translucent.diffusion.cache import FieldCache
 from translucent.errors import InputError
 from translucent.geometry.solids import Sphere
 
@@ -87,9 +88,13 @@ def test_errors_are_shares_of_the_mean_without_the_noise() -> None:
     assert found.block == pytest.approx(wanted, rel=0.1)
 
 
-def test_diffusion_is_nearer_than_layers_and_what_engines_do(studio: Studio) -> None:
+def test_diffusion_is_nearer_than_layers_and_what_engines_do(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     names = ("diffusion-resolution-16", "diffusion-resolution-32", "ScatteringLayer", "layer-without-inner-mirrors")
+    solved: list[tl.Diffusion] = []
+    solve = FieldCache._body
+    monkeypatch.setattr(FieldCache, "_body", lambda *given: (solved.append(given[-1]), solve(*given))[1])
     made = measured(studio, named("jade ring"), *names)
+    assert solved == [tl.Diffusion(16), tl.Diffusion(32)], "once each, though drawn in two sizes"
     assert made.truth_noise is not None
     assert made.compared_size == (40, 40)
     rows = {row.method: row for row in made.rows if row.kind != "floor"}

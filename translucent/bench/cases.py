@@ -51,7 +51,7 @@ class Case:
     quick : bool
         Measured with ``--quick``, too.
     brief : bool
-        Only the contenders of ``--quick``: another case of this kind has them all.
+        Only the contenders that are `brief`: another case of this kind has them all.
     shrink : int
         Timed at this part of the width and height: many steps along each ray take long.
     compared : int

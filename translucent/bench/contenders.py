@@ -45,8 +45,8 @@ _SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
 #: Largest number of steps with light scattered into each: more take seconds for a frame.
 _MOST_LIT_STEPS = 128
 
-#: Trees of traced interfaces, as depth and forks, and whether ``--quick`` has them: from the cheapest tree to one whose
-#: depth is beyond the planner's, which is among them, each with as many forks as pay there.
+#: Trees of traced interfaces, as depth and forks, and whether brief cases have them: from the cheapest tree to one
+#: whose depth is beyond the planner's, which is among them, each with as many forks as pay there.
 _TREES = {(2, 0): True, (4, 0): False, (4, 1): True, (8, 1): False, (8, 2): False, (12, 2): True, (16, 3): False}
 
 
@@ -66,8 +66,10 @@ class Contender:
     kind : {"method", "counter-example", "cpu"}
     effects : tuple of str
         Cases in which it is measured.
+    brief : bool
+        Measured in brief cases, too.
     quick : bool
-        Measured with ``--quick``, too.
+        Measured with ``--quick``, too, if it is in brief cases.
     pictured : tuple of str
         Cases of which the report shows its picture.
     ior : {"matched", "refracted"}, optional
@@ -87,6 +89,7 @@ class Contender:
     technique: Technique = "plan"
     kind: Kind = "method"
     effects: tuple[Effect, ...] = _ALL
+    brief: bool = True
     quick: bool = True
     pictured: tuple[Effect, ...] = ()
     ior: Literal["matched", "refracted"] | None = None
@@ -123,11 +126,12 @@ def _ordered() -> Iterable[Contender]:
             name,
             "DepthPeeling",
             DepthPeeling(max_layers=layers),
-            quick=layers in (2, 8),
+            brief=layers in (2, 8),
+            quick=layers == 2,
         )
     yield Contender("DepthPeeling, all layers", "DepthPeeling", DepthPeeling(max_layers=MAX_LAYERS))
     for k in (2, 4, 8):
-        yield Contender(f"KBuffer, k = {k}", "KBuffer", KBuffer(k=k), quick=k == 8)
+        yield Contender(f"KBuffer, k = {k}", "KBuffer", KBuffer(k=k), brief=k == 8)
     yield Contender("FragmentLists", "FragmentLists", FragmentLists(), pictured=_SOURCES)
 
 
@@ -135,19 +139,19 @@ def _light_points() -> Iterable[Contender]:
     for points in (1, 2, 4):  # 8 is what FragmentLists does by itself
         name = f"FragmentLists, {points} light point{'s' if points > 1 else ''}"
         method = FragmentLists(light_points=points)
-        yield Contender(name, "FragmentLists", method, effects=("scattering",), quick=points != 2)
+        yield Contender(name, "FragmentLists", method, effects=("scattering",), brief=points != 2, quick=points == 1)
 
 
 def _marched() -> Iterable[Contender]:
     # Where media only absorb there is nothing to sum, and marching costs what its fragment lists cost.
     for steps in _STEPS:
-        quick = steps in (8, 64)
+        brief = steps in (8, 64)
         yield Contender(
             f"RayMarched, {steps} steps",
             "RayMarched",
             RayMarched(steps=steps),
             effects=_SOURCES if steps <= _MOST_LIT_STEPS else ("emission", "density"),
-            quick=quick,
+            brief=brief,
             pictured=_SOURCES if steps == 8 else (),
         )
         yield Contender(
@@ -157,15 +161,16 @@ def _marched() -> Iterable[Contender]:
             "march",
             "cpu",
             ("density",),
-            quick,
-            ("density",) if steps == 8 else (),
+            brief,
+            quick=steps == 8,
+            pictured=("density",) if steps == 8 else (),
         )
     for rule in get_args(Quadrature):
         if rule != "midpoint":
             steps = 16 if rule == "gauss" else 64  # shaders hold 16 Gauss points
             method = RayMarched(steps=steps, quadrature=rule)
             name = f"RayMarched, {steps} steps, {rule}"
-            yield Contender(name, "RayMarched", method, effects=_SOURCES, quick=rule == "equiangular")
+            yield Contender(name, "RayMarched", method, effects=_SOURCES, brief=rule == "equiangular")
 
 
 def _as_they_are() -> Iterable[Contender]:
@@ -201,19 +206,20 @@ def _with_interfaces() -> Iterable[Contender]:
     for one in (front, screen):
         name = type(one).__name__
         yield Contender(name, name, SignedDepth(), effects=every, pictured=every, interfaces=one)
-    for (depth, forks), quick in _TREES.items():
+    for (depth, forks), brief in _TREES.items():
         yield Contender(
             f"TracedInterfaces, depth {depth}, {'1 fork' if forks == 1 else f'{forks} forks'}",
             "TracedInterfaces",
             SignedDepth(),
             effects=every,
-            quick=quick,
+            brief=brief,
+            quick=depth != 4,
             pictured=every if (depth, forks) in ((2, 0), (12, 2)) else (),
             interfaces=TracedInterfaces(depth, forks),
         )
 
 
-#: Ways of showing light that is scattered many times, and whether ``--quick`` has them.
+#: Ways of showing light that is scattered many times, and whether ``--quick`` and brief cases have them.
 _SCATTERINGS: dict[str, tuple[Scattering, bool]] = {
     "SingleScattering": (SingleScattering(), False),
     "ScatteringLayer": (ScatteringLayer(), True),
@@ -243,13 +249,13 @@ def _with_scattering() -> Iterable[Contender]:
             pictured=every,
             engine=engine,
         )
-    for name, (scattering, quick) in _SCATTERINGS.items():
+    for name, (scattering, brief) in _SCATTERINGS.items():
         yield Contender(
             name,
             type(scattering).__name__,
             SignedDepth(),
             effects=every,
-            quick=quick,
+            brief=brief,
             pictured=every,
             scattering=scattering,
         )
@@ -262,7 +268,7 @@ def _path_traced() -> Iterable[Contender]:
             "PathTraced",
             PathTraced(paths=paths),
             effects=_WHOLE_FRAMES,
-            quick=False,
+            brief=False,
             pictured=_WHOLE_FRAMES if paths == _PATHS[-1] else (),
         )
 
@@ -271,7 +277,7 @@ CONTENDERS: tuple[Contender, ...] = (
     Contender("constant thickness", "constant thickness", ThinLayer(), "constant", "counter-example", pictured=_ALL),
     Contender("sphere assumption", "sphere assumption", ThinLayer(), "ball", "counter-example"),
     Contender("ThinLayer", "ThinLayer", ThinLayer(), ior="matched"),
-    Contender("ThinLayer, refracted", "ThinLayer", ThinLayer(), quick=False, ior="refracted"),
+    Contender("ThinLayer, refracted", "ThinLayer", ThinLayer(), brief=False, ior="refracted"),
     *_as_they_are(),
     Contender(
         "BackFaceDepth, unmarked",
@@ -298,18 +304,21 @@ CONTENDERS: tuple[Contender, ...] = (
     *_with_interfaces(),
     *_with_scattering(),
     *_path_traced(),
-    Contender("cpu backend", "cpu backend", FragmentLists(), "cpu", "cpu", (*_ALL, "interfaces"), quick=False),
+    Contender("cpu backend", "cpu backend", FragmentLists(), "cpu", "cpu", (*_ALL, "interfaces"), brief=False),
 )
 
 
-def contenders(effect: Effect, *, quick: bool, only: Iterable[str] = ()) -> tuple[Contender, ...]:
-    """Contenders on a case of this effect; `only` names contenders or families, as `check_names` accepts them."""
+def contenders(effect: Effect, *, quick: bool, brief: bool = False, only: Iterable[str] = ()) -> tuple[Contender, ...]:
+    """Contenders on a case of this effect, with ``--quick`` or in a brief case fewer; `only` names contenders or
+    families, as `check_names` accepts them.
+    """
     wanted = {_slug(name) for name in only}
     return tuple(
         one
         for one in CONTENDERS
         if effect in one.effects
-        and (one.quick or not quick or wanted)
+        and (wanted or one.brief or not (quick or brief))
+        and (wanted or one.quick or not quick)
         and (not wanted or wanted & {_slug(one.name), _slug(one.family)})
     )
 

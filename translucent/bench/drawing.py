@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol, TypeVar, cast
 
 from translucent import reference
 from translucent.bench.scattering.engines import Engine
@@ -23,12 +23,14 @@ from translucent.gpu.timer import PassTimer
 from translucent.planning.methods import RayMarched, SignedDepth
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
-from translucent.planning.scattering import SingleScattering
+from translucent.planning.scattering import Diffusion, SingleScattering
 from translucent.planning.scattering.choice import shown
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
 Size = tuple[int, int]
+
+Made = TypeVar("Made")
 
 
 class Drawing(Protocol):
@@ -46,7 +48,7 @@ class Drawing(Protocol):
 
     @property
     def solve_seconds(self) -> float | None:
-        """Seconds that were spent once on light that diffuses; None where none does."""
+        """Seconds that were spent on light that diffuses, which is solved for once; None where none does."""
 
     def release(self) -> None:
         """Free its resources."""
@@ -68,14 +70,30 @@ class Studio:
         self.resources = Resources(self.gl)
         self.timer = PassTimer(self.gl)
         self.clock = time.process_time if is_software(renderer) else time.perf_counter
-        self._passes: dict[type[Pass], Pass] = {}
+        self._own: dict[Callable[[Any], Any], Any] = {}
+        self._light: dict[Diffusion, DiffusionCache] = {}
 
     def step(self, name: PassName) -> Pass:
-        """Pass with this name in plans."""
-        kind = PASSES[name]
-        if kind not in self._passes:
-            self._passes[kind] = kind(self.gl)
-        return self._passes[kind]
+        """Pass with this name in plans: that of the renderer, as another would compile its programs again."""
+        return self.renderer.gpu.step(PASSES[name])
+
+    def own(self, kind: Callable[[Any], Made]) -> Made:
+        """What is in no plan, made of the context alone, and once: its programs are compiled once, too."""
+        if kind not in self._own:
+            self._own[kind] = kind(self.gl)
+        return cast("Made", self._own[kind])
+
+    def light(self, diffusion: Diffusion) -> DiffusionCache:
+        """Light that diffuses on grids of one size, for all drawings of a scene: it is solved for once."""
+        if diffusion not in self._light:
+            self._light[diffusion] = DiffusionCache(self.gl)
+        return self._light[diffusion]
+
+    def forget_light(self) -> None:
+        """Free the light that diffuses, which is another in each scene."""
+        for light in self._light.values():
+            light.release()
+        self._light.clear()
 
     def timed(self, geometry: Callable[[], None], shading: Callable[[], None]) -> Sample:
         """Draw the part that finds thickness, then the rest of the frame; each until the device has finished."""
@@ -92,8 +110,9 @@ class Studio:
 
     def release(self) -> None:
         """Free all resources."""
+        self.forget_light()
         self.resources.release()
-        self._passes.clear()
+        self._own.clear()
 
 
 class _OnGpu:
@@ -106,12 +125,11 @@ class _OnGpu:
     ) -> None:
         self._studio = studio
         scene = shown(scene, plan.given_back)
-        # Only the light of the last scene is kept: each drawing of light that diffuses has its own.
-        resources, self._own = copy.copy(studio.resources), DiffusionCache(studio.gl)
-        resources.diffusion = self._own
+        resources = copy.copy(studio.resources)
         if plan.given_back.solved:
+            resources.diffusion = studio.light(plan.given_back.diffusion)
             began = time.perf_counter()
-            self._own.solve(scene, plan.given_back.diffusion)
+            resources.diffusion.solve(scene, plan.given_back.diffusion)
             self.solve_seconds = time.perf_counter() - began
         self._job = FrameJob(studio.gl, scene, plan, targets, resources, compact=compact)
 
@@ -127,9 +145,8 @@ class _OnGpu:
         return self._job.targets.bytes_per_pixel() + lights
 
     def release(self) -> None:
-        """Free the uniform buffers, and light of its own."""
+        """Free the uniform buffers."""
         self._job.release()
-        self._own.release()
 
 
 class Floor:
@@ -144,7 +161,7 @@ class Floor:
         self._staging = (PassSpec(PassName.OPAQUE, "staging", opaque, 1),) if opaque else ()
         self._studio = studio
         self._job = FrameJob(studio.gl, scene, RenderPlan(SignedDepth(), self._staging), targets, studio.resources)
-        self._pass = DepthOnlyPass(studio.gl)
+        self._pass = studio.own(DepthOnlyPass)
 
     def draw(self) -> Sample:
         """Draw the floor."""

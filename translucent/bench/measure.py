@@ -17,7 +17,7 @@ from translucent.bench.promise import promise_of
 from translucent.bench.record import CaseRecord
 from translucent.bench.row import Errors, Quantity, Row
 from translucent.bench.staging import drawing, plan_of, seen_by
-from translucent.bench.timing import Samples, interleaved, ratio, timing
+from translucent.bench.timing import STEADY, Pace, Samples, interleaved, ratio, timing
 from translucent.bench.truth import Truth
 from translucent.errors import InputError, TranslucentError, TranslucentWarning
 from translucent.frames.frame import Frame
@@ -70,8 +70,8 @@ class CaseRun:
         For timing.
     compared : float
         Width and height of the frames that are held against the reference, as a share of what the case wants.
-    patience : float
-        As of `interleaved`.
+    pace : Pace
+        Of timing.
     """
 
     studio: Studio
@@ -80,7 +80,7 @@ class CaseRun:
     size: Size
     seconds: float
     compared: float = 1.0
-    patience: float = 1.0
+    pace: Pace = STEADY
     _entries: list[_Entry] = field(default_factory=list)
 
     def measure(self, contenders: Sequence[Contender]) -> CaseRecord:
@@ -106,6 +106,7 @@ class CaseRun:
             entry.frame = None
             self._entries.append(entry)
         rows = mark_frontier(self._timed(scene), blank.quantity)
+        self.studio.forget_light()
         return dataclasses.replace(blank, rows=rows, pictures=tuple(pictures))
 
     def _truth(self, scene: Scene, size: Size) -> Truth:
@@ -184,7 +185,7 @@ class CaseRun:
                     drawings,
                     self.seconds,
                     lambda name, error: failures.update({name: error}),
-                    self.patience,
+                    self.pace,
                 )
                 for entry in ready:
                     if entry.contender.method.peels and entry.row.method in found:

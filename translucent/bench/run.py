@@ -21,6 +21,7 @@ from translucent.bench.scaling import ScalingRun
 from translucent.bench.scattering.slabs import measure_slabs
 from translucent.bench.shadows.part import ShadowsRun
 from translucent.bench.shadows.record import Shadows
+from translucent.bench.timing import STEADY, Pace
 from translucent.errors import RenderError
 from translucent.renderer import Renderer
 from translucent.scene.camera import check_size
@@ -40,18 +41,18 @@ class Effort:
         Of timing, for each case and for each step of a scaling axis.
     compared : float
         Width and height of the frames that are held against the reference, as a share of what the case wants.
-    patience : float
-        How many times as long a drawing is timed at most where its rounds differ much.
+    pace : Pace
+        Of timing.
     """
 
     case_seconds: float
     step_seconds: float
     compared: float
-    patience: float = 1.0
+    pace: Pace = STEADY
 
 
-FULL = Effort(12.0, 2.5, 1.0, patience=3.0)
-QUICK = Effort(0.6, 0.15, 0.4)
+FULL = Effort(12.0, 2.5, 1.0, Pace(patience=3.0))
+QUICK = Effort(0.6, 0.15, 0.4, Pace(long=0.1, floors=2))
 
 #: Callback with what is being measured, the number of steps done, and their total.
 Progress = Callable[[str, int, int], None]
@@ -177,7 +178,7 @@ def _measured(
     progress: Progress,
 ) -> Iterator[Report]:
     """The report after each step of it."""
-    scaling, shadows = ScalingRun(studio, effort.step_seconds, quick, effort.patience), ShadowsRun(studio, quick)
+    scaling, shadows = ScalingRun(studio, effort.step_seconds, quick, effort.pace), ShadowsRun(studio, quick)
     steps = {
         "scaling": sum(len(ladder.steps) for ladder in scaling.ladders()),
         "slabs": 1,
@@ -193,8 +194,8 @@ def _measured(
 
     for case in cases:
         told(f"case {case.name}")
-        chosen = contenders(case.effect, quick=quick or case.brief, only=methods)
-        run = CaseRun(studio, cpu, case, size, effort.case_seconds, effort.compared, effort.patience)
+        chosen = contenders(case.effect, quick=quick, brief=case.brief, only=methods)
+        run = CaseRun(studio, cpu, case, size, effort.case_seconds, effort.compared, effort.pace)
         report = _judged(dataclasses.replace(report, cases=(*report.cases, run.measure(chosen))))
         studio.renderer.gpu.context.drain()
         yield report

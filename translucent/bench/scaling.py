@@ -14,7 +14,7 @@ from translucent.bench.drawing import Floor, Planned, Size, Studio, is_software
 from translucent.bench.measure import one_line
 from translucent.bench.record import ScalePoint, Series
 from translucent.bench.shapes import lying_torus, plates
-from translucent.bench.timing import Samples, interleaved, ratio, timing
+from translucent.bench.timing import STEADY, Pace, Samples, interleaved, ratio, timing
 from translucent.errors import TranslucentError
 from translucent.geometry.solids import Sphere
 from translucent.gpu.targets import Targets
@@ -70,14 +70,14 @@ class ScalingRun:
         For each step.
     quick : bool
         Two steps of each ladder, none of the longest.
-    patience : float
-        As of `interleaved`.
+    pace : Pace
+        Of timing.
     """
 
     studio: Studio
     seconds: float
     quick: bool
-    patience: float = 1.0
+    pace: Pace = STEADY
     _points: dict[tuple[Axis, str], list[ScalePoint]] = field(default_factory=dict)
 
     def ladders(self) -> list[Ladder]:
@@ -130,7 +130,7 @@ class ScalingRun:
                 {name: drawn.draw for name, drawn in drawings.items()},
                 self.seconds,
                 lambda name, error: failures.update({name: error}),
-                self.patience,
+                self.pace,
             )
         finally:
             for drawn in drawings.values():
@@ -174,7 +174,7 @@ def _ladders(software: bool) -> list[Ladder]:
 
 def _thinned(ladder: Ladder) -> Ladder:
     steps = list(ladder.steps)
-    last = {"triangles": 2, "pixels": 2, "layers": 4, "media": 4}[ladder.axis]
+    last = {"triangles": 2, "pixels": 1, "layers": 3, "media": 4}[ladder.axis]
     return dataclasses.replace(ladder, steps={x: ladder.steps[x] for x in (steps[0], steps[last])})
 
 

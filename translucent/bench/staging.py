@@ -8,7 +8,7 @@ from typing import cast
 from translucent.bench.contenders import REFRACTED_IOR, Contender
 from translucent.bench.drawing import Drawing, OfEngine, OnProcessor, Planned, Short, Studio
 from translucent.errors import InputError
-from translucent.gpu.passes.shortcuts import HalfFloatPass, NearestFacePass, Shortcut, UnmarkedBackFacePass
+from translucent.gpu.passes.shortcuts import HalfFloatPass, NearestFace, NearestFacePass, Shortcut, UnmarkedBackFacePass
 from translucent.gpu.targets import Targets
 from translucent.planning.methods import BackFaceDepth, RayMarched, SignedDepth
 from translucent.planning.render_plan import RenderPlan
@@ -54,11 +54,11 @@ def drawing(
         return Planned(studio, scene, targets, plan)
     shortcut: Shortcut
     if contender.technique == "half":
-        shortcut = HalfFloatPass(studio.gl)
+        shortcut = studio.own(HalfFloatPass)
     elif contender.technique == "unmarked":
-        shortcut = UnmarkedBackFacePass(studio.gl)
+        shortcut = studio.own(UnmarkedBackFacePass)
     else:
-        shortcut = NearestFacePass(studio.gl, sphere=contender.technique == "ball", size=size)
+        shortcut = NearestFace(studio.own(NearestFacePass), sphere=contender.technique == "ball", size=size)
     return Short(studio, scene, targets, plan, shortcut)
 
 

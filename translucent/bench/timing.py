@@ -22,8 +22,9 @@ from translucent.bench.row import Ratio, Timing
 #: Rounds that even the slowest takes part in, and that the fastest needs no more than.
 FEWEST, MOST = 3, 60
 
-#: A drawing of so many seconds needs no more rounds than this: its own noise averages out within it.
-FEWEST_LONG, LONG = 2, 0.3
+#: A drawing of `Pace.long` seconds needs no more rounds than this, and less from `LONGEST` on: its own noise averages
+#: out within it.
+FEWEST_LONG = 2
 FEWEST_LONGEST, LONGEST = 1, 2.0
 
 #: What differs much between rounds takes part in so many at least, while it and its floors have taken fewer seconds: of
@@ -38,6 +39,29 @@ UNSURE = 0.03
 
 #: Draws of the floor on each side of a sample take this share of the time of the sample, up to `MOST_FLOORS` draws.
 FLOOR_SHARE, MOST_FLOORS = 0.3, 10
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Pace of measurements: what they may take beyond their share of the time.
+
+    Attributes
+    ----------
+    patience : float
+        How many times its share a drawing is timed at most where its rounds differ much.
+    long : float
+        Seconds of a drawing from which on `FEWEST_LONG` rounds do.
+    floors : int
+        Draws of the floor to warm up, and again to know how long it takes.
+    """
+
+    patience: float = 1.0
+    long: float = 0.3
+    floors: int = 5
+
+
+#: Pace where nobody waits.
+STEADY = Pace()
 
 
 class Sample(NamedTuple):
@@ -111,22 +135,22 @@ def interleaved(
     drawings: Mapping[str, Callable[[], Sample]],
     seconds: float,
     failed: Callable[[str, Exception], None],
-    patience: float = 1.0,
+    pace: Pace = STEADY,
 ) -> dict[str, Samples]:
     """Measure all drawings, in turns, for about as many seconds; each gets an equal share, and at least a few rounds.
 
-    One whose ratio to the floor is `UNSURE` gets up to `patience` times its share. What raises is left out of the other
-    rounds, and `failed` hears of it.
+    One whose ratio to the floor is `UNSURE` gets up to `pace.patience` times its share. What raises is left out of the
+    other rounds, and `failed` hears of it.
     """
     warming = seconds / 8 / max(len(drawings), 1)
     warmed = {name: draw for name, draw in drawings.items() if _warm_up(name, draw, warming, failed)}
-    for _ in range(5):
+    for _ in range(pace.floors):
         floor()
     base, repeated = _Repeated(floor), {name: _Repeated(draw) for name, draw in warmed.items()}
     found = {name: Samples() for name in warmed}
     share = 0.85 * seconds / max(len(warmed), 1)
-    typical = float(np.median([base.sample().wall for _ in range(5)]))
-    while running := [name for name in warmed if not _enough(found[name], share, patience)]:
+    typical = float(np.median([base.sample().wall for _ in range(pace.floors)]))
+    while running := [name for name in warmed if not _enough(found[name], share, pace)]:
         before = _floor(base, typical, 0.0)
         for name in running:
             try:
@@ -189,15 +213,16 @@ def _mean(samples: list[Sample]) -> Sample:
     return Sample(wall, frame, float(np.mean(gpu)) if gpu else None, part, whole)
 
 
-def _enough(samples: Samples, share: float, patience: float) -> bool:
+def _enough(samples: Samples, share: float, pace: Pace) -> bool:
     rounds = len(samples.wall)
     first = samples.frame[0] if rounds else 0.0
-    fewest = FEWEST_LONGEST if first > LONGEST else FEWEST_LONG if first > LONG else FEWEST
-    if rounds >= MOST * patience or rounds < fewest or samples.spent < share:
-        return rounds >= MOST * patience
+    fewest = FEWEST_LONGEST if first > LONGEST else FEWEST_LONG if first > pace.long else FEWEST
+    most = MOST * pace.patience
+    if rounds >= most or rounds < fewest or samples.spent < share:
+        return rounds >= most
     if rounds < FEWEST_UNSURE and samples.spent < CHEAP and _unsure(samples):
         return False
-    return samples.spent >= patience * share or not _unsure(samples)
+    return samples.spent >= pace.patience * share or not _unsure(samples)
 
 
 def _unsure(samples: Samples) -> bool:

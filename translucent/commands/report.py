@@ -41,7 +41,11 @@ PATH = click.Path(path_type=Path)
 @click.command(epilog="Example: translucent report model.stl --unit mm -o out/report --quick")
 @click.argument("models", nargs=-1, metavar="[MODEL...]")
 @click.option("-o", "--output", type=PATH, metavar="DIR", help="Folder for report.html, .svg, .json and .csv.")
-@click.option("--quick", is_flag=True, help="About a minute: fewer scenes, methods, pixels and repetitions.")
+@click.option(
+    "--quick",
+    is_flag=True,
+    help="About a minute, more where nothing is compiled yet: fewer scenes, methods, pixels and repetitions.",
+)
 @click.option("--size", metavar="WxH", help="Size of the timed frames in pixels.")
 @click.option("--methods", metavar="NAME,...", help="Only these: signed-depth, k-buffer, ray-marched, ...")
 @click.option("--only", metavar="PART,...", help="Only these: scenes, scaling, slabs, shadows, hard-cases.")

@@ -184,14 +184,14 @@ class GpuRenderer:
     @property
     def paths(self) -> PathTracer:
         """Tracer of random paths, which `run` takes, too."""
-        step = self._pass(PathTracePass)
+        step = self.step(PathTracePass)
         assert isinstance(step, PathTracePass)
         return step.tracer
 
     @property
     def photons(self) -> CausticsPass:
         """Follower of photons, which `run` takes, too."""
-        step = self._pass(CausticsPass)
+        step = self.step(CausticsPass)
         assert isinstance(step, CausticsPass)
         return step
 
@@ -207,7 +207,7 @@ class GpuRenderer:
             if (geometry_only and not spec.geometry_passes) or spec.name in leave_out:
                 continue
             before_drawing(self.context.gl)
-            step = self._pass(PASSES[spec.name])  # compiles on first use, which is no part of the frame
+            step = self.step(PASSES[spec.name])  # compiles on first use, which is no part of the frame
             with self._timer.measure(spec.name):
                 step.run(job, spec)
 
@@ -271,7 +271,8 @@ class GpuRenderer:
             how = "it was interrupted" if self._interrupted and not self._closed else "the renderer is closed"
             raise RenderError("rendering", how, "make a new one")
 
-    def _pass(self, kind: type[Pass]) -> Pass:
+    def step(self, kind: type[Pass]) -> Pass:
+        """The pass of a kind, made when it is first asked for, with the context current."""
         if kind not in self._passes:
             before_making(self.context.gl)
             self._passes[kind] = kind(self.context.gl)

@@ -16,6 +16,9 @@ BRANCHES = 8
 #: Number of lines that walk down the tree together: the working arrays stay below 100 MB.
 LINES = 1 << 12
 
+#: Pairs of a line and a node that are tested together: what NumPy keeps of them stays in the caches of a processor.
+PAIRS = 1 << 10
+
 #: Enlargement of boxes as a share of the distances, so that rounding loses no triangle.
 MARGIN = 1e-13
 
@@ -90,8 +93,12 @@ class BoxTree:
             np.abs(lines.origins).sum(axis=1) + np.abs(self.levels[-1][0]).max(where=self._real, initial=0)
         )
         for level in reversed(self.levels):
-            pair, child = np.nonzero(_meets(lines.where(line), level[node], slack[line]))
-            line, node = line[pair], node[pair] * BRANCHES + child
+            met = [np.empty((2, 0), np.int64)]
+            for begin in range(0, len(line), PAIRS):
+                some, nodes = line[begin : begin + PAIRS], node[begin : begin + PAIRS]
+                pair, child = np.nonzero(_meets(lines.where(some), level[nodes], slack[some]))
+                met.append(np.array([some[pair], nodes[pair] * BRANCHES + child]))
+            line, node = np.concatenate(met, axis=1)
         return line, self.order[node]
 
     @property

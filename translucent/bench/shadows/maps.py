@@ -18,7 +18,6 @@ from translucent.frames.metrics import interior
 from translucent.gpu.job import FrameJob
 from translucent.gpu.light_cameras import outermost
 from translucent.gpu.passes.depth_only import DepthOnlyPass
-from translucent.gpu.passes.shadow_maps import ShadowMapsPass
 from translucent.gpu.passes.shortcuts import HalfFloatPass
 from translucent.gpu.shadow_cameras import ShadowThrowers
 from translucent.gpu.targets import Targets
@@ -75,7 +74,7 @@ def halve(studio: Studio, scene: Scene, size: int) -> None:
     renderer, camera = studio.renderer, map_camera(scene)
     seen = replace(scene, objects=list(scene.bodies), camera=camera, lights=[])
     targets = Targets(studio.gl, (size, size))
-    drawn = Short(studio, seen, targets, renderer.plan(seen), HalfFloatPass(studio.gl))
+    drawn = Short(studio, seen, targets, renderer.plan(seen), studio.own(HalfFloatPass))
     try:
         drawn.draw()
         frame = drawn.read()
@@ -117,7 +116,7 @@ def _drawings(studio: Studio, scene: Scene, size: int) -> Iterator[tuple[Callabl
     small, large = Targets(gl, (16, 16)), Targets(gl, (size, size))
     job = FrameJob(gl, scene, chosen, small, studio.resources)
     seen = FrameJob(gl, replace(scene, camera=map_camera(scene)), chosen, large, studio.resources)
-    maps, floor = ShadowMapsPass(gl), DepthOnlyPass(gl)
+    maps, floor = studio.step(spec.name), studio.own(DepthOnlyPass)
     job.place((0.0, 0.0))
     seen.place((0.0, 0.0), with_depth=True)
 

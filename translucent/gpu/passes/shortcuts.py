@@ -28,40 +28,22 @@ class Shortcut(Protocol):
 
 
 class NearestFacePass:
-    """Thickness from the nearest face alone, constant or that of a ball; see ``shaders/thickness/nearest_face.frag``.
+    """Drawing of `NearestFace`, whatever its size; see ``shaders/thickness/nearest_face.frag``."""
 
-    Parameters
-    ----------
-    gl : moderngl.Context
-    sphere : bool
-        The thickness is `size` times n.v; else `size` everywhere.
-    size : float
-        In metres.
-    """
-
-    with_depth = True
-
-    def __init__(self, gl: moderngl.Context, *, sphere: bool, size: float) -> None:
+    def __init__(self, gl: moderngl.Context) -> None:
         self._variants = Variants(gl, "geometry/body.vert", "thickness/nearest_face.frag")
         self._with_depth: WeakKeyDictionary[Targets, dict[bool, moderngl.Framebuffer]] = WeakKeyDictionary()
-        self._sphere = sphere
-        self._size = size
 
-    def run(self, job: FrameJob) -> None:
+    def run(self, job: FrameJob, *, sphere: bool, size: float) -> None:
         """Draw the bodies: where several are, the nearest hides the others, as in viewers of glTF."""
         framebuffer = self._framebuffer(job)
         framebuffer.use()
         framebuffer.clear(depth=1.0)
         job.gl.enable_only(moderngl.DEPTH_TEST)
-        program = self._variants.program(
-            WITH_NORMAL=self._sphere, WITH_POSITION=0, SPHERE=self._sphere, SPECTRAL=job.plan.spectral
-        )
-        set_uniform(program, "size", self._size)
+        program = self._variants.program(WITH_NORMAL=sphere, WITH_POSITION=0, SPHERE=sphere, SPECTRAL=job.plan.spectral)
+        set_uniform(program, "size", size)
         job.draw(program, _bodies(job))
         job.gl.enable_only(moderngl.NOTHING)
-
-    def hand_over(self, job: FrameJob) -> None:
-        """Nothing to do: the result is in the accumulator."""
 
     def _framebuffer(self, job: FrameJob) -> moderngl.Framebuffer:
         """The accumulator with a depth buffer."""
@@ -70,6 +52,32 @@ class NearestFacePass:
             depth = job.gl.depth_renderbuffer(job.targets.size)
             made[job.plan.spectral] = job.gl.framebuffer(job.accumulator().color_attachments, depth)
         return made[job.plan.spectral]
+
+
+class NearestFace:
+    """Thickness from the nearest face alone, constant or that of a ball.
+
+    Parameters
+    ----------
+    drawing : NearestFacePass
+        That draws it.
+    sphere : bool
+        The thickness is `size` times n.v; else `size` everywhere.
+    size : float
+        In metres.
+    """
+
+    with_depth = True
+
+    def __init__(self, drawing: NearestFacePass, *, sphere: bool, size: float) -> None:
+        self._drawing, self._sphere, self._size = drawing, sphere, size
+
+    def run(self, job: FrameJob) -> None:
+        """Draw the bodies."""
+        self._drawing.run(job, sphere=self._sphere, size=self._size)
+
+    def hand_over(self, job: FrameJob) -> None:
+        """Nothing to do: the result is in the accumulator."""
 
 
 class UnmarkedBackFacePass:
