@@ -78,7 +78,7 @@ class Studio:
         return self.renderer.gpu.step(PASSES[name])
 
     def own(self, kind: Callable[[Any], Made]) -> Made:
-        """What is in no plan, made of the context alone, and once: its programs are compiled once, too."""
+        """Object in no plan, made of the context alone, and once: its programs are compiled once, too."""
         if kind not in self._own:
             self._own[kind] = kind(self.gl)
         return cast("Made", self._own[kind])

@@ -98,8 +98,7 @@ class Viewport:
             gl, vertex, "present/gather.frag", radiance=0, optical_depth=1, thickness=2, flags=3
         )
         self._gathering = gl.vertex_array(self._gather, [])
-        #: Kinds of samples, the first of a pixel or others, that have been added.
-        self._added: set[bool] = set()
+        self._added: set[bool] = set()  # first samples of pixels, others
         self._draw_part = build_program(gl, "present/window.vert", "present/window.frag", picture=0)
         self._drawing_part = gl.vertex_array(self._draw_part, [])
         self._variants: dict[tuple[int, ...], tuple[moderngl.Program, moderngl.VertexArray]] = {}
@@ -375,15 +374,14 @@ class Viewport:
 
     def _make_ready(self, job: FrameJob, side: Side, *, first: bool) -> None:
         """Have the driver compile what adds samples, which takes as long as a step: a window has a frame for it."""
-        if first in self._added:
-            return
-        before_making(self._gl)
-        into = side.all if first else side.light
-        into.scissor = 0, 0, 0, 0
-        self._gather_into(into, job, blends=not first)
-        into.scissor = None
-        self._added.add(first)
-        before_drawing(self._gl)
+        if first not in self._added:
+            before_making(self._gl)
+            into = side.all if first else side.light
+            into.scissor = 0, 0, 0, 0
+            self._gather_into(into, job, blends=not first)
+            into.scissor = None
+            self._added.add(first)
+            before_drawing(self._gl)
 
     def _add(self, job: FrameJob, side: Side, origin: Size, *, first: bool) -> None:
         """Store the frame of a job: in place of the last one, or added to its radiance."""
@@ -393,13 +391,10 @@ class Viewport:
         self._gather_into(into, job, blends=not first)
 
     def _gather_into(self, into: moderngl.Framebuffer, job: FrameJob, *, blends: bool) -> None:
-        result = job.targets.result()
-        radiance = job.picture.color_attachments[0]
-        for unit, texture in enumerate([radiance, *result.color_attachments[2:5]]):
-            texture.use(unit)
+        for unit, one in enumerate([job.picture.color_attachments[0], *job.targets.result().color_attachments[2:5]]):
+            one.use(unit)
         into.use()
         self._gl.enable_only(moderngl.BLEND if blends else moderngl.NOTHING)
         if blends:
-            self._gl.blend_equation = moderngl.FUNC_ADD
-            self._gl.blend_func = moderngl.ONE, moderngl.ONE
+            self._gl.blend_equation, self._gl.blend_func = moderngl.FUNC_ADD, (moderngl.ONE, moderngl.ONE)
         self._gathering.render(moderngl.TRIANGLES, vertices=3)

@@ -192,7 +192,7 @@ class Stage:
         if display.converges and still and not more:
             more, drawn = self.converging.step(scene, self.renderer, self.viewport, self._budget)
         if lit:
-            more, drawn = self._light_by_photons(scene, methods[0], display.antialias, workspace)
+            more, drawn = self._light_by_photons(scene, methods[0], workspace)
             if self.photons.light is None and not more:  # there are no photons to follow
                 more = drawn = self._step(0, scene, display.antialias)
         return self._presenting.present(self.viewport, changed=drawn, last=not more) or more
@@ -252,16 +252,12 @@ class Stage:
             self.viewport.restart(side)
         return True
 
-    def _light_by_photons(
-        self, scene: Scene, method: Method | None, antialias: bool, workspace: Workspace
-    ) -> tuple[bool, bool]:
+    def _light_by_photons(self, scene: Scene, method: Method | None, workspace: Workspace) -> tuple[bool, bool]:
         """Follow photons, or draw a step of the picture with their light; whether more is to come, and it changed."""
         photons = self.photons
         expected = 0.0 if self.plans[0] is None else self._pace.known(self.plans[0])
-        scattering = self.ways.scattering
-        if not photons.ready(
-            workspace, scene, self.renderer, self.viewport, method, scattering, self._budget, expected
-        ):
+        given = self.renderer, self.viewport, method, self.ways.scattering
+        if not photons.ready(workspace, scene, *given, self._budget, expected):
             if (plan := photons.show_media(self.viewport)) is not None:
                 self.plans[0], self._strides.of[0] = plan, self._pace.stride(plan, self._budget)
             return False, False
@@ -270,7 +266,7 @@ class Stage:
         if photons.side == 1 and not self.viewport.steps(1):
             self._strides.of[1] = self._pace.stride(photons.plan, self._budget)
         stride, begun = self._strides.of[photons.side], time.perf_counter()
-        samples = samples_of(stride, antialias)
+        samples = samples_of(stride, workspace.document.display.antialias)
         self.viewport.step(photons.side, scene, photons.plan, stride, max(samples, 1), photons=photons.light.texture)
         self._finish(0, photons.plan, stride, begun)
         if photons.take_over(self.viewport, stride, samples):
