@@ -306,7 +306,7 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
     }
     # A pace for those who wait: two rounds of what is long.
     drawings = {"sure": steady(0.008), "unsure": unsteady(0.007), "long": unsteady(0.1)}
-    quick = interleaved(steady(0.005), drawings, 0.0, lambda *_: None, Pace(long=0.05, floors=2))
+    quick = interleaved(steady(0.005), drawings, 0.0, lambda *_: None, Pace(long=0.05))
     assert {name: len(one.wall) for name, one in quick.items()} == {
         "sure": FEWEST,
         "unsure": FEWEST_UNSURE,

@@ -52,7 +52,7 @@ class Effort:
 
 
 FULL = Effort(12.0, 2.5, 1.0, Pace(patience=3.0))
-QUICK = Effort(0.6, 0.15, 0.4, Pace(long=0.1, floors=2))
+QUICK = Effort(0.6, 0.15, 0.4, Pace(long=0.1))
 
 #: Callback with what is being measured, the number of steps done, and their total.
 Progress = Callable[[str, int, int], None]

@@ -51,13 +51,10 @@ class Pace:
         How many times its share a drawing is timed at most where its rounds differ much.
     long : float
         Seconds of a drawing from which on `FEWEST_LONG` rounds do.
-    floors : int
-        Draws of the floor to warm up, and again to know how long it takes.
     """
 
     patience: float = 1.0
     long: float = 0.3
-    floors: int = 5
 
 
 #: Pace where nobody waits.
@@ -144,12 +141,12 @@ def interleaved(
     """
     warming = seconds / 8 / max(len(drawings), 1)
     warmed = {name: draw for name, draw in drawings.items() if _warm_up(name, draw, warming, failed)}
-    for _ in range(pace.floors):
+    for _ in range(5):
         floor()
     base, repeated = _Repeated(floor), {name: _Repeated(draw) for name, draw in warmed.items()}
     found = {name: Samples() for name in warmed}
     share = 0.85 * seconds / max(len(warmed), 1)
-    typical = float(np.median([base.sample().wall for _ in range(pace.floors)]))
+    typical = float(np.median([base.sample().wall for _ in range(5)]))
     while running := [name for name in warmed if not _enough(found[name], share, pace)]:
         before = _floor(base, typical, 0.0)
         for name in running:
