@@ -16,6 +16,7 @@ from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.formulas.diffuse_interface import half_space_reflectance
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.notes import NoteKind
+from translucent.planning.scattering import diffusion
 
 BALL = Sphere().tessellate(48)
 CAMERA = tl.Camera.look_at((1.0, 0.8, 4.0), (0, 0, 0), fov_y=30.0)
@@ -203,6 +204,24 @@ def test_a_lamp_at_the_surface_is_no_brighter_than_its_light(renderer: tl.Render
     # I / h^2 / pi, if the whole disc below the lamp gave back all of it.
     assert frame.radiance.max() < 1 / 0.002**2 / np.pi
     assert np.isfinite(frame.radiance).all()
+
+
+def test_coarse_grids_gain_little_from_the_correction(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What uniform light says of a coarse grid is small beside its other errors, so that it is not asked."""
+    bear = tl.load_mesh(mesh_path("bear"))
+    camera = tl.Camera.framing(bear.vertices, (1, 1), direction=(-0.35, -0.3, -1.0), fov_y=28.0)
+    for name in ("skim_milk", "jade"):
+        medium = tl.preset(name).medium
+        lights = [tl.DirectionalLight((-1, -1, -0.5), (2, 2, 2))]
+        scene = tl.Scene([tl.Object(bear, medium)], camera, lights, tl.Environment.studio())
+        pictures = []
+        for resolution, least in ((12, 12), (12, 16), (32, 16)):
+            monkeypatch.setattr(diffusion, "LEAST_CORRECTED", least)
+            with tl.Renderer() as renderer:
+                frame = renderer.render(scene, (100, 100), scattering=tl.Diffusion(resolution))
+            pictures.append(np.clip(frame.radiance[frame.coverage], 0.0, 1.0) ** (1 / 2.2))
+        corrected, plain, fine = pictures
+        assert np.abs(plain - corrected).mean() < 0.25 * np.abs(corrected - fine).mean(), name
 
 
 @pytest.fixture

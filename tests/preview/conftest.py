@@ -22,7 +22,7 @@ from translucent.preview.workspace import Workspace
 def not_nice(monkeypatch: pytest.MonkeyPatch) -> None:
     """Worker processes that tests wait for are not nice: they would wait for the tests beside them."""
     monkeypatch.setattr(worker, "NICENESS", 0)
-    monkeypatch.setattr(worker, "URGENT_NICENESS", 0)
+    monkeypatch.setattr(worker, "IDLE", None)
 
 
 @pytest.fixture

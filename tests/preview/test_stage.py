@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import runpy
 import shutil
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -92,6 +93,25 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     with stage.current():
         frame = stage.renderer.render(scene, SIZE)
     assert np.abs(pixels(stage) - frame.to_srgb8().astype(int)).mean() < 1.0
+
+
+def test_samples_wait_for_an_environment_that_is_being_read(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All pixels of the last picture are drawn, once, and smoothed when it is known to stay."""
+    monkeypatch.setattr(stages, "BUDGET", 1e9)
+    work.do(Change("display.antialias", True))
+    finish(stage, work)
+    assert stage.viewport.steps(0) > 1
+    reads = threading.Event()
+    work.lanes["light"].start("reading the environment", lambda _: reads.wait(60.0), lambda _: None)
+    stage.viewport.restart()
+    for _ in range(4):
+        assert stage.draw(work, SIZE)
+    assert stage.viewport.steps(0) == 1
+    reads.set()
+    finish(stage, work)
+    assert stage.viewport.steps(0) > 1
 
 
 def test_light_diffuses_as_soon_as_it_is_solved_for(

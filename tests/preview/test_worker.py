@@ -100,6 +100,10 @@ def mapped(report: Report, folder: str, mesh: Mesh) -> tuple[float, set[str]]:
     return float(mesh.vertices[-1, 0]), files(folder)
 
 
+def policies(report: Report) -> set[int]:
+    return {os.sched_getscheduler(int(thread)) for thread in os.listdir("/proc/self/task")}
+
+
 def cancelling(task: Task) -> Callable[..., None]:
     report = task.report
 
@@ -129,6 +133,12 @@ def test_work_that_reports_ends_and_its_process_goes_on(
     # What was meant for the last work does not stop the next.
     for _ in range(2):
         assert pool.call(Task("next", lambda _: None, lambda _: None), pid) == int(task.detail)
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="this system knows no idle processes")
+def test_processes_run_when_nobody_else_wants_to(task: Task, pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker, "IDLE", os.SCHED_IDLE)
+    assert pool.call(task, policies) == {os.SCHED_IDLE}
 
 
 def test_a_process_that_dies_is_told_and_the_next_one_begins(task: Task, pool: Pool) -> None:
@@ -242,8 +252,8 @@ class Fake:
 
     alive = True
 
-    def __init__(self, _: object, nice: int) -> None:
-        self.nice, self.modules = nice, set[str]()
+    def __init__(self, _: object) -> None:
+        self.modules = set[str]()
 
     def ask(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
         self.begun, self.go = arguments

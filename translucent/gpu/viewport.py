@@ -370,6 +370,7 @@ class Viewport:
                 side.release()
                 self._sides[number] = None
             side = self._sides[number] = Side(self._gl, size)
+            before_drawing(self._gl)  # drivers clear large pictures, which takes as long as a step
         return side
 
     def _make_ready(self, job: FrameJob, side: Side, *, first: bool) -> None:

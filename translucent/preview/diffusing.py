@@ -22,9 +22,9 @@ from translucent.scene.scene import Scene
 if TYPE_CHECKING:
     from translucent.diffusion.cache import FieldCache, Fields
 
-#: Grid on which light is solved for in the frame while things move: in the bear, other lights take 10 ms of processor
-#: time and another medium 20 ms, a fifth of what they take on the usual one. Pixels of milk, jade and wax in bear and
-#: candle are 1.2 to 6.5 of 255 off those of the usual one, those of layers 1.9 to 24.
+#: Grid on which light is solved for in the frame while things move: in the bear, other lights take 25 ms of processor
+#: time and another medium 45 ms, a sixth of what they take on the usual one. Pixels of milk, jade and wax in bear and
+#: candle are 0.5 to 5.6 of 255 off those of the usual one, those of layers 1.2 to 19.
 SMALL = Diffusion(12)
 
 #: Seconds of a frame that it may take. Where it took longer, it waits until the scene rests.

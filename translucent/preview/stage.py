@@ -187,8 +187,9 @@ class Stage:
         lit = lit and still
         # A large picture takes as long to be shown as a step: it has a frame for that alone.
         alone = self._presenting.begin(workspace, scene, self.viewport, self._shown)
-        drawn = not lit and not alone and any(self._step(side, scene, display.antialias) for side in sides)
-        more = drawn or alone
+        antialias = display.antialias and not workspace.relights
+        drawn = not lit and not alone and any(self._step(side, scene, antialias) for side in sides)
+        more = drawn or alone or workspace.relights
         if display.converges and still and not more:
             more, drawn = self.converging.step(scene, self.renderer, self.viewport, self._budget)
         if lit:

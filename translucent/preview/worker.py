@@ -34,8 +34,13 @@ from translucent.scene.texture import Texture
 #: Seconds between checks whether the result is still wanted.
 PATIENCE = 0.1
 
-#: Niceness of processes whose work the picture waits for, and of the others, so that the window comes first.
-URGENT_NICENESS, NICENESS = 10, 19
+#: Policy of a scheduler that has others run at once when they want to, so that the window comes first. Before a frame
+#: that wakes up may go on, Linux leaves even nice processes the rest of their slice: a millisecond or more, at each of
+#: the many times that a frame waits.
+IDLE: int | None = getattr(os, "SCHED_IDLE", None)
+
+#: Niceness where the system knows no such policy.
+NICENESS = 19
 
 #: Seconds that canceled work has to end, before its process is ended.
 PARTING = 5.0
@@ -147,12 +152,10 @@ class Pool:
             finally:
                 self._waiting.remove(ticket)
                 self._changed.notify_all()
-            nice = URGENT_NICENESS if urgency == Urgency.PICTURE else NICENESS
             self._idle = [worker for worker in self._idle if worker.alive]
-            able = [worker for worker in self._idle if worker.nice == nice]  # no process can become less nice
-            known = [worker for worker in able if work.__module__ in worker.modules]
-            worker = (known or able)[-1] if able else _Worker(self._kept, nice)
-            if able:
+            known = [worker for worker in self._idle if work.__module__ in worker.modules]
+            worker = (known or self._idle)[-1] if self._idle else _Worker(self._kept)
+            if self._idle:
                 self._idle.remove(worker)
             self._busy.append(worker)
             return worker
@@ -211,26 +214,25 @@ class _Worker:
 
     Attributes
     ----------
-    nice : int
     modules : set of str
         That it has done work of, and has made ready what that needs.
     """
 
-    def __init__(self, kept: _Kept, nice: int) -> None:
+    def __init__(self, kept: _Kept) -> None:
         # Spawned, not forked: OpenGL and threads do not survive a fork.
         context = multiprocessing.get_context("spawn")
         pipe, theirs = context.Pipe()
-        self._process: BaseProcess = context.Process(target=_run, args=(theirs, nice), daemon=True)
+        self._process: BaseProcess = context.Process(target=_run, args=(theirs,), daemon=True)
         self._process.start()
         theirs.close()
         assert self._process.pid is not None
+        _give_way(self._process.pid)
         self._channel = Channel(pipe, self._process.pid)
         self._kept, self._sent = kept, set[int]()
         self._closing = threading.Lock()
         self._known: dict[int, object] = {}
         self._number = 0
         self.modules: set[str] = set()
-        self.nice = nice
 
     def ask(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
         """Send work, preceded by the values that it needs and that were not sent before."""
@@ -314,15 +316,22 @@ class _Worker:
             self._channel.pipe.close()
 
 
-def _run(pipe: Connection, niceness: int) -> None:
+def _give_way(process: int) -> None:
+    """Have a process that has just begun, and all its threads to come, let others run first."""
+    with suppress(OSError):  # containers may forbid it, or it has ended
+        if IDLE is not None:
+            os.sched_setscheduler(process, IDLE, os.sched_param(0))
+        elif hasattr(os, "setpriority"):
+            os.setpriority(os.PRIO_PROCESS, process, NICENESS)
+
+
+def _run(pipe: Connection) -> None:
     """Main loop of the worker process, until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window answers Ctrl-C, and ends this process
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_follow_parent, daemon=True).start()
     channel = Channel(pipe, os.getppid())
     warnings.showwarning = lambda message, *_, **__: channel.send("warning", 0, Parcel.of(str(message)))
-    if hasattr(os, "nice"):
-        os.nice(niceness)
     kept: dict[int, object] = {}
     while True:
         try:

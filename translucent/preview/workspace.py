@@ -232,6 +232,12 @@ class Workspace:
         tasks = [lane.task for lane in self.lanes.values() if lane.task is not None]
         return [task for task in tasks if task.name or task not in (self.compiler.lane.task, self.shelf.lane.task)]
 
+    @property
+    def relights(self) -> bool:
+        """True if another environment or stage is being prepared, so that what is drawn now will not stay."""
+        task = self.lanes["light"].task
+        return task is not None and bool(task.name)
+
     def prepare(self) -> None:
         """Prepare later pictures, now that the first is there."""
         self._lighting.begun = True

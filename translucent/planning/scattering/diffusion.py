@@ -15,8 +15,8 @@ from translucent.scene.scene import Object
 #: Resolutions that make sense: below, no body has an inside; above, the memory told in the error is needed.
 LEAST_RESOLUTION, MOST_RESOLUTION = 8, 128
 
-#: Resolution from which on solutions are corrected by uniform light. At 12, pictures of milk, jade and wax in bear and
-#: candle change by less than 0.1 of 255 by that, and are 0.1 to 1.2 off those at 32.
+#: Resolution from which on solutions are corrected by uniform light. At 12, pixels of milk, jade and wax in bear and
+#: candle change by less than 0.5 of 255 by that, and are 0.5 to 5.6 off those at 32.
 LEAST_CORRECTED = 16
 
 #: Cells in the bounds of a body, most of them empty; each takes about 150 bytes.
@@ -60,7 +60,7 @@ class Diffusion(Scattering):
     @property
     def corrected(self) -> bool:
         """True if the solution is corrected by uniform light, which takes as long as all else: not on coarse grids,
-        whose other errors are ten times as large.
+        whose other errors are five times as large, or more.
         """
         return self.resolution >= LEAST_CORRECTED
 
