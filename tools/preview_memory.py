@@ -128,7 +128,7 @@ def show(path: Path, stage: str, inset: bool, patience: float) -> None:
     from translucent.preview.actions import Turn
     from translucent.preview.desk import Desk
     from translucent.preview.document import Display, Document, Look, Model
-    from translucent.preview.script import Script
+    from translucent.preview.script import PAUSE, Script
 
     begun = float(os.environ[BEGUN])
 
@@ -141,6 +141,8 @@ def show(path: Path, stage: str, inset: bool, patience: float) -> None:
             now = time.time()
             if desk.more:
                 self.busy = now
+            if desk.waits:
+                time.sleep(PAUSE)  # as a window without a script, which leaves other processes the time
             self.longest, self.last = max(self.longest, now - self.last), now
             if self.reached < 0:
                 if desk.stage.timings[0].wall:

@@ -78,7 +78,7 @@ class Tasks(Script):
             if cores > self._busiest.cores:
                 self._busiest = Frame(cores, seconds, thread, desk.stage.drawing, self._sampler.told())
         ended = self._continue(desk)
-        if desk.drawn:
+        if desk.waits:
             time.sleep(PAUSE)  # other processes need the time more
         # What the tool does is no part of a frame.
         self._last = clocks()

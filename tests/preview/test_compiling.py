@@ -28,6 +28,7 @@ from translucent.preview import stage as stages
 from translucent.preview.actions import Change, ChoosePreset
 from translucent.preview.compiling import Compiled, Compiler, stand_in
 from translucent.preview.stage import Stage
+from translucent.preview.tasks import Task
 from translucent.preview.timing import Pace
 from translucent.preview.worker import Pool
 from translucent.preview.workspace import Workspace
@@ -332,6 +333,31 @@ def test_a_request_that_cannot_be_made_is_told_once(
     finish(stage, work)
     assert stage.problem == ""
     assert [m.text for m in work.messages if "in the window" in m.text]
+
+
+def test_normals_that_two_lanes_ask_for_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, asked, may_end = Sphere().tessellate(8), list[object](), threading.Event()
+
+    class Slow:
+        """A pool that makes normals when it may."""
+
+        def call(self, task: Task, work: object, mesh: Mesh, **_: object) -> np.ndarray:
+            asked.append(work)
+            may_end.wait(20.0)
+            return np.zeros((*mesh.faces.shape, 3), np.float32)
+
+    monkeypatch.setattr(tracing, "PATIENCE", 0.001)
+    tasks = [Task("", lambda task: tracing.have_smoothed(task, Slow(), mesh), print) for _ in range(3)]  # type: ignore[arg-type]
+    threads = [threading.Thread(target=task.run) for task in tasks]
+    for thread in threads:
+        thread.start()
+    tasks[2].cancel()
+    may_end.set()
+    for thread in threads:
+        thread.join(20.0)
+    assert asked == [tracing.smoothed]
+    assert has_drawn_normals(mesh)
+    assert [task.error for task in tasks] == [None] * 3
 
 
 def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierarchy(

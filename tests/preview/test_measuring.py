@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+import threading
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 import translucent as tl
+from tests.preview.waiting import SIZE, wait
+from translucent.preview import desk as desks
+from translucent.preview import measuring
+from translucent.preview.actions import Change, Turn
+from translucent.preview.desk import Desk
 from translucent.preview.measuring import crossing, measure
+from translucent.preview.workspace import Workspace
 from translucent.scene.texture import Texture
 
 
@@ -50,3 +60,43 @@ def test_the_inset_shows_textures_paint_and_leaves() -> None:
         assert above == [255, 0, 0]
         assert below == [0, 0, 255]
         assert cut_out == [255, 255, 255], "the hole shows what is behind"
+
+
+class StillStage:
+    """A stage whose picture is always there."""
+
+    waits, state, viewport = False, "full picture", SimpleNamespace(size=SIZE)
+
+    def draw(self, *_: object) -> bool:
+        return False
+
+
+def test_measuring_waits_for_what_the_picture_needs_and_is_cancelled_when_things_move(
+    work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    desk, begun = desks.Desk(work, StillStage()), list[tl.Scene]()  # type: ignore[arg-type]
+    monkeypatch.setattr(desks, "STILL", -1.0)
+    monkeypatch.setattr(Desk, "_keep_picture", lambda _: None)
+    monkeypatch.setattr(work, "measure", lambda scene, *_: begun.append(scene))
+    wait(work, lambda: work.loaded is not None and not work.prepares)
+    reads = threading.Event()
+    work.lanes["light"].start("setting the stage", lambda _: reads.wait(20.0), lambda _: None)
+    assert desk.draw(SIZE)
+    assert not begun
+    reads.set()
+    wait(work, lambda: work.lanes["light"].task is None)
+    desk.draw(SIZE)
+    assert begun == [work.scene()]
+    task = work.lanes["draw"].start("measuring", lambda _: None, lambda _: None)
+    work.do(Turn(10.0, 0.0))
+    desk.draw(SIZE)
+    assert task.cancelled
+    assert begun[1:] == [work.scene()]
+    monkeypatch.setattr(measuring, "MOST_TRIANGLES", 10)
+    work.do(Turn(10.0, 0.0))
+    desk.draw(SIZE)
+    assert len(begun) == 2
+    work.do(Change("display.inset", True))
+    work.do(Turn(10.0, 0.0))
+    desk.draw(SIZE)
+    assert begun[2:] == [work.scene()]

@@ -31,8 +31,9 @@ POPUP = (0.10, 0.105, 0.115, 1.0)
 #: their widths, and the viewport gets the rest.
 NARROW, RIGHT, LEFT = 1280, 0.27, 0.25
 
-#: Frames per second of a window that has nothing to do.
-IDLE_FPS = 9.0
+#: Frames per second of a window that has nothing to do, and of one that waits for other processes: they need the time
+#: more. Whatever the user does wakes it at once.
+IDLE_FPS, WAITING_FPS = 9.0, 20.0
 
 #: Seconds between frames of a window that has nothing to show yet: the thread that reads the model needs the time more.
 READING = 0.03
@@ -316,7 +317,8 @@ class _Window:
         if self.work.loaded is None:
             time.sleep(READING)
         idling = hello_imgui.get_runner_params().fps_idling
-        idling.enable_idling = not self.desk.more and self.script is None
+        idling.enable_idling = self.desk.waits and self.script is None
+        idling.fps_idle = WAITING_FPS if self.desk.more else IDLE_FPS
         if self.script is not None and self.script.step(self.desk):
             for text in filter(None, (self.desk.stage.problem, self.desk.stage.shader_problem)):
                 self.work.refuse(RenderError("the picture is not what it should be", text))

@@ -21,7 +21,7 @@ from translucent.assets import newest_shader
 from translucent.errors import RenderError, TranslucentError
 from translucent.formulas.tone import TONES
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.normals import has_drawn_normals, keep_drawn_normals
+from translucent.geometry.normals import has_drawn_normals
 from translucent.geometry.solids import Box
 from translucent.gpu.ledger import Ledger, ProgramName
 from translucent.gpu.photon_light import PhotonLight
@@ -31,7 +31,7 @@ from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering.diffusion import LEAST_RESOLUTION, Diffusion
 from translucent.preview.tasks import CancelledError, Lane, Report, Task, problem
-from translucent.preview.tracing import smoothed
+from translucent.preview.tracing import have_smoothed
 from translucent.preview.worker import Pool, Urgency
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import EnvironmentMap
@@ -125,7 +125,7 @@ class Compiler:
 
     def _make(self, task: Task, scene: Scene, plans: Sequence[RenderPlan]) -> Compiled:
         for mesh in unsmoothed(scene, plans):
-            keep_drawn_normals(mesh, self._call(task, smoothed, mesh))
+            have_smoothed(task, self._pool, mesh)
         return self._call(task, compile_frames, stand_in(scene), tuple(map(_quick, plans)), self.device)
 
     def take(self, found: Compiled, missing: ProgramName | None = None) -> None:

@@ -21,7 +21,7 @@ from translucent.preview.browser import Browser
 from translucent.preview.dialogs import browser_for, open_dialog
 from translucent.preview.document import RANGES, Material
 from translucent.preview.environments import EnvironmentFolder
-from translucent.preview.measuring import Crossing, Measured, first_object
+from translucent.preview.measuring import Crossing, Measured, first_object, measurable
 from translucent.preview.picturing import model_key, model_picture
 from translucent.preview.scenes import material_of, method_of
 from translucent.preview.stage import Stage
@@ -59,6 +59,7 @@ class Desk:
     drag: int = 0
     more: bool = True
     drawn: bool = False
+    waits: bool = False
     pressed_at: tuple[float, float] = (0.0, 0.0)
     dragging_split: bool = False
     texts: dict[str, str] = field(default_factory=dict)
@@ -186,6 +187,7 @@ class Desk:
         self.work.update()
         more = self.stage.draw(self.work, pixels)
         self.drawn = not more
+        self.waits = self.stage.waits or not more
         # All pixels are there; edges may become smooth later.
         self.work.shelf.begin_frame(idle=not more or self.stage.state.startswith("full"))
         if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:
@@ -195,7 +197,10 @@ class Desk:
         if wanted != self._measured_for:
             self._measured_for, self._still_since = wanted, time.monotonic()
             self._asked = False
-        if scene is not None and not self._asked and time.monotonic() - self._still_since > STILL:
+            if (measuring := self.work.lanes["draw"].task) is not None:
+                measuring.cancel()
+        still = time.monotonic() - self._still_since > STILL
+        if scene is not None and still and not self._asked and not self.work.prepares:
             self._asked = True
             self._measure(scene)
         unmeasured = scene is not None and not self._asked
@@ -206,7 +211,8 @@ class Desk:
             return
         document, size = self.work.document, self.stage.viewport.size
         method = method_of(document.display.method, document.material)
-        self.work.measure(scene, method, size, self._take)
+        if document.display.inset or measurable(scene):
+            self.work.measure(scene, method, size, self._take)
         if document.display.compare in ("reference", "error"):
             levels = (1,) if document.display.compare == "error" else None
             self.work.draw_truth(scene, method, size, levels)

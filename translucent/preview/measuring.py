@@ -35,6 +35,10 @@ MEASURED_HEIGHT = 90
 #: hundred times as long.
 LIT_HEIGHT = 30
 
+#: Largest number of triangles of a scene that is measured without being asked to: of 5 million, the reference takes 20
+#: seconds and 2 GB.
+MOST_TRIANGLES = 2_000_000
+
 #: Shares of the viewport's size at which the split's reference is drawn, one after the other.
 LEVELS = (8, 4, 2, 1)
 
@@ -110,6 +114,11 @@ class Crossing:
 def _renderer(written: float) -> Renderer:
     """Renderer of the worker process, for one version of the shaders."""
     return Renderer()
+
+
+def measurable(scene: Scene) -> bool:
+    """True if a scene is small enough to be measured without being asked to."""
+    return sum(len(item.mesh.faces) for item in scene.objects) <= MOST_TRIANGLES
 
 
 def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> Compared:

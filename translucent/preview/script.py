@@ -134,7 +134,7 @@ class Script:
     def _rested(self, desk: Desk) -> bool:
         assert self._waiting is not None
         passed = time.monotonic() - self._waiting
-        if desk.drawn:
+        if desk.waits:
             time.sleep(PAUSE)
         if self._until >= 0:
             return passed >= self._until

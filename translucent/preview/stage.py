@@ -70,6 +70,8 @@ class Stage:
         What is drawn more simply while the picture moves, and why, or nothing.
     drawing : float
         Seconds that the last call of `draw` took.
+    waits : bool
+        There was nothing to draw in it before others are done.
     """
 
     def __init__(self, context: Any = None, compiler: Compiler | None = None) -> None:
@@ -87,7 +89,7 @@ class Stage:
         self.plans: list[RenderPlan | None] = [None, None]
         self.timings = [Timing(), Timing()]
         self.problem = self.shader_problem = self.simpler = self.state = ""
-        self.drawing, self._begun = 0.0, False
+        self.drawing, self.waits, self._begun = 0.0, False, False
         self._moving: RenderPlan | None = None
         self._held: Scene | None = None
         self._shown: tuple[object, ...] = ()
@@ -137,7 +139,7 @@ class Stage:
         self.viewport.draw_into(self._window, part)
 
     def _draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
-        held, self._held = self._held, None
+        held, self._held, self.waits = self._held, None, False
         scene, display = held or workspace.scene(), workspace.document.display
         self.viewport.resize(size)
         if scene is None:
@@ -156,6 +158,7 @@ class Stage:
         second = methods[1] if both else None
         wanted = (scene, methods[0], second, scattering, interfaces, self.viewport.size, self.renderer)
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
+            self.waits = True
             return True
         if (not display.converges or wanted != self._shown) and self.converging.stop():
             self._shown = ()  # the interactive picture is drawn again
@@ -189,6 +192,7 @@ class Stage:
         alone = self._presenting.begin(workspace, scene, self.viewport, self._shown)
         antialias = display.antialias and not workspace.relights
         drawn = not lit and not alone and any(self._step(side, scene, antialias) for side in sides)
+        self.waits = workspace.relights and not (drawn or alone or lit)
         more = drawn or alone or workspace.relights
         if display.converges and still and not more:
             more, drawn = self.converging.step(scene, self.renderer, self.viewport, self._budget)

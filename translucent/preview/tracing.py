@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from weakref import WeakSet
 
 import numpy as np
@@ -11,11 +12,14 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import drawn_normals, has_drawn_normals, keep_drawn_normals, made_normals
 from translucent.gpu.packed_meshes import PackedMesh, has_packed, keep_packed, pack_mesh
 from translucent.preview.tasks import Lane, Report, Task
-from translucent.preview.worker import Pool, Urgency
+from translucent.preview.worker import PATIENCE, Pool, Urgency
 from translucent.scene.scene import Scene
 
 #: Largest number of triangles whose hierarchy is built without a worker process.
 PACKED_AT_ONCE = 20_000
+
+#: Held while normals are made.
+_smoothing = threading.Lock()
 
 UNTIL = "interfaces in screen space, until rays can be traced through the mesh"
 NEVER = "interfaces in screen space, since the mesh could not be prepared for rays"
@@ -60,9 +64,19 @@ def _is_ready(mesh: Mesh) -> bool:
 
 
 def _prepare(task: Task, pool: Pool, mesh: Mesh) -> None:
-    if not has_drawn_normals(mesh):
-        keep_drawn_normals(mesh, pool.call(task, smoothed, mesh, urgency=Urgency.PICTURE))
+    have_smoothed(task, pool, mesh)
     keep_packed(mesh, pool.call(task, packed, mesh, drawn_normals(mesh), urgency=Urgency.PICTURE))
+
+
+def have_smoothed(task: Task, pool: Pool, mesh: Mesh) -> None:
+    """Have a worker process make the `drawn_normals` of a mesh, once: who asks meanwhile waits for the same."""
+    while not _smoothing.acquire(timeout=PATIENCE):
+        task.report(task.share, task.detail)
+    try:
+        if not has_drawn_normals(mesh):
+            keep_drawn_normals(mesh, pool.call(task, smoothed, mesh, urgency=Urgency.PICTURE))
+    finally:
+        _smoothing.release()
 
 
 def smoothed(report: Report, mesh: Mesh) -> npt.NDArray[np.float32]:

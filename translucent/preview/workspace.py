@@ -238,6 +238,12 @@ class Workspace:
         task = self.lanes["light"].task
         return task is not None and bool(task.name)
 
+    @property
+    def prepares(self) -> bool:
+        """True if processes are at work on what the picture waits for, which may take all the memory that there is."""
+        lanes = self.lanes["trace"], self.compiler.lane
+        return self.relights or any(lane.task is not None and lane.task.name for lane in lanes)
+
     def prepare(self) -> None:
         """Prepare later pictures, now that the first is there."""
         self._lighting.begun = True

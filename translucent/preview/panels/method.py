@@ -9,6 +9,7 @@ from translucent.planning.scattering import SCATTERINGS
 from translucent.preview import numbers
 from translucent.preview.desk import ERROR, FAINT, WARNING, Desk, begin_rows, check, choice, fact, slider, wrapped
 from translucent.preview.document import AUTO, METHOD_NAMES
+from translucent.preview.measuring import MOST_TRIANGLES, measurable
 from translucent.preview.timing import Timing
 
 SCATTERING_NAMES = (AUTO, *SCATTERINGS)
@@ -63,7 +64,12 @@ def _plan(plan: RenderPlan, timing: Timing) -> None:
 
 def _errors(desk: Desk) -> None:
     measured, unit = desk.work.measured, desk.get("display.unit")
-    if measured is None or measured.scene is not desk.work.scene():
+    scene, display = desk.work.scene(), desk.work.document.display
+    if scene is not None and not (display.inset or measurable(scene)):
+        wrapped(
+            f"not measured, unless its inset is shown: {MOST_TRIANGLES:,} triangles and more take much memory", FAINT
+        )
+    elif measured is None or measured.scene is not scene:
         wrapped("measured as soon as the view is still", FAINT)
     if measured is None:
         return
