@@ -207,7 +207,7 @@ def test_a_lamp_at_the_surface_is_no_brighter_than_its_light(renderer: tl.Render
 
 
 def test_coarse_grids_gain_little_from_the_correction(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What uniform light says of a coarse grid is small beside its other errors, so that it is not asked."""
+    """The correction by uniform light is small beside other errors of such a grid, so that it is left out."""
     bear = tl.load_mesh(mesh_path("bear"))
     camera = tl.Camera.framing(bear.vertices, (1, 1), direction=(-0.35, -0.3, -1.0), fov_y=28.0)
     for name in ("skim_milk", "jade"):

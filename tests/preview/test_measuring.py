@@ -10,11 +10,11 @@ import pytest
 
 import translucent as tl
 from tests.preview.waiting import SIZE, wait
-from translucent.preview import desk as desks
-from translucent.preview import measuring
+from translucent.preview import comparing, measuring
 from translucent.preview.actions import Change, Turn
 from translucent.preview.desk import Desk
 from translucent.preview.measuring import crossing, measure
+from translucent.preview.preparations import prepares
 from translucent.preview.workspace import Workspace
 from translucent.scene.texture import Texture
 
@@ -74,11 +74,11 @@ class StillStage:
 def test_measuring_waits_for_what_the_picture_needs_and_is_cancelled_when_things_move(
     work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    desk, begun = desks.Desk(work, StillStage()), list[tl.Scene]()  # type: ignore[arg-type]
-    monkeypatch.setattr(desks, "STILL", -1.0)
+    desk, begun = Desk(work, StillStage()), list[tl.Scene]()  # type: ignore[arg-type]
+    monkeypatch.setattr(comparing, "STILL", -1.0)
     monkeypatch.setattr(Desk, "_keep_picture", lambda _: None)
     monkeypatch.setattr(work, "measure", lambda scene, *_: begun.append(scene))
-    wait(work, lambda: work.loaded is not None and not work.prepares)
+    wait(work, lambda: work.loaded is not None and not prepares(work))
     reads = threading.Event()
     work.lanes["light"].start("setting the stage", lambda _: reads.wait(20.0), lambda _: None)
     assert desk.draw(SIZE)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from translucent.preview.preparations import relights
 from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
 
@@ -35,7 +36,7 @@ def finish(stage: Stage, work: Workspace) -> None:
     """Draw until nothing is left to draw, or to be compiled or solved for it."""
     end = time.monotonic() + 60.0
     lanes = work.compiler.lane, work.lanes["diffuse"], work.lanes["trace"]
-    while stage.draw(work, SIZE) | (busy := work.relights or any(lane.task is not None for lane in lanes)):
+    while stage.draw(work, SIZE) | (busy := relights(work) or any(lane.task is not None for lane in lanes)):
         assert time.monotonic() < end, "the picture is never done"
         work.update()
         if busy:

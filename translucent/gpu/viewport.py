@@ -93,10 +93,8 @@ class Viewport:
     def __init__(self, engine: GpuRenderer) -> None:
         self.engine = engine
         gl = self._gl = engine.context.gl
-        vertex = "geometry/fullscreen.vert"
-        self._gather = build_program(
-            gl, vertex, "present/gather.frag", radiance=0, optical_depth=1, thickness=2, flags=3
-        )
+        units = {"radiance": 0, "optical_depth": 1, "thickness": 2, "flags": 3}
+        self._gather = build_program(gl, "geometry/fullscreen.vert", "present/gather.frag", **units)
         self._gathering = gl.vertex_array(self._gather, [])
         self._added: set[bool] = set()  # first samples of pixels, others
         self._draw_part = build_program(gl, "present/window.vert", "present/window.frag", picture=0)

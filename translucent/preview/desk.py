@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 import os
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,20 +17,18 @@ from imgui_bundle import hello_imgui, imgui
 from translucent.errors import TranslucentError
 from translucent.preview.actions import Assign, Change, ChoosePreset, changed_material, preset_material
 from translucent.preview.browser import Browser
+from translucent.preview.comparing import Comparing
 from translucent.preview.dialogs import browser_for, open_dialog
 from translucent.preview.document import RANGES, Material
 from translucent.preview.environments import EnvironmentFolder
-from translucent.preview.measuring import Crossing, Measured, first_object, measurable
+from translucent.preview.measuring import Crossing, first_object
 from translucent.preview.picturing import model_key, model_picture
-from translucent.preview.scenes import material_of, method_of
+from translucent.preview.scenes import material_of
 from translucent.preview.stage import Stage
 from translucent.preview.tips import TIPS
 from translucent.preview.workspace import Workspace
-from translucent.scene.scene import Object, Scene
+from translucent.scene.scene import Object
 from translucent.scene.showcase import fillable
-
-#: Seconds without movement after which a view counts as still.
-STILL = 0.25
 
 #: Largest number of triangles among which a thread finds the one under the mouse; else a worker process does.
 PICKED_AT_ONCE = 200_000
@@ -79,9 +76,9 @@ class Desk:
     kept_of: str = ""
     _textures: dict[str, Any] = field(default_factory=dict)
     _inset: tuple[Any, Any] | None = None
-    _measured_for: object = None
-    _asked: bool = False
-    _still_since: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.comparing = Comparing(self.work)
 
     def change(self, name: str, value: Any, *, step: bool = False) -> None:
         """Give a field a value; all changes while the mouse is down are one undo step.
@@ -192,33 +189,8 @@ class Desk:
         self.work.shelf.begin_frame(idle=not more or self.stage.state.startswith("full"))
         if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:
             self._keep_picture()
-        scene = self.work.scene()
-        wanted = (scene, self.work.document.display.method, self.work.document.display.compare)
-        if wanted != self._measured_for:
-            self._measured_for, self._still_since = wanted, time.monotonic()
-            self._asked = False
-            if (measuring := self.work.lanes["draw"].task) is not None:
-                measuring.cancel()
-        still = time.monotonic() - self._still_since > STILL
-        if scene is not None and still and not self._asked and not self.work.prepares:
-            self._asked = True
-            self._measure(scene)
-        unmeasured = scene is not None and not self._asked
-        return more or unmeasured or bool(self.work.busy)
-
-    def _measure(self, scene: Scene) -> None:
-        if self.work.shown_bake is not None:
-            return
-        document, size = self.work.document, self.stage.viewport.size
-        method = method_of(document.display.method, document.material)
-        if document.display.inset or measurable(scene):
-            self.work.measure(scene, method, size, self._take)
-        if document.display.compare in ("reference", "error"):
-            levels = (1,) if document.display.compare == "error" else None
-            self.work.draw_truth(scene, method, size, levels)
-
-    def _take(self, measured: Measured) -> None:
-        self.work.measured = measured
+        uncompared = self.comparing.step(self.stage.viewport.size)
+        return more or uncompared or bool(self.work.busy)
 
     def frame(self) -> None:
         """Frame the whole model, or the object that was clicked."""

@@ -18,6 +18,7 @@ from translucent.planning.render_plan import RenderPlan
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.converging import Converging
 from translucent.preview.photons import Photons
+from translucent.preview.preparations import relights
 from translucent.preview.presenting import Presenting
 from translucent.preview.scenes import method_of
 from translucent.preview.staging import tone_of
@@ -95,8 +96,7 @@ class Stage:
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
         self._asked: Task | None = None
-        self._presenting = Presenting()
-        self._pace = Pace()
+        self._presenting, self._pace = Presenting(), Pace()
         self._frame_budget, self._budget = FrameBudget(), BUDGET
         self._strides = Strides(self._pace)
         self.ways = Ways(traced_at_once=compiler is None)
@@ -169,10 +169,8 @@ class Stage:
             self._begin(workspace, scene)
             self.watch(workspace)
         else:
-            self.plans = [
-                self.renderer.plan(scene, methods[0], interfaces=interfaces, scattering=scattering),
-                self.renderer.plan(scene, methods[1], interfaces=interfaces, scattering=scattering) if both else None,
-            ]
+            plan = partial(self.renderer.plan, scene, interfaces=interfaces, scattering=scattering)
+            self.plans = [plan(methods[0]), plan(methods[1]) if both else None]
             self._shown = wanted
             self.viewport.restart()
             self._presenting.truth = None
@@ -190,10 +188,10 @@ class Stage:
         lit = lit and still
         # A large picture takes as long to be shown as a step: it has a frame for that alone.
         alone = self._presenting.begin(workspace, scene, self.viewport, self._shown)
-        antialias = display.antialias and not workspace.relights
+        antialias = display.antialias and not relights(workspace)
         drawn = not lit and not alone and any(self._step(side, scene, antialias) for side in sides)
-        self.waits = workspace.relights and not (drawn or alone or lit)
-        more = drawn or alone or workspace.relights
+        more = drawn or alone or relights(workspace)
+        self.waits = more and not (drawn or alone or lit)
         if display.converges and still and not more:
             more, drawn = self.converging.step(scene, self.renderer, self.viewport, self._budget)
         if lit:
@@ -206,16 +204,13 @@ class Stage:
         """Draw the picture alone, while things move."""
         look, scattering, interfaces = workspace.document.look, self.ways.scattering, self.ways.interfaces
         shadows = self.ways.quick_shadows(scene)
+        planned = partial(self.renderer.plan, scene, method, scattering=scattering, shadows=shadows)
         if shadows is not None:
-            self._moving = self.renderer.plan(
-                scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
-            )
+            self._moving = planned(interfaces=interfaces)
         slowest = self._budget * COARSEST_TRACED**2
         if any(self._pace.traces_longer(plan, slowest) for plan in (self.plans[0], self._moving)):
             interfaces = SCREEN
-            self._moving = self.renderer.plan(
-                scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
-            )
+            self._moving = planned(interfaces=interfaces)
         begun, factor = time.perf_counter(), self._pace.factor(self._moving or self.plans[0], FACTORS, self._budget)
         try:
             with self.viewport.at_once(factor) as framebuffer:

@@ -232,18 +232,6 @@ class Workspace:
         tasks = [lane.task for lane in self.lanes.values() if lane.task is not None]
         return [task for task in tasks if task.name or task not in (self.compiler.lane.task, self.shelf.lane.task)]
 
-    @property
-    def relights(self) -> bool:
-        """True if another environment or stage is being prepared, so that what is drawn now will not stay."""
-        task = self.lanes["light"].task
-        return task is not None and bool(task.name)
-
-    @property
-    def prepares(self) -> bool:
-        """True if processes are at work on what the picture waits for, which may take all the memory that there is."""
-        lanes = self.lanes["trace"], self.compiler.lane
-        return self.relights or any(lane.task is not None and lane.task.name for lane in lanes)
-
     def prepare(self) -> None:
         """Prepare later pictures, now that the first is there."""
         self._lighting.begun = True
