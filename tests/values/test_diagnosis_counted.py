@@ -211,6 +211,8 @@ def test_components_are_numbered_by_their_first_nodes(count: int, pairs: list[tu
 def test_a_long_chain_is_one_component_however_its_nodes_are_numbered() -> None:
     for order in (np.arange(5000), np.arange(5000)[::-1], np.random.default_rng(1).permutation(5000)):
         assert not connected(5000, order[:-1], order[1:]).any()
+    leaves = np.arange(4999)  # of a star whose center is the highest node: each has no lower neighbor
+    assert not connected(5000, leaves, np.full_like(leaves, 4999)).any()
 
 
 # Places

@@ -272,22 +272,49 @@ def use_mask(faces: npt.NDArray[np.integer], count: int) -> Mask:
 
 
 def connected(count: int, one: Numbers, other: Numbers) -> Numbers:
-    """(count,): number of the component of each node, from 0, where edges join the nodes `one` and `other` (k,).
+    """(count,): number of the component of each node, in the order of their lowest nodes, where edges join the nodes
+    `one` and `other` (k,).
 
     Every node points to a lower neighbor, so that those of a tree lead to one root; what still joins roots is a smaller
-    graph (Sollin's algorithm, in JaJa 1992, section 5.1).
+    graph. In that, as lower ends may be few, every node joins its lowest neighbor: at most half of them stay (Sollin's
+    algorithm, in JaJa 1992, section 5.1).
+    """
+    root = np.arange(count, dtype=one.dtype)
+    root[np.maximum(one, other)] = np.minimum(one, other)
+    joined = found = _numbered(root)
+    while True:
+        one, other = joined.take(one), joined.take(other)
+        apart = one != other
+        if not apart.any():
+            return found
+        one, other = one[apart], other[apart]
+        joined = _numbered(_lowest_neighbors(int(joined.max()) + 1, one, other))
+        found = joined.take(found)
+
+
+def _lowest_neighbors(count: int, one: Numbers, other: Numbers) -> Numbers:
+    """(count,): lowest neighbor of each node; itself if it has none, or is the lower one of two that have each other.
+
+    No longer circles are left: the neighbor of a node's neighbor is that node or a lower one.
     """
     node = np.arange(count, dtype=one.dtype)
-    root = node.copy()
-    root[np.maximum(one, other)] = np.minimum(one, other)
+    near = np.full(count, count, dtype=one.dtype)
+    np.minimum.at(near, one, other)
+    np.minimum.at(near, other, one)
+    near = np.where(near == count, node, near)
+    return np.where((near.take(near) == node) & (node < near), node, near)
+
+
+def _numbered(root: Numbers) -> Numbers:
+    """(n,): number of the tree of each node, in the order of their lowest nodes, where nodes point towards roots."""
     while not np.array_equal(above := root.take(root), root):
         root = above
-    number = np.cumsum(root == node, dtype=one.dtype) - one.dtype.type(1)
-    roots = int(number[-1]) + 1
-    number = number.take(root)
-    one, other = number.take(one), number.take(other)
-    apart = one != other
-    return connected(roots, one[apart], other[apart]).take(number) if apart.any() else number
+    node = np.arange(len(root), dtype=root.dtype)
+    if (root > node).any():
+        lowest = node.copy()
+        np.minimum.at(lowest, root, node)
+        root = lowest.take(root)
+    return (np.cumsum(root == node, dtype=root.dtype) - root.dtype.type(1)).take(root)
 
 
 def extent(points: Array) -> Array:
