@@ -347,7 +347,8 @@ def test_normals_that_two_lanes_ask_for_are_made_once(monkeypatch: pytest.Monkey
             return np.zeros((*mesh.faces.shape, 3), np.float32)
 
     monkeypatch.setattr(tracing, "PATIENCE", 0.001)
-    tasks = [Task("", lambda task: tracing.have_smoothed(task, Slow(), mesh), print) for _ in range(3)]  # type: ignore[arg-type]
+    pool: Any = Slow()
+    tasks = [Task("", lambda task: tracing.have_smoothed(task, pool, mesh), print) for _ in range(3)]
     threads = [threading.Thread(target=task.run) for task in tasks]
     for thread in threads:
         thread.start()

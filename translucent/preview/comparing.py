@@ -33,7 +33,8 @@ class Comparing:
             Of the viewport, in pixels.
         """
         scene, display = self.work.scene(), self.work.document.display
-        view = scene, display.method, display.compare
+        measured = scene is not None and (display.inset or measurable(scene))
+        view = scene, display.method, display.compare, measured
         if view != self._view:
             self._view, self._since, self._begun = view, time.monotonic(), False
             if (last := self.work.lanes["draw"].task) is not None:
@@ -44,13 +45,13 @@ class Comparing:
             return True
         self._begun = True
         if self.work.shown_bake is None:
-            self._begin(scene, size)
+            self._begin(scene, size, measured=measured)
         return False
 
-    def _begin(self, scene: Scene, size: tuple[int, int]) -> None:
+    def _begin(self, scene: Scene, size: tuple[int, int], *, measured: bool) -> None:
         display = self.work.document.display
         method = method_of(display.method, self.work.document.material)
-        if display.inset or measurable(scene):
+        if measured:
             self.work.measure(scene, method, size, self._take)
         if display.compare in ("reference", "error"):
             levels = (1,) if display.compare == "error" else None
