@@ -1,4 +1,4 @@
-"""Promises of the source about itself: rings, docstrings, sizes."""
+"""Promises of the source about itself: no import circles, docstrings, public names, one class for each name."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import ast
 import re
 import subprocess
 import sys
-import tomllib
+from collections import Counter
 from functools import cache
 from graphlib import TopologicalSorter
 from importlib import import_module
@@ -18,8 +18,7 @@ import translucent as tl
 
 PACKAGE = Path(tl.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
-CLAUSE = re.compile(r'^ *r?"""((?:What|Where|Which|Whose|Of|Those|That|How|When|If|Whether)\b.*)', re.MULTILINE)
-CONTRACTS = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+CLASS = re.compile(r"^ *class (\w+)", re.MULTILINE)
 
 
 def name(path: Path) -> str:
@@ -46,12 +45,43 @@ def imported(path: Path) -> set[str]:
 MODULES = {".".join(("translucent", *path.relative_to(PACKAGE).with_suffix("").parts)): path for path in FILES}
 MODULES = {module.removesuffix(".__init__"): path for module, path in MODULES.items()}
 
-
-def test_at_most_twenty_rooms_are_at_the_top() -> None:
-    """Each of which the rings know: import-linter sees to it that nothing else is there."""
-    folders = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").is_file()}
-    assert folders <= {one.strip() for layer in CONTRACTS[0]["layers"] for one in layer.split("|")}
-    assert len(folders) <= 20
+# Names that several classes still share. A class that gets a name of its own leaves this list; nothing joins it.
+SHARED = {
+    "BentLight",
+    "Change",
+    "DiffusedLight",
+    "Errors",
+    "Fields",
+    "Interfaces",
+    "Layer",
+    "Measured",
+    "Meetings",
+    "Pace",
+    "PhotonLight",
+    "Picture",
+    "Probe",
+    "Progress",
+    "Rays",
+    "Row",
+    "SceneView",
+    "Seen",
+    "Shader",
+    "Shot",
+    "Stage",
+    "Steps",
+    "Surface",
+    "SurfaceLight",
+    "Timing",
+    "Tracer",
+    "Truth",
+    "Turn",
+    "Ways",
+    "_Channel",
+    "_Entry",
+    "_Spans",
+    "_Tree",
+    "_Walk",
+}
 
 
 def test_no_module_imports_itself_through_others() -> None:
@@ -65,17 +95,10 @@ def test_a_module_says_what_it_is_for() -> None:
     assert silent == []
 
 
-def test_a_module_is_short() -> None:
-    lengths = {name(path): len(path.read_text(encoding="utf-8").splitlines()) for path in FILES}
-    assert {path: length for path, length in lengths.items() if length > 400} == {}
-
-
-def test_a_docstring_begins_with_a_noun_or_an_imperative() -> None:
-    """Clauses ("What it does") say less than their nouns; by text, for parsing all files takes long."""
-    root = PACKAGE.parent
-    files = [path for folder in ("translucent", "tests", "tools", "examples") for path in (root / folder).rglob("*.py")]
-    texts = {str(path.relative_to(root)): path.read_text(encoding="utf-8") for path in files}
-    assert {path: found for path, text in texts.items() if (found := CLAUSE.findall(text))} == {}
+def test_a_class_has_a_name_of_its_own() -> None:
+    """Each name stands for one class, in whichever module; by text, for parsing all files takes long."""
+    classes = Counter(found for path in FILES for found in CLASS.findall(path.read_text(encoding="utf-8")))
+    assert {one for one, count in classes.items() if count > 1} == SHARED
 
 
 def test_a_public_name_exists_and_is_documented() -> None:
