@@ -19,7 +19,7 @@ from translucent import assets as data
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals
 from translucent.geometry.solids import Box, Sphere
-from translucent.gpu.ledger import Ledger, PostponedError, ProgramName
+from translucent.gpu.compile_budget import CompileBudget, PostponedError, ProgramName
 from translucent.gpu.packed_meshes import has_packed
 from translucent.gpu.viewport import Viewport
 from translucent.planning.passes import PassName
@@ -112,11 +112,11 @@ def needed(*frames: tuple[tl.Scene, tl.RenderPlan]) -> list[set[ProgramName]]:
     found = []
     with tl.Renderer() as renderer:
         gl = renderer.gpu.context.gl
-        gl.extra = ledger = Ledger()
+        gl.extra = budget = CompileBudget()
         with renderer.gpu.context.current():
             for scene, plan in frames:
                 renderer.gpu.draw(scene, gl.simple_framebuffer(SIZE), plan, 0.0, "none")
-                found.append(set(ledger.needed))
+                found.append(set(budget.needed))
     return found
 
 
@@ -136,15 +136,15 @@ def test_what_stands_in_for_a_scene_is_drawn_with_its_programs(name: str) -> Non
 
 
 def test_a_frame_that_has_made_enough_draws_nothing() -> None:
-    ledger = Ledger(postpones=True)
-    ledger.begin_frame(-1.0)
-    ledger.leave_room()  # there was nothing to make
-    ledger.enter(None)
+    budget = CompileBudget(postpones=True)
+    budget.begin_frame(-1.0)
+    budget.leave_room()  # there was nothing to make
+    budget.enter(None)
     with pytest.raises(PostponedError):
-        ledger.leave_room()
-    ledger.begin_frame(60.0)
-    ledger.enter(None)
-    ledger.leave_room()
+        budget.leave_room()
+    budget.begin_frame(60.0)
+    budget.enter(None)
+    budget.leave_room()
 
 
 def test_programs_are_compiled_elsewhere_for_each_kind_of_texture() -> None:
@@ -158,17 +158,17 @@ def test_programs_are_compiled_elsewhere_for_each_kind_of_texture() -> None:
 
     with tl.Renderer() as renderer:
         gl = renderer.gpu.context.gl
-        gl.extra = ledger = Ledger()
+        gl.extra = budget = CompileBudget()
 
         def draw(side: int) -> None:
             scene = painted(side)
             plan = renderer.plan(scene, interfaces=tl.ScreenInterfaces())
-            ledger.begin_frame(60.0)
+            budget.begin_frame(60.0)
             renderer.gpu.draw(scene, gl.simple_framebuffer(SIZE), plan, 0.0, "none")
 
         with renderer.gpu.context.current():
             draw(60)
-            ledger.postpones, ledger.elsewhere = True, set(ledger.needed)
+            budget.postpones, budget.elsewhere = True, set(budget.needed)
             draw(100)
             with pytest.raises(PostponedError) as postponed:
                 draw(64)
@@ -181,19 +181,19 @@ def test_what_adds_samples_is_made_in_frames_of_its_own() -> None:
     """
     scene, steps = showcase(Sphere().tessellate(8)), list[bool]()
     with tl.Renderer() as renderer, renderer.gpu.context.current():
-        renderer.gpu.context.gl.extra = ledger = Ledger()
+        renderer.gpu.context.gl.extra = budget = CompileBudget()
         viewport, plan = Viewport(renderer.gpu), renderer.plan(scene)
         viewport.resize(SIZE)
-        ledger.begin_frame(60.0)
+        budget.begin_frame(60.0)
         for _ in range(2):
             viewport.step(0, scene, plan, 1)
         wanted = viewport.mean_radiance()
         viewport.restart()
         viewport._added.clear()  # all else is there
         viewport._sides[0] = None
-        ledger.postpones = True
+        budget.postpones = True
         for _ in range(5):
-            ledger.begin_frame(-1.0)
+            budget.begin_frame(-1.0)
             before = viewport.steps(0)
             with suppress(PostponedError):
                 viewport.step(0, scene, plan, 1)
@@ -252,7 +252,7 @@ def test_the_last_picture_stays_until_the_next_one_is_compiled(
 ) -> None:
     near.set()
     finish(stage, work)
-    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
+    wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
     near.clear()
     before = pixels(stage)
     work.do(ChoosePreset("whole_milk"))
@@ -277,7 +277,7 @@ def test_a_frame_that_takes_too_long_goes_on_in_the_next_one(
 ) -> None:
     near.set()
     finish(stage, work)
-    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
+    wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
     monkeypatch.setattr(stages, "BUDGET", 0.0)
     monkeypatch.setattr(Pace, "stride", lambda *_: 1)  # not 256 steps for a picture: what is made is the same
     made: list[bool] = []
@@ -302,7 +302,7 @@ def test_a_frame_that_takes_too_long_goes_on_in_the_next_one(
 def test_who_does_not_wait_has_the_window_compile(stage: Stage, work: Workspace, near: threading.Event) -> None:
     near.set()
     finish(stage, work)
-    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
+    wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
     near.clear()
     work.do(ChoosePreset("whole_milk"))
     assert stage.draw(work, SIZE)
@@ -367,7 +367,7 @@ def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierar
     monkeypatch.setattr(tracing, "PACKED_AT_ONCE", 10)
     near.set()
     finish(stage, work)
-    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
+    wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
     near.clear()
     assert work.loaded is not None
     mesh = work.loaded.scene.objects[0].mesh

@@ -13,7 +13,7 @@ import pytest
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.cli import main
-from translucent.gpu.ledger import PostponedError
+from translucent.gpu.compile_budget import PostponedError
 from translucent.gpu.passes import shadow_maps
 from translucent.preview import preferences, timing
 from translucent.preview.actions import Change, ChoosePreset, Turn

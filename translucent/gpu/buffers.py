@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from translucent.geometry.mesh import Mesh, unit_normals
 from translucent.geometry.normals import drawn_normals
-from translucent.gpu.ledger import before_making
+from translucent.gpu.compile_budget import before_making
 
 #: Faces whose corners are written at a time, so that little memory is taken meanwhile.
 _CHUNK = 1 << 18

@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 import moderngl
 import numpy as np
 
-from translucent.gpu.ledger import before_making
+from translucent.gpu.compile_budget import before_making
 from translucent.scene.environment import Environment
 from translucent.scene.environment_filter import filtered
 from translucent.scene.environment_map import EnvironmentMap

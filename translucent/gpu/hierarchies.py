@@ -20,9 +20,9 @@ from translucent.files.reading import size_text
 from translucent.geometry.bvh import BLOCK, LEAF_SIZE, Floats, build_hierarchy
 from translucent.geometry.mesh import Mesh
 from translucent.gpu.body_uniforms import bounded_extinction
+from translucent.gpu.compile_budget import before_making
 from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
 from translucent.gpu.layout import TRACED_BODY
-from translucent.gpu.ledger import before_making
 from translucent.gpu.packed_meshes import FIRST_BITS, Words, frame, has_packed, packed_mesh, packed_nodes
 from translucent.gpu.textures import unlike_powers
 from translucent.media.medium import VACUUM, Medium

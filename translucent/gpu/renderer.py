@@ -17,10 +17,10 @@ from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
 from translucent.gpu.adaptive import AdaptiveSampling, is_adaptive, traced_samples
 from translucent.gpu.backdrop import TextureBackdrop
+from translucent.gpu.compile_budget import before_drawing, before_making
 from translucent.gpu.context import GpuContext, adopt_context, open_context, require_own_process
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
-from translucent.gpu.ledger import before_drawing, before_making
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.caustics import CausticsPass
 from translucent.gpu.passes.path_trace import PathTracePass, PathTracer

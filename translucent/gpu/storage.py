@@ -7,7 +7,7 @@ from functools import cached_property
 import moderngl
 
 from translucent.errors import RenderError
-from translucent.gpu.ledger import before_making
+from translucent.gpu.compile_budget import before_making
 
 #: First OpenGL version in which shaders write to buffers.
 SHADER_STORAGE = 430

@@ -9,7 +9,7 @@ import numpy as np
 
 from translucent.errors import RenderError
 from translucent.formulas.brdf_table import brdf_table
-from translucent.gpu.ledger import before_drawing_with, before_making
+from translucent.gpu.compile_budget import before_drawing_with, before_making
 from translucent.gpu.shaders import set_uniform
 from translucent.scene.surface import TEXTURE_FIELDS, Surface
 from translucent.scene.texture import Texture

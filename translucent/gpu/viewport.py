@@ -18,8 +18,8 @@ from translucent.errors import RenderError
 from translucent.formulas.tone import TONES
 from translucent.frames.aovs import EMPTY, SEEN, WRONG, false_colors
 from translucent.frames.frame import Frame
+from translucent.gpu.compile_budget import before_drawing, before_making
 from translucent.gpu.job import FrameJob
-from translucent.gpu.ledger import before_drawing, before_making
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import build_program, set_uniform
 from translucent.gpu.strides import STRIDES, phases, shifts

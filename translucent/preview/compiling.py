@@ -23,7 +23,7 @@ from translucent.formulas.tone import TONES
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import has_drawn_normals
 from translucent.geometry.solids import Box
-from translucent.gpu.ledger import Ledger, ProgramName
+from translucent.gpu.compile_budget import CompileBudget, ProgramName
 from translucent.gpu.photon_light import PhotonLight
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
@@ -84,7 +84,7 @@ class Compiler:
 
     Attributes
     ----------
-    ledger : Ledger
+    budget : CompileBudget
         For the context that waits.
     lane : Lane
         One request after the other; a task that nobody waits for has no name.
@@ -94,14 +94,14 @@ class Compiler:
 
     def __init__(self, pool: Pool) -> None:
         self._pool = pool
-        self.ledger = Ledger()
+        self.budget = CompileBudget()
         self.lane = Lane("compile")
         self.device = ""
 
     def begin(self, scene: Scene, plans: Sequence[RenderPlan], then: Callable[[Compiled], None]) -> None:
         """Start the worker process, with a frame like the one on show; from now on, the context waits for it."""
-        self.ledger.postpones = True
-        self.ledger.elsewhere |= self.ledger.needed
+        self.budget.postpones = True
+        self.budget.elsewhere |= self.budget.needed
 
         def work(task: Task) -> Compiled:
             self._call(task, show_frames, stand_in(scene), plans[0], self.device)
@@ -111,7 +111,7 @@ class Compiler:
 
     def lacks_normals(self, scene: Scene, plans: Sequence[RenderPlan]) -> bool:
         """True if the context should wait for normals."""
-        return self.ledger.postpones and bool(unsmoothed(scene, plans))
+        return self.budget.postpones and bool(unsmoothed(scene, plans))
 
     def ask(
         self,
@@ -131,11 +131,11 @@ class Compiler:
     def take(self, found: Compiled, missing: ProgramName | None = None) -> None:
         """Let the context build what is ready, and what was `missing`: if it is not ready, the window tells why."""
         if found.programs is None:
-            self.ledger.postpones = False
+            self.budget.postpones = False
         else:
-            self.ledger.elsewhere |= found.programs
+            self.budget.elsewhere |= found.programs
         if missing is not None:
-            self.ledger.elsewhere.add(missing)
+            self.budget.elsewhere.add(missing)
 
     def _call(self, task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
         return self._pool.call(task, work, *arguments, urgency=Urgency.PICTURE)
@@ -170,7 +170,7 @@ def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:
 
 def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], device: str) -> Compiled:
     """Draw a scene by plans, as it is drawn while it moves and at rest, and return the programs that this needed."""
-    engine, ledger = _engine(newest_shader(), device)
+    engine, budget = _engine(newest_shader(), device)
     trouble = ""
     with engine.context.current() as gl:
         picture, viewport = gl.framebuffer([gl.texture(FRAME, 4)]), Viewport(engine)
@@ -190,7 +190,7 @@ def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], de
             gl.finish()
             viewport.release()
             picture.release()
-    return Compiled(frozenset(ledger.needed), trouble)
+    return Compiled(frozenset(budget.needed), trouble)
 
 
 def _light_by_photons(engine: GpuRenderer, scene: Scene, plan: RenderPlan) -> None:
@@ -220,7 +220,7 @@ def show_frames(report: Report, scene: Scene, plan: RenderPlan, device: str) -> 
 
 
 @lru_cache(maxsize=1)
-def _engine(written: float, device: str) -> tuple[GpuRenderer, Ledger]:
+def _engine(written: float, device: str) -> tuple[GpuRenderer, CompileBudget]:
     """Renderer of the worker process, for one version of the shaders.
 
     Raises
@@ -228,11 +228,11 @@ def _engine(written: float, device: str) -> tuple[GpuRenderer, Ledger]:
     RenderError
         If it draws with another device than the window.
     """
-    engine, ledger = GpuRenderer(), Ledger()
+    engine, budget = GpuRenderer(), CompileBudget()
     if (own := engine.context.renderer) != device:
         raise RenderError("another process", f"it draws with {own}, and the window with {device}", "mend the drivers")
-    engine.context.gl.extra = ledger
-    return engine, ledger
+    engine.context.gl.extra = budget
+    return engine, budget
 
 
 def _quick(plan: RenderPlan) -> RenderPlan:

@@ -10,8 +10,8 @@ from typing import Any
 from translucent.assets import newest_shader
 from translucent.errors import TranslucentError
 from translucent.geometry.normals import drawn_normals
+from translucent.gpu.compile_budget import PostponedError, ProgramName
 from translucent.gpu.context import open_context
-from translucent.gpu.ledger import PostponedError, ProgramName
 from translucent.gpu.viewport import Probe, Viewport
 from translucent.planning.methods import Method
 from translucent.planning.render_plan import RenderPlan
@@ -81,7 +81,7 @@ class Stage:
         self._own = open_context() if context is None else None
         self._gl = context if self._own is None else self._own.gl
         self._compiler = compiler
-        self._gl.extra = None if compiler is None else compiler.ledger
+        self._gl.extra = None if compiler is None else compiler.budget
         with self.current():
             self.renderer = Renderer(context=self._gl)
             self.viewport = Viewport(self.renderer.gpu)
@@ -115,7 +115,7 @@ class Stage:
         started = time.perf_counter()
         self._budget = self._frame_budget.begin(BUDGET)
         if self._compiler is not None:
-            self._compiler.ledger.begin_frame(PREPARING * self._budget)
+            self._compiler.budget.begin_frame(PREPARING * self._budget)
         with self.current():
             try:
                 more = self._draw(workspace, size)
@@ -341,17 +341,17 @@ class Stage:
     def reload(self, workspace: Workspace) -> None:
         """Compile the shaders anew; if that fails, keep the present ones, and tell why."""
         compiler, scene = self._compiler, workspace.scene()
-        if compiler is None or not compiler.ledger.postpones or scene is None:
+        if compiler is None or not compiler.budget.postpones or scene is None:
             return self._rebuild(workspace)
 
         def take(found: Compiled) -> None:
             if found.programs is not None and found.problem:
                 self.shader_problem = found.problem
                 return
-            compiler.ledger.postpones = False  # should anything still be missing
+            compiler.budget.postpones = False  # should anything still be missing
             self._rebuild(workspace)
-            compiler.ledger.elsewhere.clear()
-            compiler.ledger.postpones = True
+            compiler.budget.elsewhere.clear()
+            compiler.budget.postpones = True
             self._take_compiled(workspace, found)
 
         compiler.ask("preparing the picture", scene, self._drawn_plans, take)

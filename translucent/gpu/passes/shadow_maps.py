@@ -14,10 +14,10 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.gpu.balance import FaceCounts
 from translucent.gpu.body_uniforms import BodyRoles, bounded_extinction
+from translucent.gpu.compile_budget import before_making
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
-from translucent.gpu.ledger import before_making
 from translucent.gpu.light_cameras import light_key, objects_key, outermost
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass

@@ -1,4 +1,4 @@
-"""Compile budget of a context: a ledger of the programs made, and postponement of others so that no window freezes."""
+"""Compile budget of an OpenGL context: programs wait for another process to compile them, or for a later frame."""
 
 from __future__ import annotations
 
@@ -30,9 +30,8 @@ class PostponedError(Exception):
 
 
 @dataclass(eq=False)
-class Ledger:
-    """Ledger of the programs that a context has made, and of its compile budget. It is the context's ``extra``, if
-    anything is.
+class CompileBudget:
+    """Compile budget of a context, which holds it as its ``extra``, with a record of the programs that it has made.
 
     Attributes
     ----------
@@ -71,23 +70,24 @@ class Ledger:
 
 
 def before_making(gl: moderngl.Context, program: ProgramName | None = None) -> None:
-    """Ask the context's ledger whether a program, or another cached object that takes time, may be made now."""
-    if isinstance(gl.extra, Ledger):
+    """Ask the context's compile budget whether a program, or another cached object that takes time, may be made now."""
+    if isinstance(gl.extra, CompileBudget):
         gl.extra.enter(program)
 
 
 def before_drawing(gl: moderngl.Context) -> None:
-    """Ask the context's ledger whether the frame has time left to draw with what it has made."""
-    if isinstance(gl.extra, Ledger):
+    """Ask the context's compile budget whether the frame has time left to draw with what it has made."""
+    if isinstance(gl.extra, CompileBudget):
         gl.extra.leave_room()
 
 
 def before_drawing_with(gl: moderngl.Context, program: moderngl.Program, kinds: Kinds) -> None:
-    """Ask the context's ledger whether a program may be used now with textures of these kinds, when it first is:
-    drivers then compile it once more.
+    """Ask the context's compile budget whether a program may be used now with textures of these types.
+
+    Drivers compile it once more at its first use with them.
     """
-    ledger, name = gl.extra, program.extra
-    if isinstance(ledger, Ledger) and name is not None:
+    budget, name = gl.extra, program.extra
+    if isinstance(budget, CompileBudget) and name is not None:
         files, switches = name
-        if (used := (files, (*switches, *kinds))) not in ledger.needed:
-            ledger.enter(used)
+        if (used := (files, (*switches, *kinds))) not in budget.needed:
+            budget.enter(used)
