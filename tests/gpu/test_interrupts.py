@@ -5,10 +5,12 @@ from __future__ import annotations
 import gc
 import os
 import signal
+import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -20,7 +22,9 @@ import translucent as tl
 from translucent.geometry.solids import Sphere
 from translucent.gpu import context as contexts
 from translucent.gpu import renderer as renderers
+from translucent.gpu import signals as deferrals
 from translucent.gpu import timer as timers
+from translucent.gpu.signals import DeferredSignals
 
 SIZE = (12, 8)
 MEDIUM = tl.Medium(absorption=(1, 2, 3))
@@ -31,20 +35,20 @@ BEGUN_AND_ENDED = [(moderngl.__file__, "__enter__"), (moderngl.__file__, "__exit
 
 
 @contextmanager
-def interrupted_at(line: int) -> Iterator[list[str]]:
-    """Raise `KeyboardInterrupt` at one of the lines that are executed within; the list has those before it."""
+def interrupted_at(line: int, watched: Sequence[str | None] = WATCHED) -> Iterator[list[str]]:
+    """Press Ctrl-C at one of the lines that are executed within; the list has those before it."""
     seen: list[str] = []
 
     def trace(frame: FrameType, event: str, argument: Any) -> Any:
         code = frame.f_code
         if code.co_name == "_release":  # of an earlier renderer
             return None
-        if code.co_filename not in WATCHED and (code.co_filename, code.co_name) not in BEGUN_AND_ENDED:
+        if code.co_filename not in watched and (code.co_filename, code.co_name) not in BEGUN_AND_ENDED:
             return None
         if event == "line":
             seen.append(f"{os.path.basename(frame.f_code.co_filename)}:{frame.f_lineno}")
             if len(seen) == line:
-                raise KeyboardInterrupt
+                signal.raise_signal(signal.SIGINT)
         return trace
 
     before = sys.gettrace()
@@ -128,6 +132,97 @@ def test_what_was_interrupted_says_so() -> None:
         with pytest.raises(tl.RenderError, match=r"^rendering; it was interrupted; make a new one$"):
             engine.render(SCENE, SIZE, renderer.plan(SCENE), 1)
         assert renderer.gpu is not engine
+
+
+# Signals
+
+#: Draws two frames, with Ctrl-C as soon as moderngl calls this function of its Python part within `Context.program`.
+STRUCK = """
+import signal, sys
+import _moderngl
+import translucent as tl
+from translucent.geometry.solids import Sphere
+
+scene = tl.showcase(Sphere().tessellate(12), tl.Medium(absorption=(1, 2, 3)), (12, 8), stage="none")
+make = getattr(_moderngl, sys.argv[1])
+
+def struck(*arguments):
+    setattr(_moderngl, sys.argv[1], make)
+    signal.raise_signal(signal.SIGINT)
+    return make(*arguments)
+
+setattr(_moderngl, sys.argv[1], struck)
+with tl.Renderer() as renderer, tl.Renderer() as other:
+    try:
+        renderer.render(scene, (12, 8))
+    except KeyboardInterrupt:
+        assert (renderer.render(scene, (12, 8)).radiance == other.render(scene, (12, 8)).radiance).all()
+        sys.exit(5)
+"""
+
+
+@pytest.mark.parametrize("within", ["make_attribute", "make_uniform", "make_uniform_block"])
+def test_ctrl_c_while_a_program_is_made_is_no_crash(within: str) -> None:
+    """moderngl goes on with a null pointer where a function that it calls raises."""
+    environment = {**os.environ, "PYTHONPATH": str(Path(tl.__file__).parents[1])}
+    done = subprocess.run([sys.executable, "-c", STRUCK, within], env=environment, capture_output=True, text=True)
+    assert done.returncode == 5, done.stderr
+
+
+@contextmanager
+def heard() -> Iterator[list[int]]:
+    """Numbers of the signals that a handler has seen, which raises then; Ctrl-C and SIGTERM have it."""
+    numbers: list[int] = []
+
+    def handler(number: int, frame: FrameType | None) -> None:
+        numbers.append(number)
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield numbers
+        assert {signal.getsignal(number) for number in before} == {handler}
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)
+
+
+def test_deferred_signals_are_all_raised_at_the_end() -> None:
+    def strike() -> None:
+        with DeferredSignals():
+            with DeferredSignals():
+                signal.raise_signal(signal.SIGTERM)
+                signal.raise_signal(signal.SIGINT)
+            assert not numbers
+
+    with heard() as numbers:
+        with pytest.raises(KeyboardInterrupt):
+            strike()
+        assert sorted(numbers) == [signal.SIGINT, signal.SIGTERM]
+
+
+def test_a_thread_leaves_handlers_alone() -> None:
+    def look() -> None:
+        with DeferredSignals():
+            assert signal.getsignal(signal.SIGINT) is before
+
+    before = signal.getsignal(signal.SIGINT)
+    assert in_a_thread(look) is None
+
+
+def test_signals_are_heard_wherever_their_deferral_is_interrupted() -> None:
+    watched = [deferrals.__file__]
+    with heard(), interrupted_at(0, watched) as seen, DeferredSignals():
+        pass
+    assert len(seen) > 100
+    for line in range(1, len(seen) + 1):
+        with heard() as numbers:
+            with pytest.raises(KeyboardInterrupt), interrupted_at(line, watched), DeferredSignals():
+                pass
+            for number in (signal.SIGINT, signal.SIGTERM):
+                with pytest.raises(KeyboardInterrupt):
+                    signal.raise_signal(number)
+            assert numbers == [signal.SIGINT, signal.SIGINT, signal.SIGTERM]
 
 
 # Threads and forks

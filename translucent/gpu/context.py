@@ -19,6 +19,7 @@ import moderngl
 
 from translucent.errors import InputError, RenderError
 from translucent.gpu.osmesa import OSMesaContext
+from translucent.gpu.signals import DeferredSignals
 
 Backend = Literal["egl", "window", "osmesa"]
 
@@ -197,7 +198,8 @@ def open_context(backend: str | None = None) -> GpuContext:
     attempts: list[Attempt] = []
     for name in (backend,) if backend else ("egl", "osmesa"):
         try:
-            gl = _OPENERS[name]()
+            with DeferredSignals():
+                gl = _OPENERS[name]()
         except Exception as error:  # noqa: BLE001 - glcontext raises bare Exception, and each platform its own kinds
             attempts.append(Attempt(name, str(error) or type(error).__name__))
             continue

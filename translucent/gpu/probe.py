@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.gpu.shaders import preprocess
+from translucent.gpu.signals import DeferredSignals
 
 _SIGNATURE = re.compile(r"^((?:float|vec[234])(?:\[\d+\])?)\s+(\w+)\s*\(([^)]*)\)\s*\{", re.MULTILINE)
 _PARAMETER = re.compile(r"(\w+)\s+(\w+)(?:\[(\d+)\])?")
@@ -58,7 +59,9 @@ def run_function(
     """
     arrays = [np.ascontiguousarray(argument, dtype=np.float32) for argument in arguments]
     count, width = len(arrays[0]), _width(signature.returns)
-    program = gl.program(vertex_shader=feedback_program(preprocess(library).text, signature), varyings=["result"])
+    source = feedback_program(preprocess(library).text, signature)
+    with DeferredSignals():
+        program = gl.program(vertex_shader=source, varyings=["result"])
     content: list[tuple[moderngl.Buffer, str, str]] = []
     tables: list[moderngl.Texture] = []
     for array, (kind, name, length) in zip(arrays, signature.parameters, strict=True):

@@ -14,6 +14,7 @@ from translucent.assets import shader_path
 from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import BLOCKS, TABLES
+from translucent.gpu.signals import DeferredSignals
 from translucent.gpu.std140 import PackedTable, UniformBlock
 
 _INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*(?://.*)?$')
@@ -181,7 +182,8 @@ def build_program(
     if unused := sorted(given.keys() - used):
         raise RenderError(f"shaders {vertex!r} and {fragment!r}", f"neither asks for {unused}", "check the spelling")
     try:
-        program = gl.program(vertex_shader=stages[0].text, fragment_shader=stages[1].text)
+        with DeferredSignals():
+            program = gl.program(vertex_shader=stages[0].text, fragment_shader=stages[1].text)
     except moderngl.Error as error:
         log = str(error)
         stage = stages[1] if "fragment_shader" in log else stages[0]
