@@ -10,13 +10,13 @@ import pytest
 
 from translucent.bake import batch
 from translucent.planning.shadow_maps import ShadowMaps
-from translucent.scene import staging
+from translucent.scene import stages
 
 
 def with_few_shadows(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make maps of shadows of 128 texels a side, where no size is stated, and of 8 directions on stages."""
     monkeypatch.setattr(ShadowMaps.__init__, "__defaults__", (128, None))
-    monkeypatch.setattr(staging, "ENVIRONMENT_SHADOWS", 8)
+    monkeypatch.setattr(stages, "ENVIRONMENT_SHADOWS", 8)
 
 
 def without_processes(monkeypatch: pytest.MonkeyPatch) -> None:

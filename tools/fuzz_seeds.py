@@ -21,14 +21,13 @@ from translucent.bench.picture import Picture
 from translucent.bench.record import CaseRecord, Provenance, Report
 from translucent.bench.row import Errors, Row, Timing
 from translucent.files.unpacking import PICTURES
-from translucent.frames.photographs import read_photographs
-from translucent.frames.picture import read_picture
+from translucent.frames.photographs import read_photographs, read_picture
 from translucent.geometry.solids import Box
 from translucent.gltf.materials import read_materials
 from translucent.gltf.write import write_medium
 from translucent.materials import load_medium, text_block
 from translucent.media.pixel import pixel_color
-from translucent.media.preset_file import read_presets
+from translucent.media.preset import read_presets
 from translucent.scene.environment_files import read_environment_map
 
 JADE = tl.Medium.from_color((0.2, 0.6, 0.4), 0.02, ior=1.5)

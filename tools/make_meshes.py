@@ -17,8 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.solid_geometry import revolve
-from translucent.geometry.solids import Sphere, SphericalShell
+from translucent.geometry.solids import Sphere, SphericalShell, revolve
 
 ROOT = Path(__file__).resolve().parents[1]
 CENTIMETRE = 0.01

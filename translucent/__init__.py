@@ -65,13 +65,13 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.media.density import ExponentialDensity as ExponentialDensity
     from translucent.media.density import LinearDensity as LinearDensity
     from translucent.media.fitting import Fit as Fit
+    from translucent.media.fitting import StepFit as StepFit
     from translucent.media.fitting import fit_medium as fit_medium
     from translucent.media.fitting import fit_wedge as fit_wedge
     from translucent.media.medium import Medium as Medium
     from translucent.media.preset import Preset as Preset
     from translucent.media.presets import preset as preset
     from translucent.media.presets import presets as presets
-    from translucent.media.step_fit import StepFit as StepFit
     from translucent.mesh_files import load_mesh as load_mesh
     from translucent.notebook.view import view as view
     from translucent.page.write import write_page as write_page
@@ -104,7 +104,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.scene.scene import Object as Object
     from translucent.scene.scene import Scene as Scene
     from translucent.scene.showcase import showcase as showcase
-    from translucent.scene.staging import staged as staged
+    from translucent.scene.stages import staged as staged
     from translucent.scene.surface import Surface as Surface
     from translucent.scene.texture import Texture as Texture
     from translucent.tiles import render_tiles as render_tiles
@@ -136,23 +136,22 @@ _NAMES = {
     "gltf.write": "write_medium",
     "materials": "load_medium text_block",
     "media.albedo": "scattering_medium",
-    "media.conversion": "DistanceMatch clamp_colors color_at_distance condition_number "
-    "distance_for_color extinction_from_colors",
+    "media.conversion": "DistanceMatch clamp_colors color_at_distance "
+    "condition_number distance_for_color extinction_from_colors",
     "media.density": "DensityGrid ExponentialDensity LinearDensity",
-    "media.fitting": "Fit fit_medium fit_wedge",
+    "media.fitting": "Fit StepFit fit_medium fit_wedge",
     "media.medium": "Medium",
     "media.preset": "Preset",
     "media.presets": "preset presets",
-    "media.step_fit": "StepFit",
     "mesh_files": "load_mesh",
     "notebook.view": "view",
     "page.write": "write_page",
     "planning.caustics": "Caustics",
     "planning.interfaces": "FrontInterface ScreenInterfaces TracedInterfaces",
-    "planning.scattering": "Diffusion ScatteringLayer SingleScattering",
     "planning.methods": "BackFaceDepth DepthPeeling FragmentLists KBuffer PathTraced RayMarched SignedDepth ThinLayer",
     "planning.plan": "plan",
     "planning.render_plan": "Capabilities RenderPlan",
+    "planning.scattering": "Diffusion ScatteringLayer SingleScattering",
     "planning.shadow_maps": "ShadowMaps",
     "renderer": "Renderer",
     "scene.backdrop": "Backdrop",
@@ -161,7 +160,7 @@ _NAMES = {
     "scene.lights": "DirectionalLight PointLight SpotLight",
     "scene.scene": "Object Scene",
     "scene.showcase": "showcase",
-    "scene.staging": "staged",
+    "scene.stages": "staged",
     "scene.surface": "Surface",
     "scene.texture": "Texture",
     "tiles": "render_tiles",

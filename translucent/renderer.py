@@ -32,8 +32,7 @@ from translucent.planning.scattering.choice import check_scattering
 from translucent.planning.shadow_maps import ShadowMaps, check_shadows
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
-from translucent.scene.checks import check_scene
-from translucent.scene.scene import Scene
+from translucent.scene.scene import Scene, check_scene
 from translucent.scene.shadow_catchers import before_page, page_radiance
 from translucent.version import VERSION
 

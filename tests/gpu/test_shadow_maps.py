@@ -18,7 +18,7 @@ from translucent.gpu.light_cameras import outermost
 from translucent.gpu.shadow_atlas import LEAST_TEXELS, MOST_BYTES, ShadowViews
 from translucent.gpu.shadow_cameras import ShadowThrowers
 from translucent.planning.mirrors import lit_side
-from translucent.scene.staging import staged
+from translucent.scene.stages import staged
 
 SIZE = (96, 72)
 DARK = tl.Environment.constant((0, 0, 0))

@@ -24,7 +24,7 @@ from translucent.preview.session import load_session, save_session
 from translucent.preview.stage import Stage
 from translucent.preview.staging import stage_name, tone_of
 from translucent.preview.workspace import Workspace
-from translucent.scene import staging
+from translucent.scene import stages
 from translucent.scene.showcase import framing
 from translucent.scene.stages import stage_named
 from translucent.scene.turntable import on_stage
@@ -35,7 +35,7 @@ SMALL = (48, 32)
 @pytest.fixture(autouse=True)
 def few_directions(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine without a GPU takes a while for 128 maps."""
-    monkeypatch.setattr(staging, "ENVIRONMENT_SHADOWS", 16)
+    monkeypatch.setattr(stages, "ENVIRONMENT_SHADOWS", 16)
 
 
 @pytest.fixture

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.scene.environment import equirectangular_uv
-from translucent.scene.environment_filter import LEVEL_SIZE, LEVELS, FilteredEnvironment, filtered
+from translucent.scene.environment import LEVEL_SIZE, LEVELS, FilteredEnvironment, equirectangular_uv, filtered
 from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, texel_directions
 from translucent.scene.lobes import irradiance_map
 

@@ -16,8 +16,8 @@ from tests.work import calls
 from translucent.geometry import mesh as meshes
 from translucent.planning.plan import plan
 from translucent.planning.slots import medium_slots
-from translucent.scene import overlaps
-from translucent.scene.overlaps import first_overlap
+from translucent.scene import scene as overlaps
+from translucent.scene.scene import first_overlap
 from translucent.scene.showcase import filled
 
 #: Twice as many nodes; what is linear takes twice as many calls, but for what is done once.

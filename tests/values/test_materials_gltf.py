@@ -21,7 +21,7 @@ from translucent.gltf.file import GltfFile, read_gltf
 from translucent.gltf.materials import GltfMaterial, materials_of, read_materials
 from translucent.gltf.scene_media import material_uses, thickness_at, thickness_map, world_thickness
 from translucent.gltf.textures import TextureTransform
-from translucent.media.color_distance import BLACKEST
+from translucent.media.medium import BLACKEST
 
 COLOR = (0.1, 0.5, 0.9)
 

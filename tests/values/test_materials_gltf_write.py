@@ -17,7 +17,7 @@ from translucent.gltf.materials import materials_of, read_materials
 from translucent.gltf.scene_media import material_uses
 from translucent.gltf.write import write_medium
 from translucent.gltf.write_file import write_gltf
-from translucent.media.color_distance import BLACKEST
+from translucent.media.medium import BLACKEST
 
 # Writing
 

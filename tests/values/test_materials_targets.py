@@ -22,7 +22,7 @@ from translucent.materials.openpbr import read_openpbr, write_openpbr
 from translucent.materials.standard_surface import read_standard_surface, write_standard_surface
 from translucent.materials.unity import from_unity
 from translucent.materials.unreal import LONGEST_CM, from_mean_free_path_cm, mean_free_path_cm
-from translucent.media.color_distance import BLACKEST, color_at, extinction_at
+from translucent.media.medium import BLACKEST, color_at, extinction_at
 
 # Color at a distance
 

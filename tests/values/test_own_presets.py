@@ -9,10 +9,8 @@ import pytest
 
 import translucent as tl
 from tests.command_line import Run
-from translucent.media.own_presets import preset_name, read_own_presets, save_own_preset
-from translucent.media.preset import Preset
-from translucent.media.preset_file import preset_text, read_presets
-from translucent.media.presets import grouped, matching
+from translucent.media.preset import Preset, preset_text, read_presets
+from translucent.media.presets import grouped, matching, preset_name, read_own_presets, save_own_preset
 
 GOOD = '[mint]\nkind = "estimated"\nsource = "by eye"\ncolor = [0.4, 0.9, 0.7]\ndistance = "1cm"\nior = 1.4\n'
 BAD = f'{GOOD}\n[tea]\nkind = "estimated"\nsource = "by eye"\ncolour = [0.8, 0.4, 0.1]\ndistance = "1cm"\nior = 1.33\n'

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.media.preset_file import read_presets
+from translucent.media.preset import read_presets
 
 ENTRY = """
 [ink]

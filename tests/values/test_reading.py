@@ -28,7 +28,7 @@ from translucent.materials import load_medium
 from translucent.materials.usd import read_usda
 from translucent.media.fitting import fit_wedge
 from translucent.media.pixel import pixel_color
-from translucent.media.preset_file import read_presets
+from translucent.media.preset import read_presets
 
 JADE = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02)
 

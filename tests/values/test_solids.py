@@ -11,8 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from translucent.errors import InputError
-from translucent.geometry.solid_geometry import revolve
-from translucent.geometry.solids import Box, Ellipsoid, Frustum, Solid, Sphere, SphericalShell, Torus, TwoSpheres
+from translucent.geometry.solids import (
+    Box,
+    Ellipsoid,
+    Frustum,
+    Solid,
+    Sphere,
+    SphericalShell,
+    Torus,
+    TwoSpheres,
+    revolve,
+)
 
 Array = npt.NDArray[np.float64]
 Inside = Callable[[Array], npt.NDArray[np.bool_]]

@@ -12,8 +12,18 @@ from translucent.commands.common import STAGE_NAMES
 from translucent.geometry.solids import Box, Sphere
 from translucent.scene.shadow_catchers import before_page, page_radiance
 from translucent.scene.showcase import DEFAULT_COLOR, default_medium, framing, showcase
-from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, STAGES, stage_named
-from translucent.scene.staging import GAP, has_ground, staged, upright, upright_turn, world_vertices
+from translucent.scene.stages import (
+    DEFAULT_STAGE,
+    GAP,
+    NO_STAGE,
+    STAGES,
+    has_ground,
+    stage_named,
+    staged,
+    upright,
+    upright_turn,
+    world_vertices,
+)
 from translucent.scene.turntable import turntable
 
 SIZE = (160, 90)

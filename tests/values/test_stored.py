@@ -18,7 +18,7 @@ import sys, translucent as tl
 from translucent.assets import mesh_path
 from translucent.formulas.brdf_table import brdf_table
 from translucent.formulas.sampling import sample_shifts
-from translucent.scene.environment_filter import filtered
+from translucent.scene.environment import filtered
 from translucent.scene.shadow_directions import shadow_directions
 scene = tl.staged(tl.showcase(tl.load_mesh(mesh_path("bear")), tl.Medium(absorption=1.0), size=(64, 64), stage="none"))
 filtered(scene.environment), shadow_directions(scene.environment, 128), brdf_table(), sample_shifts(16)

@@ -18,7 +18,7 @@ from translucent.bake.check_picture import labeled, look
 from translucent.errors import InputError
 from translucent.files.paths import require_output, write_atomically
 from translucent.formulas.color import luminance
-from translucent.frames.picture import read_picture
+from translucent.frames.photographs import read_picture
 from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
 from translucent.renderer import Renderer

@@ -238,10 +238,9 @@ def _convert(
     import numpy as np
 
     from translucent.frames.appearance import medium_for_average_color, thickness_samples
-    from translucent.media.color_distance import color_at
     from translucent.media.colors import parse_color
     from translucent.media.conversion import summary
-    from translucent.media.medium import Medium
+    from translucent.media.medium import Medium, color_at
     from translucent.units import parse_length
 
     wanted, changes = clamped(color) if clamp and color is not None else (color or "", [])

@@ -11,9 +11,8 @@ from translucent.commands.common import triple_text
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
-    from translucent.media.fitting import Fit
+    from translucent.media.fitting import Fit, StepFit
     from translucent.media.medium import Medium
-    from translucent.media.step_fit import StepFit
 
 #: Suffixes of tables; all else but .toml are pictures.
 TABLES = (".csv", ".json")

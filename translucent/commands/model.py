@@ -98,7 +98,7 @@ def read_scene(
     what the model and the options bring with them.
     """
     from translucent.scene.showcase import framing, objects_named, with_roughness
-    from translucent.scene.staging import staged, upright
+    from translucent.scene.stages import staged, upright
 
     stage, turn = _turned(stage)
     options, look = options or CameraOptions(), look or FileLook()
@@ -167,8 +167,7 @@ def _mesh_scene(asked: _Asked) -> tuple[Scene, Stage | None]:
 def _file_scene(asked: _Asked, draft_extensions: bool) -> tuple[Scene, Stage | None]:
     from translucent.gltf.load import load_scene
     from translucent.scene.showcase import filled
-    from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, stage_named
-    from translucent.scene.staging import has_ground
+    from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, has_ground, stage_named
 
     look, environment = asked.look, asked.environment
     scene = load_scene(

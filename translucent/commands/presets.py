@@ -44,8 +44,7 @@ def presets(context: click.Context, group: str | None, search: str | None, as_js
 
 def _listed(group: str | None, search: str | None) -> list[Preset]:
     """Presets of the toolkit and of the user, of a group and with some words."""
-    from translucent.media.own_presets import read_own_presets
-    from translucent.media.presets import grouped, matching
+    from translucent.media.presets import grouped, matching, read_own_presets
     from translucent.media.presets import presets as all_presets
 
     own, wrong = read_own_presets()

@@ -14,8 +14,7 @@ from translucent.cpu.vectors import dot
 from translucent.formulas.footprint import ALPHA_OF_DEVIATION, LEAST_BREADTH, MOST_LOOKUPS
 from translucent.reference.ray_ends import places_on_backdrop
 from translucent.reference.rays import Rays
-from translucent.scene.environment import Environment, equirectangular_uv
-from translucent.scene.environment_filter import FilteredEnvironment, filtered
+from translucent.scene.environment import Environment, FilteredEnvironment, equirectangular_uv, filtered
 from translucent.scene.environment_map import bilinear
 from translucent.scene.scene import Scene
 

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Frozen
 from translucent.errors import InputError, TranslucentWarning
-from translucent.frozen import Frozen
 from translucent.geometry.diagnosis import Diagnosis, diagnose
 from translucent.geometry.grouping import CHUNK, equal_rows, extent, use_mask
 from translucent.geometry.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, all_apart, orient, weld

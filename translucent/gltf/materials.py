@@ -48,9 +48,8 @@ from translucent.gltf.checked import Fields, Triple
 from translucent.gltf.file import GltfFile, Json, read_gltf
 from translucent.gltf.scattering import DIFFUSE_TRANSMISSION, DraftScattering, read_draft
 from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform
-from translucent.media.color_distance import BLACKEST, extinction_at
 from translucent.media.conversion import html_strip
-from translucent.media.medium import Medium
+from translucent.media.medium import BLACKEST, Medium, extinction_at
 
 TRANSMISSION = "KHR_materials_transmission"
 VOLUME = "KHR_materials_volume"

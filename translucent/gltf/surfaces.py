@@ -53,8 +53,7 @@ from translucent.gltf.images import Textures
 from translucent.gltf.left_out import LeftOut
 from translucent.gltf.materials import CLEARCOAT, DEFAULT_IOR, IRIDESCENCE, TRANSMISSION, GltfMaterial, materials_of
 from translucent.gltf.scattering import DIFFUSE_TRANSMISSION
-from translucent.media.color_distance import extinction_at
-from translucent.media.medium import MAX_IOR, Medium
+from translucent.media.medium import MAX_IOR, Medium, extinction_at
 from translucent.scene.scene import OPAQUE_COLOR
 from translucent.scene.surface import MAX_DISPERSION, MAX_FILM, Surface
 from translucent.scene.texture import Texture

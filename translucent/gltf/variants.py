@@ -5,10 +5,9 @@ A primitive without a mapping for a variant keeps its own material. Source: the 
 
 from __future__ import annotations
 
-from translucent.errors import InputError
+from translucent.errors import InputError, close_names, did_you_mean
 from translucent.gltf.fields import extension, refused
 from translucent.gltf.file import GltfFile, Json
-from translucent.suggestions import close_names, did_you_mean
 
 VARIANTS = "KHR_materials_variants"
 

@@ -23,8 +23,7 @@ from translucent.gltf.materials import DEFAULT_IOR, EXCLUDED, IOR, TRANSMISSION,
 from translucent.gltf.scattering import DIFFUSE_TRANSMISSION, DRAFTS, SCATTER, Draft, check_draft, draft_extension
 from translucent.gltf.scene_media import primitives
 from translucent.gltf.write_file import check_gltf_output, write_gltf
-from translucent.media.color_distance import color_at
-from translucent.media.medium import Medium
+from translucent.media.medium import Medium, color_at
 
 
 def volume_extensions(medium: Medium, distance: float | None, thickness: float, ior: float) -> Json:

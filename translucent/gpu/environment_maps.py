@@ -9,8 +9,7 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.compile_budget import before_making
-from translucent.scene.environment import Environment
-from translucent.scene.environment_filter import filtered
+from translucent.scene.environment import Environment, filtered
 from translucent.scene.environment_map import EnvironmentMap
 
 

@@ -13,14 +13,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from translucent.assets import shader_names
-from translucent.errors import InputError
+from translucent.errors import InputError, close_names, did_you_mean
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.dialects import Dialect, check_dialect, head_of
 from translucent.gpu.layout import BLOCKS
 from translucent.gpu.shaders import Gathered, gather
 from translucent.gpu.std140 import UniformBlock
 from translucent.gpu.vulkan_glsl import in_vulkan
-from translucent.suggestions import close_names, did_you_mean
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
 _COMMENT = re.compile(r"//.*")

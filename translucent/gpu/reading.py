@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.frames.deferred import (
+from translucent.frames.frame import (
     Deferred,
     copied,
     coverage_of,

@@ -32,8 +32,7 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.color import srgb_to_linear
-from translucent.media.color_distance import color_at, extinction_at
-from translucent.media.medium import Medium
+from translucent.media.medium import Medium, color_at, extinction_at
 from translucent.units import metres_per_unit
 
 _LINEAR = ("lin_rec709", "none", "")

@@ -14,8 +14,7 @@ from __future__ import annotations
 import math
 
 from translucent.materials.snippet import stated, stated_color, stated_length
-from translucent.media.color_distance import color_at, extinction_at
-from translucent.media.medium import Medium
+from translucent.media.medium import Medium, color_at, extinction_at
 
 #: Largest index of refraction of a MeshPhysicalMaterial.
 LARGEST_IOR = 2.333

@@ -21,8 +21,7 @@ import numpy.typing as npt
 
 from translucent.formulas.color import linear_to_srgb, srgb_to_linear
 from translucent.materials.snippet import stated, stated_color, stated_length
-from translucent.media.color_distance import color_at, extinction_at
-from translucent.media.medium import Medium
+from translucent.media.medium import Medium, color_at, extinction_at
 
 
 def from_unity(color: npt.ArrayLike, distance: float, ior: float = 1.5) -> Medium:

@@ -20,8 +20,7 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.materials.snippet import stated
-from translucent.media.color_distance import color_at
-from translucent.media.medium import Medium
+from translucent.media.medium import Medium, color_at
 
 CENTIMETERS_PER_METRE = 100.0
 #: Mean free path in cm that the text gives to a channel without extinction: 10 km.

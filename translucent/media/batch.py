@@ -14,7 +14,7 @@ from translucent.errors import InputError
 from translucent.files.paths import require_output, write_atomically
 from translucent.media.conversion import CLAMP, clamp_colors, html_strip, summary
 from translucent.media.medium import Medium
-from translucent.media.tables import Row, check_cells, read_table
+from translucent.media.preset import Row, check_cells, read_table
 from translucent.units import metres_per_unit
 
 #: Largest number of rows in a table of swatches.

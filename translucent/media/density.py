@@ -13,12 +13,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array, Frozen, Integers
 from translucent.errors import InputError
 from translucent.files.reading import open_file
 from translucent.files.unpacking import read_array
 from translucent.formulas import optics
-from translucent.frozen import Frozen
 
 #: Largest relative density: its products with extinctions and lengths of any scene stay within float32.
 MAX_DENSITY = 1e12

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 
 from translucent.errors import TranslucentError
 from translucent.formulas.color import to_hex
-from translucent.frames.display import Bundle, bundle, png
+from translucent.frames.writing import Bundle, bundle, png
 from translucent.renderer import Renderer
 from translucent.scene.scene import Object, Scene
 from translucent.units import length_text

@@ -14,9 +14,8 @@ import numpy as np
 from translucent.errors import InputError
 from translucent.extras import require_package
 from translucent.formulas.color import to_hex
-from translucent.media.color_distance import BLACKEST, extinction_at
 from translucent.media.colors import parse_color
-from translucent.media.medium import Medium
+from translucent.media.medium import BLACKEST, Medium, extinction_at
 from translucent.media.presets import preset as named_preset
 from translucent.page.variants import editable
 from translucent.scene.camera import Camera

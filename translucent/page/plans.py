@@ -17,8 +17,7 @@ from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering import Scattering
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS, ShadowMaps
-from translucent.scene.checks import check_scene
-from translucent.scene.scene import Object, Scene
+from translucent.scene.scene import Object, Scene, check_scene
 
 #: Textures that WebGL2 promises in a shader. Passes that trace rays have theirs put together, and so read as many as
 #: `UNITS_WITH_SHADOWS` in these.

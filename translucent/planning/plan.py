@@ -34,8 +34,7 @@ from translucent.planning.scattering import Scattering, SingleScattering
 from translucent.planning.scattering.choice import check_scattering, given_back, shown
 from translucent.planning.shadow_maps import ShadowMaps, check_shadows, shadow_passes, shadows_left_out
 from translucent.planning.slots import require_clear_priorities
-from translucent.scene.checks import check_scene
-from translucent.scene.scene import Scene, object_names
+from translucent.scene.scene import Scene, check_scene, object_names
 
 
 def plan(

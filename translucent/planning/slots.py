@@ -11,8 +11,7 @@ import numpy.typing as npt
 from translucent.errors import InputError
 from translucent.media.given_back import DiffusedVolume
 from translucent.media.medium import Medium
-from translucent.scene.overlaps import first_overlap
-from translucent.scene.scene import Object, Scene
+from translucent.scene.scene import Object, Scene, first_overlap
 
 #: Largest number of winding numbers that a ray keeps apart.
 MAX_SLOTS = 16

@@ -11,8 +11,7 @@ import numpy as np
 
 from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
-from translucent.media.color_distance import color_at
-from translucent.media.medium import MAX_COEFFICIENT, Medium
+from translucent.media.medium import MAX_COEFFICIENT, Medium, color_at
 from translucent.media.presets import preset
 from translucent.preview import orbiting
 from translucent.preview.document import Assigned, Document, Material, Model, Orbit, checked

@@ -8,9 +8,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 from translucent.errors import InputError
-from translucent.media.own_presets import OWN, preset_name, presets_folder, read_own_presets, save_own_preset
 from translucent.media.preset import Preset
-from translucent.media.presets import grouped, matching, presets
+from translucent.media.presets import (
+    OWN,
+    grouped,
+    matching,
+    preset_name,
+    presets,
+    presets_folder,
+    read_own_presets,
+    save_own_preset,
+)
 from translucent.preview.document import Material
 from translucent.preview.scenes import medium_of
 

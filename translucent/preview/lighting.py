@@ -13,8 +13,8 @@ from translucent.preview.document import Document
 from translucent.preview.loaded import Loaded
 from translucent.preview.staging import environment_of, prepare_stage, stage_name
 from translucent.preview.tasks import Lane, Task
+from translucent.scene.environment import filtered
 from translucent.scene.environment_files import READERS
-from translucent.scene.environment_filter import filtered
 from translucent.scene.stages import NO_STAGE
 
 #: Environments: the one that lights, and the one in the background; and the stage.

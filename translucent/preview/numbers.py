@@ -11,9 +11,8 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.formulas.color import linear_to_srgb, srgb_to_linear, to_hex
 from translucent.frames.appearance import average_color
-from translucent.media.color_distance import color_at
 from translucent.media.conversion import summary
-from translucent.media.medium import Medium
+from translucent.media.medium import Medium, color_at
 from translucent.preview.document import Material, Triple
 from translucent.preview.scenes import medium_of
 from translucent.units import metres_per_unit

@@ -14,7 +14,7 @@ from translucent.preview.document import MAX_PITCH, Orbit
 from translucent.scene.camera import MAX_COORDINATE, Camera
 from translucent.scene.scene import Object
 from translucent.scene.showcase import framing
-from translucent.scene.staging import world_vertices
+from translucent.scene.stages import world_vertices
 
 #: Factor by which an orthographic camera stands farther back, so that a model around the target is before it.
 _STEP_BACK = 4.0

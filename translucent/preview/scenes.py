@@ -10,8 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from translucent.errors import InputError
-from translucent.media.color_distance import color_at
-from translucent.media.medium import Medium
+from translucent.media.medium import Medium, color_at
 from translucent.planning.methods import Method, method_from_name
 from translucent.planning.scattering import SCATTERINGS, Scattering
 from translucent.preview.document import AUTO, FINISH, Assigned, Document, Look, Material

@@ -15,8 +15,16 @@ from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
 from translucent.scene.shadow_directions import shadow_directions
 from translucent.scene.showcase import LIGHT_TABLE, STAGED_IOR, framing, named_environment
-from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, STAGED_TONE, stage_named
-from translucent.scene.staging import ENVIRONMENT_SHADOWS, has_ground, staged, view_axes
+from translucent.scene.stages import (
+    DEFAULT_STAGE,
+    ENVIRONMENT_SHADOWS,
+    NO_STAGE,
+    STAGED_TONE,
+    has_ground,
+    stage_named,
+    staged,
+    view_axes,
+)
 from translucent.scene.turntable import on_stage
 
 
@@ -99,7 +107,7 @@ def first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
 
 def prepare_stage(name: str, environment: str, background: str) -> None:
     """Compute what takes long about a stage, and is cached."""
-    from translucent.scene.environment_filter import filtered
+    from translucent.scene.environment import filtered
 
     stage = stage_named(name)
     if stage is not None:

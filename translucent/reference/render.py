@@ -35,8 +35,7 @@ from translucent.reference.sheets import scene_crossings, sheet_hits, sheet_thic
 from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.camera import check_size
-from translucent.scene.checks import check_scene
-from translucent.scene.scene import Scene
+from translucent.scene.scene import Scene, check_scene
 
 #: Number of surfaces, times objects, that are sorted at a time: the working arrays stay below 500 MB.
 CHUNK = 1 << 24

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Frozen
 from translucent.errors import InputError
-from translucent.frozen import Frozen
 from translucent.media.colors import ColorLike
 from translucent.scene.environment import parse_radiance
 from translucent.scene.lights import MAX_RADIANCE

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
-from translucent.frozen import Frozen
 from translucent.geometry.grouping import extent
 
 #: Factor by which a picture is larger than the objects that it frames.

@@ -7,20 +7,22 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
-from translucent.frozen import Frozen
+from translucent.formulas.spherical_harmonics import COUNT, real_harmonics
 from translucent.media.colors import ColorLike, parse_color
-from translucent.scene.environment_map import EnvironmentMap
+from translucent.scene.environment_map import EnvironmentMap, row_blocks, row_solid_angles, texel_directions
 from translucent.scene.lights import positive_triple
+from translucent.scene.lobes import KEPT, convolved, irradiance_map, sized
 
 EnvironmentKind = Literal["constant", "gradient", "checkerboard", "image"]
 
@@ -231,7 +233,6 @@ class Environment(Frozen):
         Coefficient i = l (l + 1) + m, as `translucent.formulas.spherical_harmonics.real_harmonics` has them in
         directions of the world: what a bake of scattered light is read with, where the object is not turned.
         """
-        from translucent.scene.environment_harmonics import radiance_harmonics
 
         return radiance_harmonics(self.lighting, 0 if self.map is None else self.map.size[1])
 
@@ -286,3 +287,88 @@ def equirectangular_uv(direction: npt.ArrayLike, turn: npt.ArrayLike) -> Array:
 def parse_radiance(what: str, color: ColorLike) -> Array:
     """(3,): linear radiance from a color as text, or one or three numbers >= 0; errors name it `what`."""
     return positive_triple(what, parse_color(color) if isinstance(color, str) else color)
+
+
+#: Blurred pictures between roughness 0 and 1, and their rows and columns.
+LEVELS = 8
+LEVEL_SIZE = (128, 256)
+
+
+@dataclass(frozen=True, eq=False)
+class FilteredEnvironment:
+    """Prefiltered environment: blurred reflections and irradiance, before its rotation and exposure. Row 0 is straight
+    up (+Y).
+
+    Attributes
+    ----------
+    sharp : EnvironmentMap
+        As a mirror reflects it, in full resolution.
+    levels : (n, h, w, 3) float32
+        As rough surfaces reflect it around each direction: its mean over a GGX lobe.
+    roughness : (n,) float64
+        Of the levels: 1/n, 2/n, ... 1. The alpha of GGX is its square.
+    irradiance : (h, w, 3) float32
+        On a surface with each normal: the integral of radiance times cosine.
+    """
+
+    sharp: EnvironmentMap
+    levels: npt.NDArray[np.float32]
+    roughness: Array
+    irradiance: npt.NDArray[np.float32]
+
+
+def filtered(environment: Environment) -> FilteredEnvironment:
+    """Prefilter an environment for surfaces: done once for each picture, in less than a second.
+
+    The lobe is that of the split-sum approximation (Karis 2013, "Real Shading in Unreal Engine 4", section on image
+    based lighting): seen along the normal and the reflected direction at once (n = v = r), GGX half vectors h, whose
+    density is D(h) n.h / (4 v.h) = D(h) / 4 around r, weighted with n.l. It is a mean: a uniform environment stays what
+    it is, and so does the integral over all directions.
+    """
+    return _filtered(environment.light_map)
+
+
+@lru_cache(maxsize=KEPT)
+def _filtered(source: EnvironmentMap) -> FilteredEnvironment:
+    roughness = np.arange(1, LEVELS + 1) / LEVELS
+    color = source.pixels[0, 0]
+    if (source.pixels == color).all():  # which blurring leaves as it is
+        levels = np.full((LEVELS, *LEVEL_SIZE, 3), color, dtype=np.float32)
+    else:
+        pixels = sized(source, LEVEL_SIZE)
+        with np.errstate(under="ignore"):
+            blurred = [convolved(pixels, partial(ggx_lobe, alpha=alpha)) for alpha in roughness**2]
+            levels = np.stack(blurred).astype(np.float32)
+    return FilteredEnvironment(source, levels, roughness, irradiance_map(source).pixels.astype(np.float32))
+
+
+def ggx_lobe(cosine: npt.ArrayLike, alpha: float) -> Array:
+    """GGX weight of light at an angle of this cosine to the reflected direction, up to a factor: D(h) n.l, n = v = r.
+
+    The half vector has half the angle: (n.h)^2 = (1 + cos) / 2. Walter et al. 2007, eq. 33, for D.
+    """
+    c = np.asarray(cosine, dtype=np.float64)
+    falloff = 1.0 + 0.5 * (1.0 + c) * (alpha * alpha - 1.0)
+    return np.maximum(c, 0.0) / (falloff * falloff)
+
+
+#: Rows of the picture over which formulas and coarse pictures are integrated: good to 1e-4 of the light.
+LEAST_HEIGHT = 128
+
+
+def radiance_harmonics(radiance: Callable[[Array], Array], height: int) -> Array:
+    """(9, 3): integrals over all directions of a function of unit vectors (..., 3), times each of `real_harmonics`.
+
+    Parameters
+    ----------
+    radiance : callable
+    height : int
+        Rows of a picture that resolves it; sums are no coarser than that.
+    """
+    height = max(height, LEAST_HEIGHT)
+    angles, directions = row_solid_angles(height, 2 * height), texel_directions(height, 2 * height)
+    found = np.zeros((COUNT, 3))
+    for rows in row_blocks(height, 2 * height):
+        basis = real_harmonics(directions[rows]) * angles[rows, None, None]
+        found += np.einsum("yxi,yxc->ic", basis, radiance(directions[rows]))
+    return found

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array, Frozen, Integers
 from translucent.errors import InputError, TranslucentWarning
-from translucent.frozen import Frozen
 from translucent.scene.lights import MAX_RADIANCE
 
 

@@ -9,10 +9,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.formulas.lights import ALL_AROUND, cone_attenuation, light_cone
-from translucent.frozen import Frozen
 from translucent.scene.camera import MAX_COORDINATE
 
 #: Largest radiance, intensity or irradiance: its products with lengths stay within float32.

@@ -10,17 +10,24 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from translucent.errors import InputError
+from translucent.errors import InputError, close_names, did_you_mean
 from translucent.geometry.grouping import extent
 from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Light, Object, Scene
-from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, Stage, stage_named
-from translucent.scene.staging import stage_lights, staged, with_shadows, world_vertices
+from translucent.scene.stages import (
+    DEFAULT_STAGE,
+    NO_STAGE,
+    Stage,
+    stage_lights,
+    stage_named,
+    staged,
+    with_shadows,
+    world_vertices,
+)
 from translucent.scene.surface import Surface
-from translucent.suggestions import close_names, did_you_mean
 
 #: Linear color of white light in the default medium on its mean way through a closed mesh, if that is more than
 #: `DEFAULT_REACH` of the mesh's diagonal, else after that.

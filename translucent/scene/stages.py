@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import cos, radians, sin
+from typing import Any, TypeVar
 
-from translucent.errors import InputError
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array
+from translucent.errors import InputError, close_names, did_you_mean
+from translucent.geometry.grouping import used_vertices
+from translucent.geometry.mesh import Mesh
+from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
+from translucent.scene.falloff import Falloff
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.studio import dark_studio_map
 from translucent.scene.surface import Surface
-from translucent.suggestions import close_names, did_you_mean
 
 Color = tuple[float, float, float]
 
@@ -120,3 +132,197 @@ def stage_named(name: str) -> Stage | None:
         do = did_you_mean(close) if close else f"give one of {', '.join(names)}"
         raise InputError(f"stage {name!r}", "no such stage", do)
     return STAGES[name]
+
+
+#: Air between model and ground, as a share of the model's diagonal: rays tell surfaces apart that are so far apart.
+GAP = 1e-3
+
+#: How far the ground reaches, in diagonals of the model.
+REACH = 60.0
+
+#: How far from the model the ground gets darker, and how far it goes on to, in the same.
+BRIGHT, DARK = 0.8, 9.0
+
+#: Directions of the environment that throw shadows onto the ground.
+ENVIRONMENT_SHADOWS = 128
+
+#: Share of the length of shadows that the default camera makes room for.
+SHADOW_SEEN = 0.7
+
+#: Sine of the elevation of lights below which shadows have no end to make room for.
+LOWEST = 0.3
+
+#: What messages call the ground.
+GROUND_NAME = "ground"
+
+AnyScene = TypeVar("AnyScene", bound=Scene)
+
+
+def staged(
+    scene: AnyScene,
+    stage: str | Stage = DEFAULT_STAGE,
+    environment: Environment | None = None,
+    turn: float = 0.0,
+) -> AnyScene:
+    """Scene on a stage: its objects on a ground, lit as its camera sees them; +Y is up.
+
+    The ground comes after the objects. It is a little below their lowest point, and is seen from above only.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its lights, if it has any, shine in place of the stage's.
+    stage : str or Stage
+        A stage, or its name; ``none`` gives the scene itself.
+    environment : Environment, optional
+        In place of the stage's, whose lights stay out, too.
+    turn : float
+        Of the stage with its lights and its environment about +Y, in degrees, counterclockwise as seen from above.
+
+    Raises
+    ------
+    InputError
+        If there is no such stage, or the scene stands on one.
+    """
+    chosen = stage_named(stage) if isinstance(stage, str) else stage
+    if chosen is None:
+        return scene
+    if len(scene.shown) < len(scene.objects):
+        do = 'make it without one, as by tl.showcase(mesh, medium, stage="none")'
+        raise InputError("a stage for a scene", "it has a ground that catches shadows", do)
+    axes = view_axes(scene.camera) @ _about_y(turn).T
+    ground = Object(ground_mesh(scene, axes), surface=_finish(chosen), shadow_catcher=True)
+    lights = scene.lights or (() if environment else tuple(_light(key, axes) for key in chosen.keys))
+    azimuth = float(np.degrees(np.arctan2(axes[2, 0], -axes[2, 2])))
+    made = environment or dataclasses.replace(chosen.environment(), rotation=-azimuth)
+    return dataclasses.replace(
+        scene,
+        objects=(*scene.objects, ground),
+        lights=lights,
+        environment=made,
+        environment_shadows=scene.environment_shadows or ENVIRONMENT_SHADOWS,
+    )
+
+
+def view_axes(camera: Camera) -> Array:
+    """(3, 3): unit rows to the right, up (+Y), and ahead of a camera, the first and the last of them level."""
+    ahead = camera.forward * (1.0, 0.0, 1.0)
+    if np.linalg.norm(ahead) < 1e-3:  # straight up or down: what is ahead is where the picture's top or bottom is
+        ahead = -np.sign(camera.forward[1]) * camera.up * (1.0, 0.0, 1.0)
+    ahead /= np.linalg.norm(ahead)
+    return np.stack([np.cross(ahead, (0.0, 1.0, 0.0)), (0.0, 1.0, 0.0), ahead])
+
+
+def _about_y(degrees: float) -> Array:
+    """(3, 3): turn about +Y, counterclockwise as seen from above."""
+    if not np.isfinite(degrees):
+        raise InputError(f"stage turned by {degrees}", "not finite", "give degrees")
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+
+
+def stage_lights(stage: Stage) -> list[DirectionalLight]:
+    """Lights of a stage as the default camera sees it."""
+    ahead = np.array(stage.view) * (1.0, 0.0, 1.0)
+    ahead /= np.linalg.norm(ahead)
+    axes = np.stack([np.cross(ahead, (0.0, 1.0, 0.0)), (0.0, 1.0, 0.0), ahead])
+    return [_light(key, axes) for key in stage.keys]
+
+
+def with_shadows(points: Array, lights: Sequence[Light]) -> Array:
+    """(n, 3): points, and places on the ground below them most of the way to where lights throw their shadows."""
+    height = points[:, 1:2] - points[:, 1].min()
+    feet = points - height * (0.0, 1.0, 0.0)
+    ways = [np.asarray(light.direction) for light in lights if isinstance(light, DirectionalLight)]
+    shadows = [feet - SHADOW_SEEN * height * way * (1.0, 0.0, 1.0) / way[1] for way in ways if way[1] < -LOWEST]
+    return np.concatenate([points, *shadows])
+
+
+def _finish(stage: Stage) -> Surface:
+    """Finish of the ground: its paint is darker far away, as if the lights stood near the model."""
+    if stage.far == 1.0:
+        return dataclasses.replace(stage.ground, double_sided=False)
+    return dataclasses.replace(stage.ground, double_sided=False, color_texture=_falloff(stage.far))
+
+
+@lru_cache(maxsize=8)
+def _falloff(far: float) -> Falloff:
+    """Share of the paint over the texture coordinates of `ground_mesh`: 1 in the middle, `far` at the edges."""
+    return Falloff.around(0.5 * BRIGHT / DARK, far)
+
+
+def _light(key: KeyLight, axes: Array) -> DirectionalLight:
+    azimuth, elevation = np.radians(key.azimuth), np.radians(key.elevation)
+    towards = np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)
+    return DirectionalLight(-np.asarray(towards) @ axes, key.irradiance)
+
+
+def ground_mesh(scene: Scene, axes: Array) -> Mesh:
+    """Square below the objects of a scene: two faces, as a ground that is known to shadow nothing costs no map."""
+    points = np.concatenate([world_vertices(item) for item in scene.objects])
+    low, high = points.min(axis=0), points.max(axis=0)
+    unit = float(np.linalg.norm(high - low)) or 1.0
+    foot = np.array([0.5 * (low[0] + high[0]), low[1] - GAP * unit, 0.5 * (low[2] + high[2])])
+    corners = REACH * unit * np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)]) @ axes
+    uv = 0.5 + 0.5 * REACH / DARK * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    return Mesh(foot + corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32), uv, GROUND_NAME)
+
+
+def world_vertices(item: Object) -> Array:
+    """(n, 3): vertices of an object in the world, without those that no face uses."""
+    return np.asarray(item.mesh.vertices[used_vertices(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3])
+
+
+def upright(scene: AnyScene, up: npt.ArrayLike) -> AnyScene:
+    """Scene turned, with its camera and lights, the shortest way in which `up` (3,) becomes +Y, as stages need it."""
+    turn = np.eye(4)
+    turn[:3, :3] = upright_turn(up)
+    if (turn == np.eye(4)).all():
+        return scene
+    return dataclasses.replace(
+        scene,
+        objects=[dataclasses.replace(item, transform=turn @ item.matrix) for item in scene.objects],
+        camera=dataclasses.replace(scene.camera, pose=turn @ scene.camera.pose),
+        lights=[moved(light, turn) for light in scene.lights],
+    )
+
+
+def upright_turn(up: npt.ArrayLike) -> Array:
+    """(3, 3): the smallest turn that makes a direction +Y."""
+    axis = np.asarray(up, dtype=np.float64)
+    if not (length := float(np.linalg.norm(axis))) > 0:
+        raise InputError(f"up {tuple(axis.tolist())}", "it is no direction", "give for example 0,0,1")
+    axis = axis / length
+    if axis[1] < -1.0 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    # Rodrigues' formula for the turn about their cross product (Möller & Hughes 1999).
+    cross = np.array([[0.0, -axis[0], 0.0], [axis[0], 0.0, axis[2]], [0.0, -axis[2], 0.0]])
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + axis[1]))
+
+
+def moved(light: Light, matrix: Array) -> Light:
+    """Light moved by a rigid matrix (4, 4)."""
+    changes: dict[str, Any] = {}
+    if not isinstance(light, PointLight):
+        changes["direction"] = matrix[:3, :3] @ np.asarray(light.direction)
+    if not isinstance(light, DirectionalLight):
+        changes["position"] = matrix[:3, :3] @ np.asarray(light.position) + matrix[:3, 3]
+    return dataclasses.replace(light, **changes)
+
+
+def has_ground(scene: Scene) -> bool:
+    """True if an opaque object is a ground, or a room, for all that light enters: below it, and as wide and deep."""
+    if not scene.bodies or not scene.opaque:
+        return False
+    boxes = np.stack([body.bounds for body in scene.bodies])
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    margin = GAP * float(np.linalg.norm(high - low))
+    level = [0, 2]
+    return any(
+        bool(
+            (item.bounds[0][level] <= low[level] + margin).all()
+            and (item.bounds[1][level] >= high[level] - margin).all()
+        )
+        and bool(item.bounds[0][1] <= low[1] + margin)
+        for item in scene.opaque
+    )

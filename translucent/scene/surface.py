@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
-from translucent.frozen import Frozen
 from translucent.media.colors import ColorLike, parse_color
 from translucent.media.medium import MAX_IOR
 from translucent.scene.lights import MAX_RADIANCE

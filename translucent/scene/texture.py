@@ -8,8 +8,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Frozen
 from translucent.errors import InputError
-from translucent.frozen import Frozen
 
 Wrap = Literal["repeat", "clamp"]
 

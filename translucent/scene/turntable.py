@@ -12,7 +12,7 @@ from translucent.errors import InputError
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
-from translucent.scene.staging import moved, with_shadows
+from translucent.scene.stages import moved, with_shadows
 
 #: Slices of a model, and points around each, that enclose it as it turns.
 CUTS, POINTS_AROUND = 32, 48

@@ -12,7 +12,7 @@ from translucent.bake.audit.finding import MaterialFinding, Severity
 from translucent.gltf.file import Json
 from translucent.gltf.materials import EXCLUDED, TRANSMISSION, VOLUME, GltfMaterial
 from translucent.gltf.scattering import DRAFTS
-from translucent.media.color_distance import BLACKEST
+from translucent.media.medium import BLACKEST
 
 #: Largest index of refraction of what is clear: rutile and moissanite have 2.6 to 2.9.
 LARGEST_IOR = 3.0

@@ -14,8 +14,7 @@ from translucent.arrays import Array
 from translucent.bake.audit.body import Body
 from translucent.bake.audit.finding import MaterialFinding, Severity
 from translucent.formulas.color import to_hex
-from translucent.media.color_distance import extinction_at
-from translucent.media.medium import Medium
+from translucent.media.medium import Medium, extinction_at
 from translucent.units import length_text
 
 #: Ratios of stated to true thickness beyond which it is told, and beyond which it is an error.

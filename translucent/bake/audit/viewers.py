@@ -20,8 +20,7 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.bake.audit.body import Body
 from translucent.bake.audit.thickness_rules import extinction_of
-from translucent.media.color_distance import BLACKEST
-from translucent.media.medium import Medium
+from translucent.media.medium import BLACKEST, Medium
 
 #: Names of viewers, in the order in which they are told.
 VIEWERS = ("three.js", "Khronos sample viewer", "Filament", "Blender (Cycles)")

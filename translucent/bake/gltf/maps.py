@@ -34,8 +34,7 @@ from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.materials import EXCLUDED, TRANSMISSION, VOLUME
 from translucent.gltf.textures import TEXTURE_TRANSFORM
 from translucent.gltf.write_file import write_gltf
-from translucent.media.color_distance import color_at
-from translucent.media.medium import Medium
+from translucent.media.medium import Medium, color_at
 
 #: Largest level of an 8-bit channel.
 LEVELS = 255

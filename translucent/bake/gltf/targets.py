@@ -28,8 +28,7 @@ from translucent.gltf.accessors import COMPONENTS, Accessors
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.materials import GltfMaterial, materials_of
 from translucent.gltf.textures import TextureTransform
-from translucent.media.color_distance import extinction_at
-from translucent.media.medium import Medium
+from translucent.media.medium import Medium, extinction_at
 
 _COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
