@@ -10,7 +10,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -164,8 +163,7 @@ with tl.Renderer() as renderer, tl.Renderer() as other:
 @pytest.mark.parametrize("within", ["make_attribute", "make_uniform", "make_uniform_block"])
 def test_ctrl_c_while_a_program_is_made_is_no_crash(within: str) -> None:
     """moderngl goes on with a null pointer where a function that it calls raises."""
-    environment = {**os.environ, "PYTHONPATH": str(Path(tl.__file__).parents[1])}
-    done = subprocess.run([sys.executable, "-c", STRUCK, within], env=environment, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", STRUCK, within], capture_output=True, text=True, check=False)
     assert done.returncode == 5, done.stderr
 
 

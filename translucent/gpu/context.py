@@ -18,6 +18,7 @@ from typing import Any, Literal, get_args
 import moderngl
 
 from translucent.errors import InputError, RenderError
+from translucent.gpu.drivers import avoid_full_cache
 from translucent.gpu.osmesa import OSMesaContext
 from translucent.gpu.signals import DeferredSignals
 
@@ -195,6 +196,7 @@ def open_context(backend: str | None = None) -> GpuContext:
     if backend is not None and backend not in get_args(Backend):
         raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(get_args(Backend))}")
     _note_process()
+    avoid_full_cache()
     attempts: list[Attempt] = []
     for name in (backend,) if backend else ("egl", "osmesa"):
         try:

@@ -85,9 +85,12 @@ def run(
     require_display()
     from imgui_bundle import hello_imgui
 
+    from translucent.gpu.drivers import avoid_full_cache
+
     window = _Window(document, script, allow_outside)
     params = window.params(size, scale)
     with _told_as_messages(window.work):
+        avoid_full_cache()
         try:
             hello_imgui.run(params)
         except RuntimeError as error:
