@@ -13,15 +13,15 @@ from PIL import Image
 from preview_hand import Artist, Waiting, require
 
 import translucent as tl
-from translucent.preview.orbiting import camera_of
+from translucent.preview.document import camera_of
 from translucent.preview.panels.viewport import on_screen, probe_lines
-from translucent.preview.picturing import ball_key, model_key, panorama_key
+from translucent.preview.thumbnails import ball_key, model_key, panorama_key
 
 
 def open_model(a: Artist, name: str) -> Waiting:
     yield from a.hand.key("ctrl+o")
     yield from a.answer(a.folder / name)
-    yield from a.until(lambda: Path(a.document.model.path).name == name and a.desk.drawn, f"{name} is on show")
+    yield from a.until(lambda: Path(a.document.model.path).name == name and a.state.drawn, f"{name} is on show")
 
 
 def open_file(a: Artist) -> Waiting:
@@ -40,7 +40,7 @@ def frame(a: Artist) -> Waiting:
     view = a.at("##viewport")
     assert a.document.orbit is not None
     size = view.high[0] - view.low[0], view.high[1] - view.low[1]
-    box = on_screen(camera_of(a.document.orbit), a.desk.objects[0].bounds, size)
+    box = on_screen(camera_of(a.document.orbit), a.state.objects[0].bounds, size)
     assert box is not None
     spans = (box.max(axis=0) - box.min(axis=0)) / size
     require(0.6 < spans.max() <= 1.1, f"the model fills the view, not {spans.max():.0%} of it")
@@ -51,7 +51,7 @@ def preset_by_picture(a: Artist) -> Waiting:
     yield from a.click("##search")
     yield from a.enter("jade")
     key = ball_key(tl.preset("jade"))
-    yield from a.until(lambda: key in a.desk._textures, "there is a picture of jade")
+    yield from a.until(lambda: key in a.state._textures, "there is a picture of jade")
     yield from a.click("##jade")
     yield from a.until(lambda: a.document.material.preset == "jade", "the model is of jade")
 
@@ -59,7 +59,7 @@ def preset_by_picture(a: Artist) -> Waiting:
 def drag_color(a: Artist) -> Waiting:
     yield from a.panel("Material")
     before = a.document.material.color
-    steps = len(a.desk.work.history.past)
+    steps = len(a.state.work.history.past)
     yield from a.click("##color", "Material", end=True)
     stack = imgui.internal.find_window_by_name("Material").ctx.open_popup_stack
     require(len(stack), "the picker opens")
@@ -72,7 +72,7 @@ def drag_color(a: Artist) -> Waiting:
     yield from a.drag(*way)
     require(a.document.material.color != before, "the color follows the mouse")
     require(a.document.material.source == "color", "the medium is of that color")
-    require(len(a.desk.work.history.past) == steps + 1, "a drag is one step")
+    require(len(a.state.work.history.past) == steps + 1, "a drag is one step")
     yield from a.hand.key("escape")
 
 
@@ -88,8 +88,8 @@ def distance(a: Artist) -> Waiting:
 def compare(a: Artist) -> Waiting:
     yield from a.panel("Method")
     yield from a.choose("##display.compare", "method")
-    yield from a.until(lambda: a.desk.stage.plans[1] is not None, "the other method is drawn")
-    require(isinstance(a.desk.stage.plans[1].method, tl.ThinLayer), "it is the thin layer")  # type: ignore[union-attr]
+    yield from a.until(lambda: a.state.view.plans[1] is not None, "the other method is drawn")
+    require(isinstance(a.state.view.plans[1].method, tl.ThinLayer), "it is the thin layer")  # type: ignore[union-attr]
     yield from a.drag(a.in_view(0.5, 0.8), a.in_view(0.35, 0.8))
     yield from a.until(lambda: abs(a.document.display.split - 0.35) < 0.03, "the split follows the mouse")
 
@@ -98,7 +98,7 @@ def probe(a: Artist) -> Waiting:
     yield from a.hand.move(a.in_view(0.25, 0.55))
 
     def told() -> bool:
-        lines = probe_lines(a.desk, a.desk.hovered) if a.desk.hovered else []
+        lines = probe_lines(a.state, a.state.hovered) if a.state.hovered else []
         return any("thickness" in line for line in lines) and any("reference" in line for line in lines)
 
     yield from a.until(told, "the probe tells thickness and the reference")
@@ -108,10 +108,10 @@ def read_reference(a: Artist) -> Waiting:
     yield from a.choose("##display.compare", "off")
     yield from a.click("##display.inset")
     yield from a.until(lambda: a.document.display.inset, "the inset is asked for")
-    measured = a.desk.work
+    measured = a.state.work
     yield from a.until(lambda: measured.measured is not None and measured.measured.errors, "it is measured")
     require(measured.measured.errors[0].median < 1e-5, "the median error of thickness")  # type: ignore[union-attr]
-    yield from a.until(lambda: a.desk._inset is not None, "the inset is on show")
+    yield from a.until(lambda: a.state._inset is not None, "the inset is on show")
 
 
 def bake(a: Artist) -> Waiting:
@@ -119,13 +119,13 @@ def bake(a: Artist) -> Waiting:
     yield from a.choose("##bakesize", "256")
     yield from a.choose("##bakerays", "16")
     yield from a.click("Bake", "Files")
-    yield from a.until(lambda: a.desk.work.bake is not None, "there is a map")
+    yield from a.until(lambda: a.state.work.bake is not None, "there is a map")
     path = a.folder / "thickness.exr"
     yield from a.click("Save map ...")
     yield from a.answer(path)
     yield from a.written(path)
     yield from a.click("show on the model")
-    yield from a.until(lambda: a.desk.work.shown_bake is None, "the medium is on show again")
+    yield from a.until(lambda: a.state.work.shown_bake is None, "the medium is on show again")
 
 
 def save_png(a: Artist) -> Waiting:
@@ -141,7 +141,7 @@ def save_png(a: Artist) -> Waiting:
 
 def save_turntable(a: Artist) -> Waiting:
     yield from a.panel("Files")
-    a.desk.export["pictures"] = 6  # no knob asks for so few
+    a.state.export["pictures"] = 6  # no knob asks for so few
     yield from a.click("Turntable ...")
     path = a.folder / "turntable.gif"
     yield from a.answer(path)
@@ -158,11 +158,11 @@ def undo_ten(a: Artist) -> Waiting:
         yield from a.hand.hold("ctrl", down=False)
         yield from a.enter(f"{tenths / 20:g}")
         yield from a.until(lambda x=tenths / 20: math.isclose(a.document.material.roughness, x, rel_tol=1e-6), "typed")
-    before = len(a.desk.work.history.past)
+    before = len(a.state.work.history.past)
     require(before >= 10, f"{before} steps to undo")
     for _ in range(10):
         yield from a.hand.key("ctrl+z")
-    work = a.desk.work
+    work = a.state.work
     yield from a.until(lambda: len(work.history.past) <= before - 10, "ten steps are undone")
     require(len(work.history.past) == before - 10, "no more than ten steps are undone")
     require(a.document.material.roughness == first, "roughness is as it was")
@@ -170,14 +170,14 @@ def undo_ten(a: Artist) -> Waiting:
 
 def open_second(a: Artist) -> Waiting:
     yield from open_model(a, "two.glb")
-    require(len(a.desk.objects) == 2, "there are two objects")
+    require(len(a.state.objects) == 2, "there are two objects")
 
 
 def assign_two(a: Artist) -> Waiting:
     yield from a.panel("Scene")
-    name = a.desk.name_of(0)
+    name = a.state.name_of(0)
     yield from a.click(f"{name}##name")
-    yield from a.until(lambda: a.desk.selected == 0, f"{name} is selected")
+    yield from a.until(lambda: a.state.selected == 0, f"{name} is selected")
     yield from a.panel("Library")
     yield from a.click("##search")
     yield from a.enter("wax")
@@ -193,10 +193,10 @@ def assign_two(a: Artist) -> Waiting:
 
 def hide_and_show(a: Artist) -> Waiting:
     yield from a.panel("Scene")
-    yield from a.click(f"{a.desk.name_of(1)}##name")
+    yield from a.click(f"{a.state.name_of(1)}##name")
     yield from a.click("Isolate", "Scene")
     yield from a.until(lambda: a.document.hidden == (0,), "the other is hidden")
-    yield from a.until(lambda: a.desk.drawn, "it is drawn")
+    yield from a.until(lambda: a.state.drawn, "it is drawn")
     yield from a.click("Show all")
     yield from a.until(lambda: a.document.hidden == (), "both are on show")
 
@@ -229,21 +229,21 @@ def many_environments(a: Artist) -> Waiting:
     yield from a.panel("Environments")
     yield from a.click("##folder", "Environments")
     yield from a.enter(str(folder))
-    yield from a.until(lambda: len(a.desk.environments.files()) == len(names), "all are listed")
+    yield from a.until(lambda: len(a.state.environments.files()) == len(names), "all are listed")
 
     def seen() -> list[str]:
-        found = {path: a.places.find(f"##card{path}") for path in a.desk.environments.files()}
+        found = {path: a.places.find(f"##card{path}") for path in a.state.environments.files()}
         return [path for path, place in found.items() if place]
 
     def pictured() -> bool:
-        return bool(shown := seen()) and all(panorama_key(path) in a.desk._textures for path in shown)
+        return bool(shown := seen()) and all(panorama_key(path) in a.state._textures for path in shown)
 
     yield from a.hand.move(a.at("##card", "Environments").middle)
     for _ in range(20):
         yield from a.hand.wheel(-10)
     yield from a.until(lambda: seen() and names[50] < Path(seen()[0]).name, "the wheel scrolls")
     yield from a.until(pictured, "those in view have pictures")
-    require(len(a.desk._textures) < len(names), "no others were made")
+    require(len(a.state._textures) < len(names), "no others were made")
 
 
 def load_hdr(a: Artist) -> Waiting:
@@ -253,18 +253,18 @@ def load_hdr(a: Artist) -> Waiting:
     yield from a.until(lambda: a.document.look.environment.endswith("sky.hdr"), "it lights the model")
 
     def lit() -> bool:
-        scene = a.desk.work.scene()
-        return scene is not None and scene.environment.kind == "image" and a.desk.stage.viewport.steps(0) > 0
+        scene = a.state.work.scene()
+        return scene is not None and scene.environment.kind == "image" and a.state.view.viewport.steps(0) > 0
 
     yield from a.until(lit, "it is in the picture")
-    require(a.desk.work.failure is None, f"nothing failed: {a.desk.work.failure}")
+    require(a.state.work.failure is None, f"nothing failed: {a.state.work.failure}")
 
 
 def find_key(a: Artist) -> Waiting:
     yield from a.hand.key("f1")
     yield from a.until(lambda: imgui.is_popup_open("", imgui.PopupFlags_.any_popup), "the page opens")
     yield from a.hand.key("escape")
-    yield from a.until(lambda: not a.desk.keys_shown, "Escape closes it")
+    yield from a.until(lambda: not a.state.keys_shown, "Escape closes it")
 
 
 def copy_blender(a: Artist) -> Waiting:
@@ -281,14 +281,14 @@ def leave(a: Artist) -> Waiting:
 def find_again(a: Artist) -> Waiting:
     yield from a.click("File")
     yield from a.click("Recent")
-    recent = a.desk.work.recent
+    recent = a.state.work.recent
     require([Path(path).name for path in recent[:2]] == ["two.glb", "bear.ply"], f"recent files are {recent}")
-    yield from a.until(lambda: model_key(recent[0]) in a.desk._textures, "they have pictures")
+    yield from a.until(lambda: model_key(recent[0]) in a.state._textures, "they have pictures")
     path = Path(recent[0])
     label = next(text for _, text in a.places.known if text.startswith(f"{path.name}\n"))
     yield from a.click(label)
-    yield from a.until(lambda: a.document.model.path == recent[0] and a.desk.drawn, "it is on show")
-    require(a.desk.environments.path == str(a.folder), "the folder of environments is known")
+    yield from a.until(lambda: a.document.model.path == recent[0] and a.state.drawn, "it is on show")
+    require(a.state.environments.path == str(a.folder), "the folder of environments is known")
 
 
 #: Tasks by name, in their order; the last is of a second window.

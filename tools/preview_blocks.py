@@ -13,9 +13,9 @@ import time
 from dataclasses import dataclass, field
 
 from translucent.preview import app
-from translucent.preview.desk import Desk
 from translucent.preview.document import Document, Model
 from translucent.preview.script import Script, Step, perform, read_step
+from translucent.preview.window_state import WindowState
 
 #: Seconds after which the user does the next thing, whatever is under way.
 PATIENCE = 8.0
@@ -63,23 +63,23 @@ class Longest(Script):
 
     told: list[tuple[str, float, float, float]] = field(default_factory=list)
 
-    def step(self, desk: Desk) -> bool:
+    def step(self, state: WindowState) -> bool:
         now = time.perf_counter()
         if self.told and hasattr(self, "last"):
             label, longest, drawing, _ = self.told[-1]
             frame = now - self.last
             if frame > longest:
-                longest, drawing = frame, desk.stage.drawing
+                longest, drawing = frame, state.view.drawing
             self.told[-1] = label, longest, drawing, now - self.began
         self.last = now
-        loading = desk.work.loaded is None or desk.work.lanes["load"].task is not None
-        if not self.told and (loading or desk.more):
+        loading = state.work.loaded is None or state.work.lanes["load"].task is not None
+        if not self.told and (loading or state.more):
             return False
         if self.told:
             label, longest, drawing, spent = self.told[-1]
-            if spent < 0.4 or loading or (desk.more and spent < PATIENCE):
+            if spent < 0.4 or loading or (state.more and spent < PATIENCE):
                 return False
-            rest = "not at rest" if desk.more else "at rest"
+            rest = "not at rest" if state.more else "at rest"
             print(f"{label:52} {1e3 * longest:7.0f} ms, {1e3 * drawing:7.0f} of drawing; {rest} after {spent:6.1f} s")
             sys.stdout.flush()
         if not self.steps:
@@ -88,7 +88,7 @@ class Longest(Script):
         self.began: float = time.perf_counter()
         self.last: float = self.began
         self.told.append((" ".join(map(str, (step.do, *step.values.values()))), 0.0, 0.0, 0.0))
-        perform(desk, step)
+        perform(state, step)
         return False
 
 

@@ -19,10 +19,9 @@ from typing import Any
 from imgui_bundle import imgui
 
 from translucent.preview import app
-from translucent.preview.desk import Desk
-from translucent.preview.document import Document
-from translucent.preview.orbiting import camera_of
+from translucent.preview.document import Document, camera_of
 from translucent.preview.panels.viewport import on_screen
+from translucent.preview.window_state import WindowState
 
 #: Waiting for something to happen: one frame after the other, until the iterator ends.
 Waiting = Iterator[None]
@@ -187,20 +186,20 @@ def frames(count: int = FRAMES) -> Waiting:
 class Artist:
     """A user's hand and eye in the window."""
 
-    desk: Desk
+    state: WindowState
     places: Places
     hand: Hand
     folder: Path
 
     @property
     def document(self) -> Document:
-        return self.desk.work.document
+        return self.state.work.document
 
     @property
     def resting(self) -> bool:
         """True while nothing is under way in the window."""
-        work = self.desk.work
-        return not (self.desk.more or work.shelf.busy or any(lane.task for lane in work.lanes.values()))
+        work = self.state.work
+        return not (self.state.more or work.shelf.busy or any(lane.task for lane in work.lanes.values()))
 
     def until(self, there: Callable[[], object], what: str) -> Waiting:
         """Wait until something is there, as long as anything is under way that could bring it about."""
@@ -208,7 +207,7 @@ class Artist:
         while not there():
             rested = rested + 1 if self.resting else 0
             if rested > RESTING or time.monotonic() - begun > PATIENCE:
-                told = [one.text for one in self.desk.work.messages if one.kind != "info"][-1:]
+                told = [one.text for one in self.state.work.messages if one.kind != "info"][-1:]
                 raise FailedError(f"{what}: not after {time.monotonic() - begun:.0f} s {told}")
             yield
 
@@ -277,7 +276,7 @@ class Artist:
         yield from self.until(lambda: self.places.find("##name", "##browser"), "the browser is open")
         yield from self.click("##name", "##browser")
         yield from self.enter(str(path))
-        yield from self.until(lambda: self.desk.browser is None, "the browser closes")
+        yield from self.until(lambda: self.state.browser is None, "the browser closes")
 
     def in_view(self, x: float, y: float) -> tuple[float, float]:
         """Place in the window of a place in the viewport, in shares of its sides."""
@@ -289,7 +288,7 @@ class Artist:
         view = self.at("##viewport")
         size = view.high[0] - view.low[0], view.high[1] - view.low[1]
         assert self.document.orbit is not None
-        found = on_screen(camera_of(self.document.orbit), self.desk.objects[number].bounds, size)
+        found = on_screen(camera_of(self.document.orbit), self.state.objects[number].bounds, size)
         assert found is not None
         x, y = found.mean(axis=0)
         return view.low[0] + float(x), view.low[1] + float(y)

@@ -126,9 +126,9 @@ def show(path: Path, stage: str, inset: bool, patience: float) -> None:
     """Open the window, tell what is reached, and close it."""
     from translucent.preview import app
     from translucent.preview.actions import Turn
-    from translucent.preview.desk import Desk
     from translucent.preview.document import Display, Document, Look, Model
     from translucent.preview.script import PAUSE, Script
+    from translucent.preview.window_state import WindowState
 
     begun = float(os.environ[BEGUN])
 
@@ -137,21 +137,21 @@ def show(path: Path, stage: str, inset: bool, patience: float) -> None:
         last = since = busy = begun
         longest = 0.0
 
-        def step(self, desk: Desk) -> bool:
+        def step(self, state: WindowState) -> bool:
             now = time.time()
-            if desk.more:
+            if state.more:
                 self.busy = now
-            if desk.waits:
+            if state.waits:
                 time.sleep(PAUSE)  # as a window without a script, which leaves other processes the time
             self.longest, self.last = max(self.longest, now - self.last), now
             if self.reached < 0:
-                if desk.stage.timings[0].wall:
+                if state.view.timings[0].wall:
                     self.reach("first picture", now)
                 return False
             if now - self.busy < REST and now - self.since < patience:
                 return False
             self.reach(("at rest", "turned, at rest")[self.reached], now)
-            desk.work.do(Turn(30.0, 5.0))
+            state.work.do(Turn(30.0, 5.0))
             return self.reached == 2
 
         def reach(self, state: str, now: float) -> None:

@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 from translucent.media.presets import presets
-from translucent.preview.actions import Change, ChoosePreset, Pan, SetOrbit, Turn, Zoom
+from translucent.preview.actions import ChoosePreset, Pan, SetField, SetOrbit, Turn, Zoom
 from translucent.preview.document import RANGES, Document, Model, Orbit
 from translucent.preview.scenes import method_of
-from translucent.preview.stage import Stage
+from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 
 #: Small meshes of the toolkit, closed and open ones.
@@ -69,7 +69,7 @@ class Monkey:
     def __init__(self, seed: int, folder: Path) -> None:
         self.random = random.Random(seed)
         self.work, self.size = Workspace(Document(Model("knot"))), (160, 96)
-        self.stage = Stage(compiler=self.work.compiler)
+        self.stage = ViewportRenderer(compiler=self.work.compiler)
         self.folder, self.bad = folder, bad_files(folder)
         self.refused = 0
         self.verbs = [self.change] * 8 + [self.bad_change, self.move, self.move, self.move, self.preset, self.resize]
@@ -123,12 +123,12 @@ class Monkey:
         if (section, key) in (("material", "preset"), ("material", "source")):
             return
         name = f"{section}.{key}"
-        self.work.do(Change(name, self.value(name, getattr(owner, key)), self.random.choice((None, 1, 2))))
+        self.work.do(SetField(name, self.value(name, getattr(owner, key)), self.random.choice((None, 1, 2))))
 
     def bad_change(self) -> None:
         before = self.work.document
         name = self.random.choice([*RANGES, "material.nothing", "nothing.at.all", "model.path"])
-        self.work.do(Change(name, self.random.choice((float("nan"), -1e300, 1e300, "?", None, [1, 2], {}))))
+        self.work.do(SetField(name, self.random.choice((float("nan"), -1e300, 1e300, "?", None, [1, 2], {}))))
         self.refused += 1
         if self.work.document != before:
             raise AssertionError(f"{name} was refused, and the document changed")

@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from translucent.preview import app, stage
-from translucent.preview.actions import Change, Turn
-from translucent.preview.desk import Desk
+from translucent.preview import app, viewport_renderer
+from translucent.preview.actions import SetField, Turn
 from translucent.preview.document import Document, Look, Model
 from translucent.preview.script import Script
+from translucent.preview.window_state import WindowState
 from translucent.scene.turntable import on_stage
 
 VIEWPORT = (1280, 720)
@@ -31,28 +31,28 @@ class Orbit(Script):
 
     seconds = 8.0
 
-    def step(self, desk: Desk) -> bool:
+    def step(self, state: WindowState) -> bool:
         self.frames: list[float]
-        if desk.work.loaded is None or desk.work.scene() is None:
+        if state.work.loaded is None or state.work.scene() is None:
             return False
-        if desk.get("look.stage") != "none" and not on_stage(desk.work.scene()):
+        if state.get("look.stage") != "none" and not on_stage(state.work.scene()):
             return False
         if not hasattr(self, "started"):
             self.started, self.frames, self.inside, self.sizes = time.perf_counter(), [], [], set()
-            desk.work.do(Change("display.inset", False))
-        if desk.work.compiler.lane.task is not None:  # the last picture stays
+            state.work.do(SetField("display.inset", False))
+        if state.work.compiler.lane.task is not None:  # the last picture stays
             self.started, self.frames, self.inside = time.perf_counter(), [], []
         self.frames.append(time.perf_counter())
-        self.inside.append(desk.stage.drawing)
-        self.sizes.add(desk.stage.viewport.size)
-        desk.work.do(Turn(2.0, 0.0))
+        self.inside.append(state.view.drawing)
+        self.sizes.add(state.view.viewport.size)
+        state.work.do(Turn(2.0, 0.0))
         return time.perf_counter() - self.started > self.seconds
 
 
 def main() -> int:
     """Measure and print."""
     if "--adaptive" not in sys.argv:
-        stage.FACTORS = (1.0,)  # no coarser picture while it moves
+        viewport_renderer.FACTORS = (1.0,)  # no coarser picture while it moves
     ball = trimesh.creation.icosphere(subdivisions=6, radius=0.05)
     ball.vertices *= 1.0 + 0.15 * np.sin(40.0 * ball.vertices)
     orbit = Orbit([])

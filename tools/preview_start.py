@@ -19,18 +19,18 @@ BEGUN = "TRANSLUCENT_BEGUN"
 def show(model: str) -> None:
     """Open the window, tell when it was there and when its picture was, and close it."""
     from translucent.preview import app
-    from translucent.preview.desk import Desk
     from translucent.preview.document import Document, Model
     from translucent.preview.script import Script
+    from translucent.preview.window_state import WindowState
 
     begun = float(os.environ[BEGUN])
 
     class First(Script):
         window = 0.0
 
-        def step(self, desk: Desk) -> bool:
+        def step(self, state: WindowState) -> bool:
             self.window = self.window or time.time() - begun
-            if desk.stage.timings[0].wall == 0.0:
+            if state.view.timings[0].wall == 0.0:
                 return False
             print(f"window after {self.window:.2f} s, picture after {time.time() - begun:.2f} s", end=", ")
             print(f"{time.process_time():.2f} s of all cores", flush=True)

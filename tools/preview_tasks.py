@@ -30,10 +30,10 @@ from preview_hand import Artist, FailedError, Hand, Places, Waiting
 
 from translucent.assets import mesh_path
 from translucent.preview import app
-from translucent.preview import desk as desks
-from translucent.preview.desk import Desk
+from translucent.preview import window_state as states
 from translucent.preview.document import Document, Model
 from translucent.preview.script import PAUSE, Script
+from translucent.preview.window_state import WindowState
 
 
 @dataclass(frozen=True, order=True)
@@ -70,26 +70,26 @@ class Tasks(Script):
     _artist: Artist | None = None
     _places: Places = field(default_factory=Places)
 
-    def step(self, desk: Desk) -> bool:
+    def step(self, state: WindowState) -> bool:
         """Continue the task; returns whether all are done."""
         if self._running is not None and self._last[0]:
             seconds, cores, thread = (now - before for now, before in zip(clocks(), self._last, strict=True))
             self._longest = max(self._longest, seconds)
             if cores > self._busiest.cores:
-                self._busiest = Frame(cores, seconds, thread, desk.stage.drawing, self._sampler.told())
-        ended = self._continue(desk)
-        if desk.waits:
+                self._busiest = Frame(cores, seconds, thread, state.view.drawing, self._sampler.told())
+        ended = self._continue(state)
+        if state.waits:
             time.sleep(PAUSE)  # other processes need the time more
         # What the tool does is no part of a frame.
         self._last = clocks()
         self._sampler.begin()
         return ended
 
-    def _continue(self, desk: Desk) -> bool:
+    def _continue(self, state: WindowState) -> bool:
         if self._artist is None:
-            if desk.work.loaded is None or desk.stage.timings[0].wall == 0.0:
+            if state.work.loaded is None or state.view.timings[0].wall == 0.0:
                 return False
-            self._artist = Artist(desk, self._places, Hand(), self.folder)
+            self._artist = Artist(state, self._places, Hand(), self.folder)
             self._running = self._artist.hand.begin()
             return False
         if self._running is None:
@@ -151,7 +151,7 @@ def make_files(folder: Path) -> None:
 
 def play(options: argparse.Namespace) -> int:
     """Do tasks in this process's window."""
-    desks.open_dialog = lambda _: None  # the browser of the window's own, on every machine
+    states.open_dialog = lambda _: None  # the browser of the window's own, on every machine
     size, folder = tuple(map(int, options.size.split("x"))), Path(options.folder)
     if not (folder / "two.glb").exists():
         make_files(folder)

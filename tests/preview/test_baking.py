@@ -10,7 +10,7 @@ import pytest
 import translucent as tl
 from translucent.geometry.normals import drawn_normals, has_drawn_normals, made_normals
 from translucent.geometry.solids import Box
-from translucent.preview import baking
+from translucent.preview import exports
 from translucent.preview.document import Orbit
 from translucent.preview.tasks import Task
 from translucent.preview.worker import Pool
@@ -25,7 +25,7 @@ def task() -> Task:
 
 def test_the_model_is_painted_with_its_map(task: Task, pool: Pool) -> None:
     body = tl.Object(BOX, tl.Medium(absorption=1.0))
-    baked = baking.bake_map(task, pool, body, tl.Medium(absorption=2.0), "transmittance", 32, 4)
+    baked = exports.bake_map(task, pool, body, tl.Medium(absorption=2.0), "transmittance", 32, 4)
     assert baked.map.settings.medium == tl.Medium(absorption=2.0)
     assert (baked.map.settings.size, baked.map.settings.rays) == (32, 4)
     assert task.share is not None
@@ -44,4 +44,4 @@ def test_the_model_is_painted_with_its_map(task: Task, pool: Pool) -> None:
 
 def test_what_the_baker_refuses_is_told(task: Task, pool: Pool) -> None:
     with pytest.raises(tl.InputError, match=r"rays 1"):
-        baking.bake_map(task, pool, tl.Object(BOX, tl.Medium(absorption=1.0)), tl.Medium(), "cone", 8, 1)
+        exports.bake_map(task, pool, tl.Object(BOX, tl.Medium(absorption=1.0)), tl.Medium(), "cone", 8, 1)

@@ -12,14 +12,11 @@ import pytest
 
 from tests.preview.waiting import wait
 from translucent.assets import shader_path
-from translucent.preview import preferences
-from translucent.preview import shelf as shelves
-from translucent.preview.browser import Browser, with_recent
-from translucent.preview.document import FINISH, Display, Look, Material, Orbit
-from translucent.preview.environments import EnvironmentFolder, title
-from translucent.preview.orbiting import camera_of
-from translucent.preview.picturing import draw_panorama, model_key, model_picture, panorama_key
-from translucent.preview.tips import TIPS
+from translucent.preview import session
+from translucent.preview.dialogs import Browser, with_recent
+from translucent.preview.document import FINISH, TIPS, Display, Look, Material, Orbit, camera_of
+from translucent.preview.library import EnvironmentFolder, title
+from translucent.preview.thumbnails import draw_panorama, model_key, model_picture, panorama_key
 from translucent.preview.workspace import Workspace
 
 
@@ -32,9 +29,9 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def desk(work: Workspace) -> Any:
-    desks = pytest.importorskip("translucent.preview.desk", reason="the extra 'ui' is not installed")
-    return desks.Desk(work, None)
+def state(work: Workspace) -> Any:
+    states = pytest.importorskip("translucent.preview.window_state", reason="the extra 'ui' is not installed")
+    return states.WindowState(work, None)
 
 
 def browser(folder: Path, *, saves: bool = False) -> Browser:
@@ -89,29 +86,29 @@ def test_a_folder_that_is_gone_is_told(folder: Path) -> None:
     assert "No such file" in shown.problem
 
 
-def test_where_there_is_no_dialog_the_browser_asks(desk: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_there_is_no_dialog_the_browser_asks(state: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from translucent.preview import dialogs
-    from translucent.preview.panels.browser import answer
+    from translucent.preview.panels.files import accept_answer
 
     monkeypatch.setattr(dialogs.shutil, "which", lambda _: None)
     monkeypatch.setattr(dialogs.sys, "platform", "linux")
-    desk.folders = [str(folder)]
-    desk.ask_file("save session")
-    assert (desk.browser.folder, desk.browser.text, desk.browser.saves) == (folder, "session.toml", True)
-    answer(desk)
-    assert desk.browser is None
+    state.folders = [str(folder)]
+    state.ask_file("save session")
+    assert (state.browser.folder, state.browser.text, state.browser.saves) == (folder, "session.toml", True)
+    accept_answer(state)
+    assert state.browser is None
     assert (folder / "session.toml").is_file()
-    desk.ask_file("environment")
-    desk.escape()
-    assert desk.browser is None
-    desk.keys_shown, desk.selected = True, 0
-    desk.escape()
-    assert (desk.keys_shown, desk.selected) == (False, 0), "one at a time, what is on top first"
-    desk.escape()
-    assert desk.selected is None
+    state.ask_file("environment")
+    state.escape()
+    assert state.browser is None
+    state.keys_shown, state.selected = True, 0
+    state.escape()
+    assert (state.keys_shown, state.selected) == (False, 0), "one at a time, what is on top first"
+    state.escape()
+    assert state.selected is None
 
 
-def test_environments_of_a_folder(tmp_path: Path, desk: Any) -> None:
+def test_environments_of_a_folder(tmp_path: Path, state: Any) -> None:
     for name in ("b.exr", "a.HDR", "c.png", "notes.txt"):
         (tmp_path / name).write_bytes(b"")
     shown = EnvironmentFolder()
@@ -125,25 +122,25 @@ def test_environments_of_a_folder(tmp_path: Path, desk: Any) -> None:
     shown.take(str(tmp_path / "gone"))
     assert (shown.files(), "No such file" in shown.problem) == ([], True)
     assert (title(""), title("studio"), title(str(tmp_path / "a.HDR"))) == ("own", "studio", "a")
-    desk.light_with("studio")
-    assert desk.get("look.environment") == "studio"
-    desk.work.undo()
-    assert desk.get("look.environment") == ""
+    state.light_with("studio")
+    assert state.get("look.environment") == "studio"
+    state.work.undo()
+    assert state.get("look.environment") == ""
 
 
 def test_folders_are_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    assert (preferences.read_folders(), preferences.read_environments()) == ([], "")
+    assert (session.read_folders(), session.read_environments()) == ([], "")
     found = with_recent(["/usr"], tmp_path / "a.glb")
     assert found == [os.path.realpath(tmp_path), "/usr"]
     assert with_recent(found, "/usr/a.glb")[0] == os.path.realpath("/usr")
-    preferences.write_folders([*found, str(tmp_path / "gone")])
-    preferences.write_environments(str(tmp_path))
-    assert preferences.read_folders() == found
-    assert preferences.read_environments() == str(tmp_path)
+    session.write_folders([*found, str(tmp_path / "gone")])
+    session.write_environments(str(tmp_path))
+    assert session.read_folders() == found
+    assert session.read_environments() == str(tmp_path)
 
 
-def test_a_model_leaves_a_small_picture(desk: Any, folder: Path) -> None:
+def test_a_model_leaves_a_small_picture(state: Any, folder: Path) -> None:
     class Pictured:
         read = 0
 
@@ -160,22 +157,22 @@ def test_a_model_leaves_a_small_picture(desk: Any, folder: Path) -> None:
             self.read += 1
             return np.full((200, 300, 3), 99, dtype=np.uint8)
 
-    desk.stage = Pictured()
-    desk.work.shelf.folder = folder / "pictures"
-    desk._keep_picture()
-    assert desk.stage.read == 0, "the toolkit's own are in no list"
-    model = dataclasses.replace(desk.work.document.model, path=str(folder / "a.glb"))
-    desk.work.history = dataclasses.replace(
-        desk.work.history, present=dataclasses.replace(desk.work.document, model=model)
+    state.view = Pictured()
+    state.work.thumbnails.folder = folder / "pictures"
+    state._keep_picture()
+    assert state.view.read == 0, "the toolkit's own are in no list"
+    model = dataclasses.replace(state.work.document.model, path=str(folder / "a.glb"))
+    state.work.history = dataclasses.replace(
+        state.work.history, present=dataclasses.replace(state.work.document, model=model)
     )
     for _ in range(3):
-        desk._keep_picture()
-    assert desk.stage.read == 1
-    kept = desk.work.shelf.picture(model_key(str(folder / "a.glb")))
+        state._keep_picture()
+    assert state.view.read == 1
+    kept = state.work.thumbnails.picture(model_key(str(folder / "a.glb")))
     assert kept.shape == (80, 120, 3)
     assert (folder / "pictures" / f"{model_key(str(folder / 'a.glb'))}.png").is_file()
     assert model_picture(np.zeros((8, 900, 3), dtype=np.uint8)).shape == (80, 120, 3)
-    wait(desk.work, lambda: True)
+    wait(state.work, lambda: True)
 
 
 def test_every_knob_is_explained() -> None:
@@ -210,35 +207,35 @@ def test_the_scale_of_errors_has_the_colors_of_the_picture() -> None:
     assert viewport.error_color(0.0) == (0.95, 0.95, 0.95)
 
 
-def test_of_ten_dropped_files_one_model_and_one_environment_are_taken(desk: Any, folder: Path) -> None:
-    from translucent.preview.drops import take_dropped
+def test_of_ten_dropped_files_one_model_and_one_environment_are_taken(state: Any, folder: Path) -> None:
+    from translucent.preview.panels.files import take_dropped
 
     skies = [folder / f"sky-{i}.hdr" for i in range(4)]
     for path in skies:
         path.write_bytes(b"no picture")
     opened: list[str] = []
-    desk.work.open = lambda model: opened.append(Path(model.path).name)
-    take_dropped(desk, [str(folder / name) for name in ("a.glb", "b.GLB", *(path.name for path in skies), *"cdef")])
+    state.work.open = lambda model: opened.append(Path(model.path).name)
+    take_dropped(state, [str(folder / name) for name in ("a.glb", "b.GLB", *(path.name for path in skies), *"cdef")])
     assert opened == ["a.glb"]
-    assert desk.get("look.environment") == str(skies[0])
-    assert desk.environments.files() == [str(path) for path in skies]
-    (told,) = desk.work.messages
+    assert state.get("look.environment") == str(skies[0])
+    assert state.environments.files() == [str(path) for path in skies]
+    (told,) = state.work.messages
     assert told.text.startswith("8 dropped files are left out")
 
 
 def test_of_a_folder_of_500_environments_few_are_read_in_a_frame(
-    desk: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    state: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for i in range(500):
         (tmp_path / f"{i:03}.hdr").write_bytes(b"no picture")
-    desk.environments.take(str(tmp_path))
-    assert len(desk.environments.files()) == 500
+    state.environments.take(str(tmp_path))
+    assert len(state.environments.files()) == 500
     monkeypatch.setattr(os, "listdir", lambda _: pytest.fail("the folder has not changed"))
-    assert desk.environments.files()[-1] == str(tmp_path / "499.hdr")
-    shelf, read = desk.work.shelf, list[Path]()
-    monkeypatch.setattr(shelves, "_read", lambda path: read.append(path))
+    assert state.environments.files()[-1] == str(tmp_path / "499.hdr")
+    thumbnails, read = state.work.thumbnails, list[Path]()
+    monkeypatch.setattr(thumbnails, "_read", lambda path: read.append(path))
     for _ in range(2):
-        shelf.begin_frame(idle=False)
-        for path in desk.environments.files():
-            assert shelf.picture(panorama_key(path), draw_panorama, path) is None
-    assert 0 < len(read) <= 2 * shelves.READ_AT_ONCE
+        thumbnails.begin_frame(idle=False)
+        for path in state.environments.files():
+            assert thumbnails.picture(panorama_key(path), draw_panorama, path) is None
+    assert 0 < len(read) <= 2 * thumbnails.READ_AT_ONCE

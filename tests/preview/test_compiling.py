@@ -23,13 +23,13 @@ from translucent.gpu.compile_budget import CompileBudget, PostponedError, Progra
 from translucent.gpu.packed_meshes import has_packed
 from translucent.gpu.viewport import Viewport
 from translucent.planning.passes import PassName
-from translucent.preview import compiling, tracing
-from translucent.preview import stage as stages
-from translucent.preview.actions import Change, ChoosePreset
+from translucent.preview import compiling, viewport_renderer
+from translucent.preview import compiling as tracing
+from translucent.preview.actions import ChoosePreset, SetField
 from translucent.preview.compiling import Compiled, Compiler, stand_in
-from translucent.preview.stage import Stage
+from translucent.preview.quality import StepTimes
 from translucent.preview.tasks import Task
-from translucent.preview.timing import Pace
+from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.worker import Pool
 from translucent.preview.workspace import Workspace
 from translucent.scene.showcase import showcase
@@ -50,8 +50,8 @@ METHODS = (
 
 
 @pytest.fixture
-def stage(work: Workspace) -> Iterator[Stage]:
-    made = Stage(compiler=work.compiler)
+def view(work: Workspace) -> Iterator[ViewportRenderer]:
+    made = ViewportRenderer(compiler=work.compiler)
     yield made
     made.close()
 
@@ -72,7 +72,7 @@ def near(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
 
 def drawn_alone(work: Workspace) -> np.ndarray:
     """The picture of a stage that compiles all by itself."""
-    alone = Stage()
+    alone = ViewportRenderer()
     try:
         finish(alone, work)
         return pixels(alone)
@@ -204,10 +204,10 @@ def test_what_adds_samples_is_made_in_frames_of_its_own() -> None:
 
 
 def test_normals_of_a_large_mesh_come_from_another_process(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(compiling, "SMOOTHED_AT_ONCE", 100)
-    finish(stage, work)
+    finish(view, work)
     assert work.loaded is not None
     mesh = work.loaded.scene.objects[0].mesh
     assert not has_drawn_normals(mesh)
@@ -215,8 +215,8 @@ def test_normals_of_a_large_mesh_come_from_another_process(
     here: list[Mesh] = []
     monkeypatch.setattr("translucent.geometry.normals.corner_normals", here.append)
     work.do(ChoosePreset("merlot"))
-    finish(stage, work)
-    assert stage.problem == ""
+    finish(view, work)
+    assert view.problem == ""
     assert not here
     np.testing.assert_array_equal(drawn_normals(mesh), corner_normals(mesh).astype(np.float32))
 
@@ -248,40 +248,40 @@ def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> 
 
 
 def test_the_last_picture_stays_until_the_next_one_is_compiled(
-    stage: Stage, work: Workspace, near: threading.Event
+    view: ViewportRenderer, work: Workspace, near: threading.Event
 ) -> None:
     near.set()
-    finish(stage, work)
+    finish(view, work)
     wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
     near.clear()
-    before = pixels(stage)
+    before = pixels(view)
     work.do(ChoosePreset("whole_milk"))
     for _ in range(3):
-        assert stage.draw(work, SIZE)
+        assert view.draw(work, SIZE)
         work.update()
     assert "preparing the picture" in [task.name for task in work.busy]
-    np.testing.assert_array_equal(pixels(stage), before)
-    assert stage.draw(work, (320, 192))  # larger now, and still the last one
-    assert np.abs(pixels(stage)[::2, ::2] - before).mean() < 3.0
+    np.testing.assert_array_equal(pixels(view), before)
+    assert view.draw(work, (320, 192))  # larger now, and still the last one
+    assert np.abs(pixels(view)[::2, ::2] - before).mean() < 3.0
     near.set()
-    finish(stage, work)
-    assert stage.problem == ""
+    finish(view, work)
+    assert view.problem == ""
     # Without antialiasing, a ray that grazes an edge is the whole pixel: it may go either way in another context.
-    differs = (np.abs(pixels(stage).astype(int) - drawn_alone(work).astype(int)) > 1).any(axis=-1)
+    differs = (np.abs(pixels(view).astype(int) - drawn_alone(work).astype(int)) > 1).any(axis=-1)
     assert differs.sum() <= 2
-    assert (pixels(stage) != before).any()
+    assert (pixels(view) != before).any()
 
 
 def test_a_frame_that_takes_too_long_goes_on_in_the_next_one(
-    stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     near.set()
-    finish(stage, work)
+    finish(view, work)
     wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
-    monkeypatch.setattr(stages, "BUDGET", 0.0)
-    monkeypatch.setattr(Pace, "stride", lambda *_: 1)  # not 256 steps for a picture: what is made is the same
+    monkeypatch.setattr(viewport_renderer, "BUDGET", 0.0)
+    monkeypatch.setattr(StepTimes, "stride", lambda *_: 1)  # not 256 steps for a picture: what is made is the same
     made: list[bool] = []
-    draw = stage._draw
+    draw = view._draw
 
     def count(*arguments: Any) -> bool:
         try:
@@ -290,29 +290,31 @@ def test_a_frame_that_takes_too_long_goes_on_in_the_next_one(
             made.append(error.program is None)
             raise
 
-    monkeypatch.setattr(stage, "_draw", count)
+    monkeypatch.setattr(view, "_draw", count)
     work.do(ChoosePreset("whole_milk"))
-    work.do(Change("look.light", True))
-    finish(stage, work)
-    assert stage.problem == ""
+    work.do(SetField("look.light", True))
+    finish(view, work)
+    assert view.problem == ""
     assert sum(made) > 5
-    np.testing.assert_allclose(pixels(stage), drawn_alone(work), atol=1)
+    np.testing.assert_allclose(pixels(view), drawn_alone(work), atol=1)
 
 
-def test_who_does_not_wait_has_the_window_compile(stage: Stage, work: Workspace, near: threading.Event) -> None:
+def test_who_does_not_wait_has_the_window_compile(
+    view: ViewportRenderer, work: Workspace, near: threading.Event
+) -> None:
     near.set()
-    finish(stage, work)
+    finish(view, work)
     wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
     near.clear()
     work.do(ChoosePreset("whole_milk"))
-    assert stage.draw(work, SIZE)
+    assert view.draw(work, SIZE)
     for _ in range(60):
         for task in work.busy:
             task.cancel()
         near.set()
         wait(work, lambda: work.compiler.lane.task is None)
         near.clear()
-        if stage.draw(work, SIZE) and stage.viewport.steps(0):
+        if view.draw(work, SIZE) and view.viewport.steps(0):
             break
     else:
         pytest.fail("it waits for ever")
@@ -320,18 +322,18 @@ def test_who_does_not_wait_has_the_window_compile(stage: Stage, work: Workspace,
 
 
 def test_a_request_that_cannot_be_made_is_told_once(
-    stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     near.set()
-    finish(stage, work)
+    finish(view, work)
 
     def fails(_: tl.Scene) -> tl.Scene:
         raise MemoryError
 
     monkeypatch.setattr(compiling, "stand_in", fails)
     work.do(ChoosePreset("whole_milk"))
-    finish(stage, work)
-    assert stage.problem == ""
+    finish(view, work)
+    assert view.problem == ""
     assert [m.text for m in work.messages if "in the window" in m.text]
 
 
@@ -362,81 +364,81 @@ def test_normals_that_two_lanes_ask_for_are_made_once(monkeypatch: pytest.Monkey
 
 
 def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierarchy(
-    stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tracing, "PACKED_AT_ONCE", 10)
     near.set()
-    finish(stage, work)
+    finish(view, work)
     wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
     near.clear()
     assert work.loaded is not None
     mesh = work.loaded.scene.objects[0].mesh
     work.do(ChoosePreset("merlot"))
-    stage.draw(work, SIZE)
-    assert "until rays can be traced" in stage.ways.told[0]
-    assert isinstance(stage.ways.interfaces, tl.ScreenInterfaces)
+    view.draw(work, SIZE)
+    assert "until rays can be traced" in view.quality.told[0]
+    assert isinstance(view.quality.interfaces, tl.ScreenInterfaces)
     assert not has_packed(mesh)
     near.set()
-    finish(stage, work)
-    assert (stage.ways.told[0], stage.ways.interfaces) == ("", None)
+    finish(view, work)
+    assert (view.quality.told[0], view.quality.interfaces) == ("", None)
     assert has_packed(mesh)
-    assert stage.plans[0] is not None
-    assert stage.plans[0].has(PassName.TRACED)
-    differs = (np.abs(pixels(stage).astype(int) - drawn_alone(work).astype(int)) > 1).any(axis=-1)
+    assert view.plans[0] is not None
+    assert view.plans[0].has(PassName.TRACED)
+    differs = (np.abs(pixels(view).astype(int) - drawn_alone(work).astype(int)) > 1).any(axis=-1)
     assert differs.sum() <= 2
 
 
-def test_nobody_waits_for_what_is_known(stage: Stage, work: Workspace, near: threading.Event) -> None:
+def test_nobody_waits_for_what_is_known(view: ViewportRenderer, work: Workspace, near: threading.Event) -> None:
     near.set()
-    finish(stage, work)
+    finish(view, work)
     near.clear()
-    work.do(Change("material.distance", 0.003))
-    assert stage.draw(work, SIZE)
-    assert stage._shown
+    work.do(SetField("material.distance", 0.003))
+    assert view.draw(work, SIZE)
+    assert view._shown
     assert not [task for task in work.busy if task.name == "preparing the picture"]
     near.set()
 
 
 def test_where_no_process_can_draw_the_window_compiles_by_itself(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def call(*_: Any, **_urgency: Any) -> Any:
         raise tl.RenderError("preparing the picture", "its process ended with status 9", "close other programs")
 
     monkeypatch.setattr(Pool, "call", call)
-    finish(stage, work)
+    finish(view, work)
     work.do(ChoosePreset("whole_milk"))
-    finish(stage, work)
-    assert stage.problem == ""
+    finish(view, work)
+    assert view.problem == ""
     told = [message.text for message in work.messages if "shaders are compiled in the window" in message.text]
     assert len(told) == 1
     assert "status 9" in told[0]
-    assert "since it could not be solved for" in stage.ways.told[1]  # nor is the window to run out of memory
+    assert "since it could not be solved for" in view.quality.told[1]  # nor is the window to run out of memory
     messages = len(work.messages)
-    work.do(Change("display.method", "depth-peeling"))
-    finish(stage, work)
+    work.do(SetField("display.method", "depth-peeling"))
+    finish(view, work)
     assert len(work.messages) == messages
 
 
 def test_a_shader_that_does_not_compile_is_told_by_the_process(
-    stage: Stage, work: Workspace, near: threading.Event, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, near: threading.Event, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     near.set()
-    finish(stage, work)
-    before = stage.renderer
+    finish(view, work)
+    before = view.renderer
     shutil.copytree(data._folder("shaders"), tmp_path / "shaders")
     monkeypatch.setattr(data, "_folder", lambda kind: tmp_path / kind)
     broken = tmp_path / "shaders" / "thickness" / "signed_depth.frag"
     good = broken.read_text()
     broken.write_text(good + "\nvoid broken( {\n")
-    stage.reload(work)
+    view.reload(work)
     wait(work, lambda: work.compiler.lane.task is None)
-    assert "shaders/thickness/signed_depth.frag:" in stage.shader_problem
-    assert stage.renderer is before
+    assert "shaders/thickness/signed_depth.frag:" in view.shader_problem
+    assert view.renderer is before
     broken.write_text(good)
-    stage.reload(work)
+    view.reload(work)
     wait(work, lambda: work.compiler.lane.task is None)
-    assert stage.shader_problem == ""
-    assert stage.renderer is not before
-    finish(stage, work)
-    assert stage.problem == ""
+    assert view.shader_problem == ""
+    assert view.renderer is not before
+    finish(view, work)
+    assert view.problem == ""

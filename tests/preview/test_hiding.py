@@ -12,12 +12,10 @@ import translucent as tl
 from tests.preview.test_library import two_bodies
 from tests.preview.waiting import wait
 from translucent.geometry.solids import Box
-from translucent.preview.actions import Hide, Open, apply
+from translucent.preview.actions import Hide, History, Open, apply
 from translucent.preview.document import Document, Orbit
-from translucent.preview.history import History
-from translucent.preview.loaded import Loaded
-from translucent.preview.recipes import Shot, command_line, python_code
-from translucent.preview.scenes import material_of, scene_of
+from translucent.preview.exports import Recipe, command_line, python_code
+from translucent.preview.scenes import Loaded, material_of, scene_of
 from translucent.preview.session import from_table, load_session, save_session, to_table
 from translucent.preview.workspace import Workspace
 from translucent.scene.showcase import DEFAULT_COLOR, DEFAULT_REACH
@@ -45,29 +43,29 @@ def test_hiding_is_a_step_of_undo_and_kept_in_sessions(tmp_path: Path) -> None:
 
 
 def test_an_object_is_isolated_and_the_last_one_is_not_hidden(work: Workspace) -> None:
-    desks = pytest.importorskip("translucent.preview.desk", reason="the extra 'ui' is not installed")
-    from translucent.preview.hiding import hide, isolate
+    states = pytest.importorskip("translucent.preview.window_state", reason="the extra 'ui' is not installed")
+    from translucent.preview.panels.scene import hide, isolate
 
-    desk = desks.Desk(work, None)
+    state = states.WindowState(work, None)
     loaded = dataclasses.replace(two_bodies(), model=work.document.model)
     work._keep(loaded)
-    isolate(desk, 1)
+    isolate(state, 1)
     assert work.document.hidden == (0, 2)
     scene = work.scene()
     assert scene is not None
     assert [item.mesh for item in scene.objects] == [loaded.scene.objects[1].mesh]
     found: list[int | None] = []
-    desk.stage = type("Stage", (), {"viewport": type("Viewport", (), {"size": (48, 32)})})()
+    state.view = type("Stage", (), {"viewport": type("Viewport", (), {"size": (48, 32)})})()
     work.frame(1)
-    desk.pick((0.5, 0.5), found.append)
+    state.pick((0.5, 0.5), found.append)
     wait(work, lambda: bool(found))
     assert found == [1], "it is told by its number in the model"
-    hide(desk, 1)
+    hide(state, 1)
     assert "the only one on show" in work.messages[-1].text
-    shot = Shot(work.document, loaded, scene, (48, 32))
+    shot = Recipe(work.document, loaded, scene, (48, 32))
     assert "hidden objects" in command_line(shot)[1]
     assert "if i not in [0, 2]" in python_code(shot)
-    isolate(desk, 1)
+    isolate(state, 1)
     assert work.document.hidden == ()
     work.do(Hide((0, 1, 2)))
     assert work.document.hidden == (), "a picture of nothing is none"

@@ -13,18 +13,16 @@ import pytest
 
 import translucent as tl
 from tests.preview.waiting import wait
-from translucent.preview import picturing
-from translucent.preview.actions import Assign, ChoosePreset, Open, apply, preset_material
+from translucent.preview import thumbnails
+from translucent.preview.actions import Assign, ChoosePreset, History, Open, apply, preset_material
 from translucent.preview.document import Document, Material, Orbit
-from translucent.preview.history import History
+from translucent.preview.exports import Recipe, command_line, python_code
 from translucent.preview.library import Library
-from translucent.preview.loaded import Loaded
 from translucent.preview.measuring import first_object
-from translucent.preview.recipes import Shot, command_line, python_code
-from translucent.preview.scenes import material_of, medium_of, scene_of
+from translucent.preview.scenes import Loaded, material_of, medium_of, scene_of
 from translucent.preview.session import from_table, load_session, save_session, to_table
-from translucent.preview.shelf import Shelf
 from translucent.preview.tasks import Lane
+from translucent.preview.thumbnails import ThumbnailCache
 from translucent.preview.workspace import Workspace
 
 PICTURE = np.full((2, 3, 3), 7, dtype=np.uint8)
@@ -32,17 +30,17 @@ PICTURE = np.full((2, 3, 3), 7, dtype=np.uint8)
 
 @pytest.fixture
 def lane() -> Iterator[Lane]:
-    made = Lane("shelf")
+    made = Lane("thumbnails")
     yield made
     made.close()
 
 
-def settle(shelf: Shelf, ask: Callable[[], Any]) -> Any:
-    """Answer of a shelf to a request that is made in every frame."""
+def settle(thumbnails: ThumbnailCache, ask: Callable[[], Any]) -> Any:
+    """Answer of a thumbnails to a request that is made in every frame."""
     end = time.monotonic() + 10.0
     while (found := ask()) is None and time.monotonic() < end:
-        shelf.begin_frame(idle=True)
-        shelf.lane.poll(print)
+        thumbnails.begin_frame(idle=True)
+        thumbnails.lane.poll(print)
         time.sleep(0.001)
     return found
 
@@ -63,25 +61,25 @@ def test_a_picture_is_made_once_and_kept_on_disk(lane: Lane, tmp_path: Path) -> 
         made.append(name)
         return PICTURE
 
-    shelf = Shelf(lane, make, tmp_path)
-    assert shelf.picture("a", "a") is None
+    thumbnails = ThumbnailCache(lane, make, tmp_path)
+    assert thumbnails.picture("a", "a") is None
     for _ in range(3):
-        shelf.begin_frame(idle=False)
-        assert shelf.picture("a", "a") is None
+        thumbnails.begin_frame(idle=False)
+        assert thumbnails.picture("a", "a") is None
     assert lane.task is None, "while the picture of the window is drawn, no others are"
-    np.testing.assert_array_equal(settle(shelf, lambda: shelf.picture("a", "a")), PICTURE)
-    again = Shelf(lane, make, tmp_path)
+    np.testing.assert_array_equal(settle(thumbnails, lambda: thumbnails.picture("a", "a")), PICTURE)
+    again = ThumbnailCache(lane, make, tmp_path)
     np.testing.assert_array_equal(again.picture("a", "a"), PICTURE)
     assert made == ["a"]
 
 
 def test_what_nobody_sees_any_more_is_not_made(lane: Lane, tmp_path: Path) -> None:
-    shelf = Shelf(lane, lambda _, name: PICTURE, tmp_path)
-    shelf.picture("seen", "seen")
-    shelf.begin_frame(idle=False)
-    assert shelf.busy
-    shelf.begin_frame(idle=False)
-    assert not shelf.busy
+    thumbnails = ThumbnailCache(lane, lambda _, name: PICTURE, tmp_path)
+    thumbnails.picture("seen", "seen")
+    thumbnails.begin_frame(idle=False)
+    assert thumbnails.busy
+    thumbnails.begin_frame(idle=False)
+    assert not thumbnails.busy
 
 
 def test_few_are_read_in_a_frame_and_what_cannot_be_made_has_no_picture(lane: Lane, tmp_path: Path) -> None:
@@ -91,15 +89,15 @@ def test_few_are_read_in_a_frame_and_what_cannot_be_made_has_no_picture(lane: La
         asked.append(name)
         raise tl.InputError("environment 'a.hdr'", "no picture")
 
-    shelf = Shelf(lane, fail, tmp_path)
+    thumbnails = ThumbnailCache(lane, fail, tmp_path)
     (tmp_path / "0.png").write_bytes(b"half")
     for number in range(500):
-        shelf.picture(str(number), str(number))
-    shelf.begin_frame(idle=True)
-    assert len(shelf._wanted) == 4, "a folder of 500 files stops no frame"
+        thumbnails.picture(str(number), str(number))
+    thumbnails.begin_frame(idle=True)
+    assert len(thumbnails._wanted) == 4, "a folder of 500 files stops no frame"
     for _ in range(20):
-        shelf.picture("0", "0")
-        shelf.begin_frame(idle=True)
+        thumbnails.picture("0", "0")
+        thumbnails.begin_frame(idle=True)
         lane.poll(print)
         time.sleep(0.002)
     assert asked == ["0"], "it is tried once"
@@ -116,29 +114,29 @@ def test_a_ball_fills_its_picture_on_the_default_stage(monkeypatch: pytest.Monke
         def to_srgb8(self, *_: object) -> np.ndarray:
             return PICTURE
 
-    monkeypatch.setattr(picturing, "_renderer", lambda _: Recorder())
-    assert picturing.draw_ball(lambda *_: None, tl.preset("wax")) is not None
+    monkeypatch.setattr(thumbnails, "_renderer", lambda _: Recorder())
+    assert thumbnails.draw_ball(lambda *_: None, tl.preset("wax")) is not None
     ball, ground = seen[0].objects
     assert (ball.medium, ball.surface.roughness) == (tl.preset("wax").medium, 0.35)  # type: ignore[union-attr]
     assert ground.shadow_catcher
     origins, ways = seen[0].camera.rays((9, 9))
     towards = ball.bounds.mean(axis=0) - origins
     past = np.linalg.norm(np.cross(towards, ways), axis=-1).reshape(9, 9)
-    assert (past[4, 1:8] < picturing.RADIUS).all()
-    assert past[0, 0] > picturing.RADIUS
+    assert (past[4, 1:8] < thumbnails.RADIUS).all()
+    assert past[0, 0] > thumbnails.RADIUS
 
 
 def test_an_environment_is_drawn_in_all_directions() -> None:
-    assert picturing.draw_panorama(lambda *_: None, "studio").shape == (64, 128, 3)
-    assert (picturing.draw_panorama(lambda *_: None, "#ff0000")[..., 0] > 200).all()
-    low, high = picturing.draw_panorama(lambda *_: None, "light-table")[[-1, 0], 5].astype(int)
+    assert thumbnails.draw_panorama(lambda *_: None, "studio").shape == (64, 128, 3)
+    assert (thumbnails.draw_panorama(lambda *_: None, "#ff0000")[..., 0] > 200).all()
+    low, high = thumbnails.draw_panorama(lambda *_: None, "light-table")[[-1, 0], 5].astype(int)
     assert (high > low + 20).all(), "the light table is white above"
 
 
 def test_keys_are_of_the_content() -> None:
     jade = tl.preset("jade")
-    assert picturing.ball_key(jade) == picturing.ball_key(dataclasses.replace(jade, name="stone", note="another"))
-    assert picturing.ball_key(jade) != picturing.ball_key(dataclasses.replace(jade, roughness=0.5))
+    assert thumbnails.ball_key(jade) == thumbnails.ball_key(dataclasses.replace(jade, name="stone", note="another"))
+    assert thumbnails.ball_key(jade) != thumbnails.ball_key(dataclasses.replace(jade, roughness=0.5))
 
 
 def test_a_material_is_saved_and_found(tmp_path: Path) -> None:
@@ -205,24 +203,24 @@ def test_a_session_with_half_an_assignment_is_refused(entry: object) -> None:
 
 
 def test_a_preset_on_the_selected_object_leaves_the_others(work: Workspace) -> None:
-    desks = pytest.importorskip("translucent.preview.desk", reason="the extra 'ui' is not installed")
-    desk = desks.Desk(work, None)
-    desk.select(0)
-    desk.choose_preset("merlot")
+    states = pytest.importorskip("translucent.preview.window_state", reason="the extra 'ui' is not installed")
+    state = states.WindowState(work, None)
+    state.select(0)
+    state.choose_preset("merlot")
     assert work.document.material.preset == "merlot", "a model of one object has one material"
     work._keep(dataclasses.replace(two_bodies(), model=work.document.model))
-    desk.select(1)
-    desk.choose_preset("honey")
-    desk.change("material.roughness", 0.5)
-    assert (desk.get("material.roughness"), desk.material.preset) == (0.5, "honey")
+    state.select(1)
+    state.choose_preset("honey")
+    state.change("material.roughness", 0.5)
+    assert (state.get("material.roughness"), state.material.preset) == (0.5, "honey")
     assert work.document.own_material(0) is None
     work.undo()
     work.undo()
     assert work.document.assigned == ()
-    desk.select(None)
-    assert desk.get("material.preset") == "merlot"
-    desk.select(1)
-    desk.choose_preset("no such")
+    state.select(None)
+    assert state.get("material.preset") == "merlot"
+    state.select(1)
+    state.choose_preset("no such")
     assert "not a known preset" in work.messages[-1].text
     wait(work, lambda: True)
 
@@ -240,7 +238,7 @@ def test_a_recipe_says_the_materials_of_single_objects(work: Workspace) -> None:
         work.do(Assign(number, preset_material(Material(), "merlot")))
     scene = work.scene()
     assert scene is not None
-    shot = Shot(work.document, loaded, scene, (48, 32))
+    shot = Recipe(work.document, loaded, scene, (48, 32))
     text, left_out = command_line(shot)
     assert "--object wine --preset merlot" in text
     assert left_out == ["the material of object 2"]

@@ -12,8 +12,9 @@ import pytest
 from PIL import Image
 
 from tests.preview.waiting import wait
-from translucent.preview import scenes, staging
-from translucent.preview.actions import Change, Turn
+from translucent.preview import scenes
+from translucent.preview import scenes as staging
+from translucent.preview.actions import SetField, Turn
 from translucent.preview.document import Document, Model
 from translucent.preview.workspace import Workspace
 
@@ -53,10 +54,10 @@ def test_the_one_before_is_on_show_until_a_file_is_read(
 
     monkeypatch.setattr(staging, "named_environment", slow)
     read.set()
-    workspace.do(Change("look.environment", "light-table"))
+    workspace.do(SetField("look.environment", "light-table"))
     before = kind(workspace)
     read.clear()
-    workspace.do(Change("look.environment", str(sky)))
+    workspace.do(SetField("look.environment", str(sky)))
     assert kind(workspace) == before != "image"
     workspace.do(Turn(5.0, 0.0))
     first = workspace.scene()
@@ -65,7 +66,7 @@ def test_the_one_before_is_on_show_until_a_file_is_read(
     read.set()
     wait(workspace, lambda: kind(workspace) == "image")
     for rotation in (10.0, 20.0):
-        workspace.do(Change("look.rotation", rotation))
+        workspace.do(SetField("look.rotation", rotation))
         scene = workspace.scene()
         assert scene is not None
         assert scene.environment is not None
@@ -74,9 +75,9 @@ def test_the_one_before_is_on_show_until_a_file_is_read(
 
 
 def test_a_file_that_cannot_be_read_is_told_once_and_the_one_before_stays(workspace: Workspace, tmp_path: Path) -> None:
-    workspace.do(Change("look.environment", "light-table"))
+    workspace.do(SetField("look.environment", "light-table"))
     before = kind(workspace)
-    workspace.do(Change("look.environment", str(tmp_path / "none.hdr")))
+    workspace.do(SetField("look.environment", str(tmp_path / "none.hdr")))
     for _ in range(3):
         kind(workspace)
         wait(workspace, lambda: workspace.lanes["light"].task is None)
@@ -89,7 +90,7 @@ def test_a_file_that_cannot_be_read_is_told_once_and_the_one_before_stays(worksp
 
 
 def test_a_file_that_changes_is_read_again(workspace: Workspace, sky: Path) -> None:
-    workspace.do(Change("look.environment", str(sky)))
+    workspace.do(SetField("look.environment", str(sky)))
     wait(workspace, lambda: kind(workspace) == "image")
     Image.fromarray(np.full((4, 8, 3), 40, dtype=np.uint8)).save(sky)
     assert scenes.environment_of(str(sky)).light_map.size == (8, 4)

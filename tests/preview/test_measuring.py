@@ -11,12 +11,11 @@ import pytest
 
 import translucent as tl
 from tests.preview.waiting import SIZE, wait
-from translucent.preview import comparing, measuring
-from translucent.preview.actions import Change, Turn
-from translucent.preview.desk import Desk
+from translucent.preview import measuring, workspace
+from translucent.preview.actions import SetField, Turn
 from translucent.preview.measuring import crossing, measure
-from translucent.preview.preparations import prepares
-from translucent.preview.workspace import Workspace
+from translucent.preview.window_state import WindowState
+from translucent.preview.workspace import Workspace, prepares
 from translucent.scene.texture import Texture
 
 
@@ -75,29 +74,29 @@ class StillStage:
 def test_measuring_waits_for_what_the_picture_needs_and_is_cancelled_when_things_move(
     work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stage: Any = StillStage()
-    desk, begun = Desk(work, stage), list[tl.Scene]()
-    monkeypatch.setattr(comparing, "STILL", -1.0)
-    monkeypatch.setattr(Desk, "_keep_picture", lambda _: None)
+    view: Any = StillStage()
+    state, begun = WindowState(work, view), list[tl.Scene]()
+    monkeypatch.setattr(workspace, "STILL", -1.0)
+    monkeypatch.setattr(WindowState, "_keep_picture", lambda _: None)
     monkeypatch.setattr(work, "measure", lambda scene, *_: begun.append(scene))
     wait(work, lambda: work.loaded is not None and not prepares(work))
     reads = threading.Event()
     work.lanes["light"].start("setting the stage", lambda _: reads.wait(20.0), lambda _: None)
-    assert desk.draw(SIZE)
+    assert state.draw(SIZE)
     assert not begun
     reads.set()
     wait(work, lambda: work.lanes["light"].task is None)
-    desk.draw(SIZE)
+    state.draw(SIZE)
     assert begun == [work.scene()]
     task = work.lanes["draw"].start("measuring", lambda _: None, lambda _: None)
     work.do(Turn(10.0, 0.0))
-    desk.draw(SIZE)
+    state.draw(SIZE)
     assert task.cancelled
     assert begun[1:] == [work.scene()]
     monkeypatch.setattr(measuring, "MOST_TRIANGLES", 10)
     work.do(Turn(10.0, 0.0))
-    desk.draw(SIZE)
+    state.draw(SIZE)
     assert len(begun) == 2
-    work.do(Change("display.inset", True))
-    desk.draw(SIZE)
+    work.do(SetField("display.inset", True))
+    state.draw(SIZE)
     assert begun[2:] == [work.scene()]

@@ -16,11 +16,11 @@ from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.photon_light import PhotonLight
 from translucent.gpu.viewport import Viewport
 from translucent.planning import caustics
-from translucent.preview import photons
-from translucent.preview.actions import Change, Turn
+from translucent.preview import refining
+from translucent.preview.actions import SetField, Turn
 from translucent.preview.document import Document, Model
 from translucent.preview.exports import write_picture
-from translucent.preview.stage import Stage
+from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 
 #: A ball of glass on a floor, under the sun.
@@ -32,19 +32,19 @@ ROUND = 1 << 12
 
 
 @pytest.fixture
-def stage() -> Iterator[Stage]:
-    made = Stage()
+def view() -> Iterator[ViewportRenderer]:
+    made = ViewportRenderer()
     yield made
     made.close()
 
 
-def test_rounds_add_up_to_the_photons_of_one_frame(stage: Stage) -> None:
+def test_rounds_add_up_to_the_photons_of_one_frame(view: ViewportRenderer) -> None:
     """They are the same photons, so that energy is right whatever their number; and the picture is drawn in parts."""
-    plan = stage.renderer.plan(LIT, caustics=tl.Caustics(ROUND))
-    with stage.current():
-        viewport = Viewport(stage.renderer.gpu)
+    plan = view.renderer.plan(LIT, caustics=tl.Caustics(ROUND))
+    with view.current():
+        viewport = Viewport(view.renderer.gpu)
         viewport.resize(SIZE)
-        light = PhotonLight(stage.renderer.gpu, LIT, viewport.size, plan)
+        light = PhotonLight(view.renderer.gpu, LIT, viewport.size, plan)
         errors, lights = [], []
         for rounds in (4, 8, 16):
             while light.rounds < rounds:
@@ -61,7 +61,7 @@ def test_rounds_add_up_to_the_photons_of_one_frame(stage: Stage) -> None:
         place = [side.kept(x, y) for y in range(SIZE[1]) for x in range(SIZE[0])]
         shown = np.array([kept[y, x, :3] for x, y in place]).reshape(SIZE[1], SIZE[0], 3)
         assert viewport.mean_radiance() == pytest.approx(shown.mean(), rel=1e-5)
-        frame = stage.renderer.render(LIT, SIZE, caustics=tl.Caustics(16 * ROUND))
+        frame = view.renderer.render(LIT, SIZE, caustics=tl.Caustics(16 * ROUND))
         light.release()
         viewport.release()
     # What is seen through glass is looked up in each part of the picture; silhouettes may fall to either side.
@@ -77,47 +77,47 @@ def test_rounds_add_up_to_the_photons_of_one_frame(stage: Stage) -> None:
 
 
 def test_photons_light_the_still_picture_until_something_changes(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in {"ROUND": ROUND, "MOST_PHOTONS": 8 * ROUND, "SHARE": 0.0}.items():
-        monkeypatch.setattr(photons, name, value)
+        monkeypatch.setattr(refining, name, value)
     assert work.loaded is not None
     monkeypatch.setattr(work, "scene", lambda: LIT)
-    finish(stage, work)
-    without = pixels(stage)
-    work.do(Change("display.caustics", True))
+    finish(view, work)
+    without = pixels(view)
+    work.do(SetField("display.caustics", True))
     told = []
-    while stage.draw(work, SIZE):
-        told.append(stage.photons.told)
-    told.append(stage.photons.told)
-    assert stage.problem == ""
+    while view.draw(work, SIZE):
+        told.append(view.photons.told)
+    told.append(view.photons.told)
+    assert view.problem == ""
     assert any(text.startswith("caustics: not in the picture yet; ") for text in told)
     # Two pictures tell the noise; a quick machine follows all these photons for the first.
     pictures = {text.split(" photons")[0] for text in told if "photons in the picture" in text}
     assert any("photons in the picture, standard error" in text for text in told) or len(pictures) == 1
-    assert stage.photons.told.startswith(f"caustics: {stage.photons.light.photons:,} photons in the picture")  # type: ignore[union-attr]
-    count = stage.photons.light.photons  # type: ignore[union-attr]
-    with stage.current():
-        frame = stage.renderer.render(LIT, SIZE, caustics=tl.Caustics(count))
-    assert (np.abs(pixels(stage) - frame.to_srgb8().astype(int))[~frame.coverage] > 1).mean() < 1e-3
-    assert np.abs(pixels(stage) - without).mean() > 0.5
-    work.do(Change("display.caustics", False))
-    finish(stage, work)
-    assert stage.photons.told == ""
-    assert (np.abs(pixels(stage) - without)[~frame.coverage] > 1).mean() < 2e-3
+    assert view.photons.told.startswith(f"caustics: {view.photons.light.photons:,} photons in the picture")  # type: ignore[union-attr]
+    count = view.photons.light.photons  # type: ignore[union-attr]
+    with view.current():
+        frame = view.renderer.render(LIT, SIZE, caustics=tl.Caustics(count))
+    assert (np.abs(pixels(view) - frame.to_srgb8().astype(int))[~frame.coverage] > 1).mean() < 1e-3
+    assert np.abs(pixels(view) - without).mean() > 0.5
+    work.do(SetField("display.caustics", False))
+    finish(view, work)
+    assert view.photons.told == ""
+    assert (np.abs(pixels(view) - without)[~frame.coverage] > 1).mean() < 2e-3
 
 
-def test_what_has_no_caustics_says_why_and_keeps_its_picture(stage: Stage, work: Workspace) -> None:
-    work.do(Change("display.antialias", True))
-    work.do(Change("display.caustics", True))
-    finish(stage, work)
-    assert stage.photons.told.startswith("no caustics; the scene has no lights")
-    assert stage.viewport.steps(0) > stage._strides.of[0] ** 2  # edges become smooth all the same
+def test_what_has_no_caustics_says_why_and_keeps_its_picture(view: ViewportRenderer, work: Workspace) -> None:
+    work.do(SetField("display.antialias", True))
+    work.do(SetField("display.caustics", True))
+    finish(view, work)
+    assert view.photons.told.startswith("no caustics; the scene has no lights")
+    assert view.viewport.steps(0) > view._strides.of[0] ** 2  # edges become smooth all the same
     work.do(Turn(10.0, 0.0))
-    assert stage.draw(work, SIZE)
-    work.do(Change("display.mode", "thickness"))
-    finish(stage, work)
-    assert stage.photons.told == ""
+    assert view.draw(work, SIZE)
+    work.do(SetField("display.mode", "thickness"))
+    finish(view, work)
+    assert view.photons.told == ""
 
 
 def test_files_have_the_photons(tmp_path: Path) -> None:
@@ -140,29 +140,31 @@ def test_a_model_on_a_stage_is_measured_without_it() -> None:
     assert seen.environment_shadows == 0
 
 
-def test_photons_in_media_are_followed_aside(stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_photons_in_media_are_followed_aside(
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Before others; with nothing that these could land on, the picture is one without rounds."""
-    if not stage.renderer.gpu.capabilities.shader_storage:
+    if not view.renderer.gpu.capabilities.shader_storage:
         pytest.skip("this OpenGL has no shader storage buffers, without which nothing marches")
     monkeypatch.setattr(caustics, "LEAST_IN_MEDIA", 1 << 10)
-    monkeypatch.setattr(photons, "ROUND", 1 << 10)
+    monkeypatch.setattr(refining, "ROUND", 1 << 10)
     fog = tl.Object(Box((-1.5, -3.0, -1.5), (1.5, -1.2, 1.5)).tessellate(), tl.Medium(scattering=0.5))
     scene = replace(LIT, objects=[tl.Object(Sphere().tessellate(16), tl.Medium(ior=1.5)), fog])
-    found, lane = photons.Photons(), work.lanes["diffuse"]
+    found, lane = refining.Photons(), work.lanes["diffuse"]
 
     def ready() -> bool:
-        return found.ready(work, scene, stage.renderer, stage.viewport, None, tl.Diffusion(8), 0.1, 0.0)
+        return found.ready(work, scene, view.renderer, view.viewport, None, tl.Diffusion(8), 0.1, 0.0)
 
-    with stage.current():
+    with view.current():
         assert not ready()
         assert found.told == "caustics: photons in media first"
-        assert found.show_media(stage.viewport) is None
+        assert found.show_media(view.viewport) is None
         wait(work, lambda: lane.task is None)
         assert not ready()
         assert found.told == "caustics: 1,024 photons in media"
-        shown = found.show_media(stage.viewport)
+        shown = found.show_media(view.viewport)
         assert shown is not None
         assert shown.given_back.volumes == (1,)
-        assert found.show_media(stage.viewport) is None
-        assert found.stop(stage.viewport)
+        assert found.show_media(view.viewport) is None
+        assert found.stop(view.viewport)
     assert found.told == ""

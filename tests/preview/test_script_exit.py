@@ -13,14 +13,14 @@ from tests.command_line import Run
 from tests.preview.waiting import wait
 from translucent.errors import RenderError
 from translucent.preview import app
-from translucent.preview.actions import Change, ChoosePreset
+from translucent.preview.actions import ChoosePreset, SetField
 from translucent.preview.document import Document, Model
 from translucent.preview.workspace import Workspace
 
 
 def _wrong_preset(work: Workspace) -> None:
     work.do(ChoosePreset("unobtainium"))
-    work.do(Change("material.color", [0.6, 0.1, 0.2]))
+    work.do(SetField("material.color", [0.6, 0.1, 0.2]))
 
 
 def _lost_file(work: Workspace) -> None:

@@ -15,14 +15,13 @@ from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.cli import main
 from translucent.gpu.compile_budget import PostponedError
 from translucent.gpu.passes import shadow_maps
-from translucent.preview import preferences, timing
-from translucent.preview.actions import Change, ChoosePreset, Turn
-from translucent.preview.document import AUTO, Document, Look, Model
-from translucent.preview.orbiting import framed, orbit_of
-from translucent.preview.recipes import Shot, command_line, python_code
+from translucent.preview import quality, session
+from translucent.preview.actions import ChoosePreset, SetField, Turn
+from translucent.preview.document import AUTO, Document, Look, Model, framed, orbit_of
+from translucent.preview.exports import Recipe, command_line, python_code
+from translucent.preview.scenes import stage_name, tone_of
 from translucent.preview.session import load_session, save_session
-from translucent.preview.stage import Stage
-from translucent.preview.staging import stage_name, tone_of
+from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 from translucent.scene import stages
 from translucent.scene.showcase import framing
@@ -50,11 +49,11 @@ def staged() -> Iterator[Workspace]:
     made.close()
 
 
-def shot(work: Workspace) -> Shot:
+def shot(work: Workspace) -> Recipe:
     scene = work.picture()
     assert scene is not None
     assert work.loaded is not None
-    return Shot(work.document, work.loaded, scene, SMALL)
+    return Recipe(work.document, work.loaded, scene, SMALL)
 
 
 def plain(work: Workspace) -> tl.Scene:
@@ -77,13 +76,13 @@ def test_a_stage_comes_after_the_first_picture_and_stays(staged: Workspace, tmp_
     first = staged.scene()
     assert first is not None
     assert (staged.document.material.ior, tone_of(staged.document.look, first)) == (1.5, "neutral")
-    for action in (Turn(30.0, 5.0), ChoosePreset("merlot"), Change("material.ior", 1.4)):
+    for action in (Turn(30.0, 5.0), ChoosePreset("merlot"), SetField("material.ior", 1.4)):
         staged.do(action)
         scene = staged.scene()
         assert scene is not None
         assert scene.objects[-1] is first.objects[-1], "the ground is the same one"
         assert (scene.lights, scene.environment) == (first.lights, first.environment)
-    staged.do(Change("look.stage", "none"))
+    staged.do(SetField("look.stage", "none"))
     assert not on_stage(staged.scene())  # type: ignore[arg-type]
     staged.undo()
     assert on_stage(staged.scene())  # type: ignore[arg-type]
@@ -94,7 +93,7 @@ def test_a_stage_comes_after_the_first_picture_and_stays(staged: Workspace, tmp_
 
 @pytest.mark.parametrize(("field", "value"), [("display.mode", "thickness"), ("display.compare", "error")])
 def test_quantities_are_those_of_the_model_alone(staged: Workspace, field: str, value: str) -> None:
-    staged.do(Change(field, value))
+    staged.do(SetField(field, value))
     scene = staged.scene()
     assert scene is not None
     assert not on_stage(scene)
@@ -115,25 +114,25 @@ def test_auto_is_what_render_takes(staged: Workspace) -> None:
 
 
 def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(timing, "STRIDES", (1, 1, 1))  # parts of a picture see the ground's texture more blurred
-    stage = Stage()
-    staged.do(Change("display.antialias", False))
-    finish(stage, staged)
+    monkeypatch.setattr(quality, "STRIDES", (1, 1, 1))  # parts of a picture see the ground's texture more blurred
+    view = ViewportRenderer()
+    staged.do(SetField("display.antialias", False))
+    finish(view, staged)
     scene = staged.scene()
     assert scene is not None
-    with stage.current():
-        frame = stage.renderer.render(scene, SIZE)
-    assert np.abs(pixels(stage) - frame.to_srgb8(0.0, "neutral").astype(int)).max() <= 1
+    with view.current():
+        frame = view.renderer.render(scene, SIZE)
+    assert np.abs(pixels(view) - frame.to_srgb8(0.0, "neutral").astype(int)).max() <= 1
     staged.do(Turn(20.0, 0.0))
-    stage.draw(staged, SIZE)
-    assert stage.simpler
-    assert stage._moving is not None
-    assert stage._moving.shadows.directions == 8
-    assert stage.state.startswith("moving")
-    staged.do(Change("look.rotation", 20.0))  # which takes new maps
-    stage.draw(staged, SIZE)
-    assert stage._moving.shadows.directions == 4
-    stage.close()
+    view.draw(staged, SIZE)
+    assert view.simpler
+    assert view._moving is not None
+    assert view._moving.shadows.directions == 8
+    assert view.state.startswith("moving")
+    staged.do(SetField("look.rotation", 20.0))  # which takes new maps
+    view.draw(staged, SIZE)
+    assert view._moving.shadows.directions == 4
+    view.close()
 
 
 def test_maps_that_take_several_frames_are_those_of_one(staged: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -222,7 +221,7 @@ def assert_alike(scene: tl.Scene, expected: tl.Scene) -> None:
 
 @pytest.mark.usefixtures("told_only")
 def test_recipes_make_the_same_picture(staged: Workspace, capsys: pytest.CaptureFixture[str]) -> None:
-    for action in (Turn(40.0, 5.0), Change("look.rotation", 30.0), Change("look.exposure", 0.5)):
+    for action in (Turn(40.0, 5.0), SetField("look.rotation", 30.0), SetField("look.exposure", 0.5)):
         staged.do(action)
     told = shot(staged)
     command, left_out = command_line(told)
@@ -243,7 +242,7 @@ def test_what_no_option_says_is_told_and_python_says_it(staged: Workspace) -> No
     changes = {"look.stage": "none", "material.ior": 1.3, "material.color": [0.2, 0.5, 0.6], "material.dispersion": 0.5}
     changes |= {"look.light": True, "orbit.orthographic": True, "look.background": "#204060"}
     for name, value in changes.items():
-        staged.do(Change(name, value))
+        staged.do(SetField(name, value))
     told = shot(staged)
     _, left_out = command_line(told)
     assert left_out == ["the index of refraction", "dispersion", "the orthographic camera", "the directional light"]
@@ -253,11 +252,11 @@ def test_what_no_option_says_is_told_and_python_says_it(staged: Workspace) -> No
 
 def test_the_last_stage_is_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    assert preferences.read_stage() == AUTO
-    preferences.write_stage("night")
-    assert preferences.read_stage() == "night"
+    assert session.read_stage() == AUTO
+    session.write_stage("night")
+    assert session.read_stage() == "night"
     (tmp_path / "translucent" / "stage.txt").write_text("moon")
-    assert preferences.read_stage() == AUTO
+    assert session.read_stage() == AUTO
 
 
 @pytest.mark.parametrize(

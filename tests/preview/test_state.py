@@ -13,16 +13,27 @@ import translucent as tl
 from translucent.cli import main
 from translucent.geometry.solids import Box
 from translucent.planning.plan import plan
-from translucent.preview import loading, numbers, orbiting
-from translucent.preview.actions import Change, ChoosePreset, Open, Pan, SetOrbit, Turn, Zoom, apply
+from translucent.preview import document as orbiting
+from translucent.preview import scenes
+from translucent.preview.actions import (
+    MAX_STEPS,
+    ChoosePreset,
+    History,
+    Open,
+    Pan,
+    SetField,
+    SetOrbit,
+    Turn,
+    Zoom,
+    apply,
+)
 from translucent.preview.document import RANGES, Document, Material, Model, Orbit
-from translucent.preview.history import MAX_STEPS, History
-from translucent.preview.loaded import Loaded
-from translucent.preview.scenes import material_of, medium_of, scattering_of, scene_of
+from translucent.preview.panels import material as numbers
+from translucent.preview.quality import FrameBudget, StepTimes
+from translucent.preview.scenes import Loaded, material_of, medium_of, scattering_of, scene_of
 from translucent.preview.script import read_script
 from translucent.preview.session import load_session, save_session
 from translucent.preview.tasks import Task
-from translucent.preview.timing import FrameBudget, Pace
 from translucent.scene.showcase import framing, showcase
 
 ORBIT = Orbit((0.1, 0.2, 0.3), 40.0, 20.0, 2.0)
@@ -30,7 +41,7 @@ ORBIT = Orbit((0.1, 0.2, 0.3), 40.0, 20.0, 2.0)
 
 def test_a_change_makes_a_new_document_and_leaves_the_old_one() -> None:
     before = Document()
-    after = apply(before, Change("material.roughness", 0.25))
+    after = apply(before, SetField("material.roughness", 0.25))
     assert (before.material.roughness, after.material.roughness) == (0.0, 0.25)
 
 
@@ -50,7 +61,7 @@ def test_a_change_makes_a_new_document_and_leaves_the_old_one() -> None:
 )
 def test_a_bad_value_is_refused(field: str, value: object, message: str) -> None:
     with pytest.raises(tl.InputError, match=message):
-        apply(Document(), Change(field, value))
+        apply(Document(), SetField(field, value))
 
 
 def test_every_range_is_of_a_field() -> None:
@@ -63,9 +74,9 @@ def test_every_range_is_of_a_field() -> None:
 def test_a_drag_is_one_step_of_undo() -> None:
     history = History()
     for value in (0.1, 0.2, 0.3):
-        history = history.done(Change("material.roughness", value, drag=1))
-    history = history.done(Change("material.roughness", 0.9, drag=2))
-    history = history.done(Change("material.transmission", 0.4, drag=2))
+        history = history.done(SetField("material.roughness", value, drag=1))
+    history = history.done(SetField("material.roughness", 0.9, drag=2))
+    history = history.done(SetField("material.transmission", 0.4, drag=2))
     assert [step.material.roughness for step in history.past] == [0.0, 0.3, 0.9]
     back = history.undone().undone()
     assert back.present.material.roughness == 0.3
@@ -74,14 +85,14 @@ def test_a_drag_is_one_step_of_undo() -> None:
 
 
 def test_a_drag_after_undo_is_a_step_of_its_own() -> None:
-    history = History().done(Change("material.roughness", 0.1, drag=1)).undone()
-    history = history.done(Change("material.roughness", 0.2, drag=1))
+    history = History().done(SetField("material.roughness", 0.1, drag=1)).undone()
+    history = history.done(SetField("material.roughness", 0.2, drag=1))
     assert len(history.past) == 1
     assert history.future == ()
 
 
 def test_undo_leaves_the_camera_where_it_is() -> None:
-    history = History(dataclasses.replace(Document(), orbit=ORBIT)).done(Change("look.exposure", 1.0))
+    history = History(dataclasses.replace(Document(), orbit=ORBIT)).done(SetField("look.exposure", 1.0))
     turned = history.done(Turn(30.0, 0.0))
     assert len(turned.past) == 1
     assert turned.undone().present.orbit == turned.present.orbit != ORBIT
@@ -90,7 +101,7 @@ def test_undo_leaves_the_camera_where_it_is() -> None:
 def test_history_has_an_end() -> None:
     history = History()
     for i in range(MAX_STEPS + 20):
-        history = history.done(Change("look.exposure", float(i % 7)))
+        history = history.done(SetField("look.exposure", float(i % 7)))
     assert len(history.past) == MAX_STEPS
 
 
@@ -98,8 +109,8 @@ def test_a_session_comes_back_to_the_last_digit(tmp_path: Path) -> None:
     drawn = random.Random(3)
     document = dataclasses.replace(apply(Document(), ChoosePreset("skim milk")), orbit=ORBIT)
     for name in ("material.distance", "material.roughness", "look.exposure", "orbit.yaw", "display.split"):
-        document = apply(document, Change(name, drawn.random()))
-    document = apply(document, Change("material.color", [drawn.random() for _ in range(3)]))
+        document = apply(document, SetField(name, drawn.random()))
+    document = apply(document, SetField("material.color", [drawn.random() for _ in range(3)]))
     save_session(tmp_path / "a.toml", document)
     assert load_session(tmp_path / "a.toml") == document
 
@@ -142,8 +153,8 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> list[list[st
 
 
 def test_the_numbers_are_those_that_extinction_prints(capsys: pytest.CaptureFixture[str]) -> None:
-    document = apply(Document(), Change("material.color", numbers.from_display([0x7B / 255, 0x1E / 255, 0x3A / 255])))
-    document = apply(document, Change("material.distance", 0.01))
+    document = apply(Document(), SetField("material.color", numbers.from_display([0x7B / 255, 0x1E / 255, 0x3A / 255])))
+    document = apply(document, SetField("material.distance", 0.01))
     merlot = apply(Document(), ChoosePreset("merlot"))
     for shown, arguments in ((document, ("#7b1e3a", "1cm")), (merlot, ("--preset", "merlot"))):
         lines = [f"{label} {text}".split() for label, text in numbers.extinction_lines(shown.material)]
@@ -159,7 +170,7 @@ def test_color_fields_hold_eight_bits_and_are_never_black() -> None:
 def test_a_preset_is_the_medium_that_it_names() -> None:
     material = apply(Document(), ChoosePreset("Marble")).material
     assert medium_of(material) == tl.preset("marble").medium
-    edited = apply(apply(Document(), ChoosePreset("Marble")), Change("material.scattering", [0.0, 0.0, 0.0])).material
+    edited = apply(apply(Document(), ChoosePreset("Marble")), SetField("material.scattering", [0.0, 0.0, 0.0])).material
     assert (edited.source, edited.preset) == ("coefficients", "")
 
 
@@ -175,11 +186,11 @@ def test_sessions_with_the_former_switch_of_the_material_are_read(tmp_path: Path
 
 
 def test_the_way_of_scattering_is_one_of_those_of_the_planner() -> None:
-    chosen = apply(Document(), Change("display.scattering", "layer"))
+    chosen = apply(Document(), SetField("display.scattering", "layer"))
     assert scattering_of(chosen.display.scattering) == tl.ScatteringLayer()
     assert scattering_of(Document().display.scattering) is None
     with pytest.raises(tl.InputError, match="use auto, diffusion, layer, single"):
-        apply(Document(), Change("display.scattering", "many"))
+        apply(Document(), SetField("display.scattering", "many"))
 
 
 def test_the_material_of_a_model_is_its_medium() -> None:
@@ -190,7 +201,7 @@ def test_the_material_of_a_model_is_its_medium() -> None:
 
 
 def test_a_scene_brings_its_own_material_and_a_mesh_leaves_it() -> None:
-    red = apply(Document(), Change("material.color", [0.9, 0.1, 0.1]))
+    red = apply(Document(), SetField("material.color", [0.9, 0.1, 0.1]))
     assert apply(red, Open("other.ply")).material == red.material
     assert apply(red, Open("other.glb")).material == Material()
 
@@ -229,7 +240,7 @@ def test_pan_moves_the_picture_with_the_mouse() -> None:
 
 def test_orthographic_and_perspective_show_the_target_alike() -> None:
     document = dataclasses.replace(Document(), orbit=ORBIT)
-    flat = apply(document, Change("orbit.orthographic", True)).orbit
+    flat = apply(document, SetField("orbit.orthographic", True)).orbit
     assert flat is not None
     assert orbiting.camera_of(flat).height == pytest.approx(orbiting.height_at_target(ORBIT))
 
@@ -250,7 +261,7 @@ def test_a_film_and_a_coat_reach_the_scene_and_come_back_from_it() -> None:
     document = dataclasses.replace(Document(), orbit=ORBIT)
     values = {"iridescence": 1.0, "iridescence_thickness": 3e-7, "clearcoat": 0.5, "clearcoat_roughness": 0.2}
     for name, value in values.items():
-        document = apply(document, Change(f"material.{name}", value))
+        document = apply(document, SetField(f"material.{name}", value))
     scene = scene_of(document, loaded)
     surface = scene.objects[0].surface
     assert surface is not None
@@ -264,7 +275,7 @@ def test_what_nobody_has_timed_yet_is_drawn_coarsely_and_traced_rays_most_of_all
     factors = {}
     for name, ior in (("clear", 1.0), ("glass", 1.5)):
         scene = showcase(Box().tessellate(), tl.Medium(5.0, ior=ior), stage="none")
-        pace, found = Pace(), plan(scene)
+        pace, found = StepTimes(), plan(scene)
         factors[name] = [pace.stride(found, 0.045)]
         for seconds in (5.0, 4.0, 0.01):  # steps of 8 x 8 take 78 ms, 62 ms
             pace.note(found, seconds)
@@ -280,14 +291,14 @@ def test_another_process_reads_models_beside_a_picture(
 ) -> None:
     path = tmp_path / "model.glb"
     path.write_bytes(bytes(size))
-    monkeypatch.setattr(loading, "load", lambda *_: "here")
+    monkeypatch.setattr(scenes, "load", lambda *_: "here")
 
     class Elsewhere:
         def call(self, *_: object, **__: object) -> tuple[str, list[object]]:
             return "there", []
 
     task = Task("opening", lambda _: None, lambda _: None)
-    assert loading.load_with(task, Elsewhere(), Model(str(path)), pictured=pictured) == read  # type: ignore[arg-type]
+    assert scenes.load_with(task, Elsewhere(), Model(str(path)), pictured=pictured) == read  # type: ignore[arg-type]
 
 
 def test_drawing_has_less_time_where_the_rest_of_the_window_takes_long() -> None:

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from translucent.preview.preparations import relights
-from translucent.preview.stage import Stage
-from translucent.preview.workspace import Workspace
+from translucent.preview.viewport_renderer import ViewportRenderer
+from translucent.preview.workspace import Workspace, relights
 
 SIZE = (160, 96)
 
@@ -32,18 +31,18 @@ def wait(work: Workspace, done: Callable[[], object], seconds: float = 60.0) -> 
         time.sleep(0.002)
 
 
-def finish(stage: Stage, work: Workspace) -> None:
+def finish(view: ViewportRenderer, work: Workspace) -> None:
     """Draw until nothing is left to draw, or to be compiled or solved for it."""
     end = time.monotonic() + 60.0
     lanes = work.compiler.lane, work.lanes["diffuse"], work.lanes["trace"]
-    while stage.draw(work, SIZE) | (busy := relights(work) or any(lane.task is not None for lane in lanes)):
+    while view.draw(work, SIZE) | (busy := relights(work) or any(lane.task is not None for lane in lanes)):
         assert time.monotonic() < end, "the picture is never done"
         work.update()
         if busy:
             time.sleep(0.01)  # a stage that waits for a lane returns at once: turning round, it would slow the lane
 
 
-def pixels(stage: Stage) -> np.ndarray:
+def pixels(view: ViewportRenderer) -> np.ndarray:
     """The picture on show."""
-    with stage.current():
-        return stage.viewport.pixels().astype(int)
+    with view.current():
+        return view.viewport.pixels().astype(int)

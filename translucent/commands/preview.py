@@ -48,9 +48,8 @@ def preview(
     """
     from translucent.preview.app import leave, require_display, run
     from translucent.preview.document import AUTO, Document, Look, Model
-    from translucent.preview.preferences import read_stage
     from translucent.preview.script import Script, read_script
-    from translucent.preview.session import load_session
+    from translucent.preview.session import load_session, read_stage
     from translucent.preview.tasks import problem
     from translucent.scene.stages import stage_named
 

@@ -60,7 +60,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Probe:
+class PixelProbe:
     """Values of one pixel.
 
     Attributes
@@ -301,7 +301,7 @@ class Viewport:
             self._variants[key] = program, self._gl.vertex_array(program, [])
         return self._variants[key]
 
-    def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
+    def probe(self, x: int, y: int, side: int = 0) -> PixelProbe | None:
         """Values of a pixel, counted from the top left; None if it is outside, or nothing is drawn yet."""
         found = self._sides[side]
         if found is None or not found.step or not (0 <= x < self.size[0] and 0 <= y < self.size[1]):
@@ -311,7 +311,7 @@ class Viewport:
         depths = np.frombuffer(found.all.read(where, 4, attachment=1, dtype="f4"), np.float32).astype(np.float64)
         flags = int(np.frombuffer(found.all.read(where, 1, attachment=2, dtype="f4"), np.float32)[0])
         red, green, blue, thickness = depths.tolist()
-        return Probe(thickness, (red, green, blue), bool(flags & 1), bool(flags & 2))
+        return PixelProbe(thickness, (red, green, blue), bool(flags & 1), bool(flags & 2))
 
     def pixels(self) -> npt.NDArray[np.uint8]:
         """(h, w, 3): the texture, read back."""

@@ -1,4 +1,4 @@
-"""Actions of a user on a document: small values, and the pure function that applies them."""
+"""Actions of a user on a document, and the history that undoes them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
 from translucent.media.medium import MAX_COEFFICIENT, Medium, color_at
 from translucent.media.presets import preset
-from translucent.preview import orbiting
+from translucent.preview import document as orbiting
 from translucent.preview.document import Assigned, Document, Material, Model, Orbit, checked
 
 
 @dataclass(frozen=True)
-class Change:
+class SetField:
     """Action: give a field, such as ``material.roughness``, a value. Changes of one `drag` are one step of undo."""
 
     field: str
@@ -103,7 +103,7 @@ class Zoom:
     down: float = 0.0
 
 
-Action = Change | Open | ChoosePreset | Assign | Hide | Adopt | Replace | SetOrbit | Turn | Pan | Zoom
+Action = SetField | Open | ChoosePreset | Assign | Hide | Adopt | Replace | SetOrbit | Turn | Pan | Zoom
 
 #: Actions that move the camera: they are no undo steps, and undo leaves the camera where it is.
 CAMERA_ACTIONS = (SetOrbit, Turn, Pan, Zoom)
@@ -123,7 +123,7 @@ def apply(document: Document, action: Action) -> Document:
         If there is no such field or preset, or a value is out of its range; the document is as it was.
     """
     match action:
-        case Change():
+        case SetField():
             return _changed(document, action)
         case Open():
             return _opened(document, action)
@@ -155,7 +155,7 @@ def _moved(orbit: Orbit, action: Turn | Pan | Zoom) -> Orbit:
             return orbiting.zoomed(orbit, action.factor, (action.right, action.down))
 
 
-def _changed(document: Document, action: Change) -> Document:
+def _changed(document: Document, action: SetField) -> Document:
     section, _, name = action.field.partition(".")
     owner = getattr(document, section, None) if section in document.__dataclass_fields__ else None
     if owner is None or name not in owner.__dataclass_fields__ or action.field == "model.path":
@@ -238,3 +238,58 @@ def _stated(material: Material) -> Material:
     color, distance = color_at(medium, None if medium.extinction.any() else 1.0)
     red, green, blue = np.asarray(color).tolist()
     return dataclasses.replace(material, color=(red, green, blue), distance=float(distance))
+
+
+#: Largest number of steps that can be undone.
+MAX_STEPS = 200
+
+
+@dataclass(frozen=True)
+class History:
+    """History of a document: its past and undone states.
+
+    Attributes
+    ----------
+    present : Document
+    past, future : tuple of Document
+        The last of `past` is what undo shows, the last of `future` what redo shows.
+    drag : tuple of (str, int), optional
+        Field, or object, and number of the drag that made the present one.
+    """
+
+    present: Document = dataclasses.field(default_factory=Document)
+    past: tuple[Document, ...] = ()
+    future: tuple[Document, ...] = ()
+    drag: tuple[str, int] | None = None
+
+    def done(self, action: Action) -> History:
+        """History after an action; one that changes nothing leaves no step, and a drag leaves one."""
+        after = apply(self.present, action)
+        if isinstance(action, (*CAMERA_ACTIONS, Adopt)):
+            return dataclasses.replace(self, present=after)
+        if after == self.present:
+            return self
+        drag = None
+        if isinstance(action, (SetField, Assign)) and action.drag is not None:
+            drag = action.field if isinstance(action, SetField) else f"object {action.object}", action.drag
+        if drag is not None and drag == self.drag:
+            return dataclasses.replace(self, present=after, future=())
+        return History(after, (*self.past, self.present)[-MAX_STEPS:], (), drag)
+
+    def undone(self) -> History:
+        """History one step back; the camera stays, unless the model is another."""
+        if not self.past:
+            return self
+        before = _seen_as(self.present, self.past[-1])
+        return History(before, self.past[:-1], (*self.future, self.present))
+
+    def redone(self) -> History:
+        """History one step forward."""
+        if not self.future:
+            return self
+        after = _seen_as(self.present, self.future[-1])
+        return History(after, (*self.past, self.present), self.future[:-1])
+
+
+def _seen_as(present: Document, other: Document) -> Document:
+    return dataclasses.replace(other, orbit=present.orbit) if other.model == present.model else other

@@ -141,7 +141,7 @@ class _Window:
         self.work = Workspace(document, allow_outside)
         self.script = script
         self.failure: BaseException | None = None
-        self.desk: Any = None
+        self.state: Any = None
         self._drops: object = None
 
     @property
@@ -209,13 +209,11 @@ class _Window:
         """Docking layout: panels on both sides, with a share of the width that they have in a narrow window."""
         from imgui_bundle import hello_imgui, imgui
 
-        from translucent.preview.panels.environments import environments_panel
-        from translucent.preview.panels.library import library_panel
-        from translucent.preview.panels.look import files_panel, look_panel
-        from translucent.preview.panels.material import material_panel
-        from translucent.preview.panels.messages import messages_panel
-        from translucent.preview.panels.method import method_panel
-        from translucent.preview.panels.tree import scene_panel
+        from translucent.preview.panels.files import files_panel
+        from translucent.preview.panels.look import environments_panel, look_panel
+        from translucent.preview.panels.material import library_panel, material_panel
+        from translucent.preview.panels.method import messages_panel, method_panel
+        from translucent.preview.panels.scene import scene_panel
         from translucent.preview.panels.viewport import viewport_panel
 
         docking = hello_imgui.DockingParams()
@@ -250,13 +248,13 @@ class _Window:
     def _show(self, panel: Callable[[Any], None]) -> None:
         from imgui_bundle import ImVec2, imgui
 
-        if self.desk is None:
+        if self.state is None:
             return
         if not imgui.is_window_docked():  # windows have no background of their own, see _style
             low, size = imgui.get_window_pos(), imgui.get_window_size()
             color = imgui.get_color_u32(imgui.ImVec4(*BACKGROUND))
             imgui.get_window_draw_list().add_rect_filled(low, ImVec2(low.x + size.x, low.y + size.y), color)
-        panel(self.desk)
+        panel(self.state)
 
     def _style(self) -> None:
         """Style of the window, without panel backgrounds: on a software rasterizer they took most of a frame's time."""
@@ -274,76 +272,76 @@ class _Window:
         from imgui_bundle import implot
 
         from translucent.gpu.context import open_context
-        from translucent.preview.desk import Desk
         from translucent.preview.dialogs import accept_drops
-        from translucent.preview.preferences import read_environments, read_folders, read_recent
-        from translucent.preview.stage import Stage
+        from translucent.preview.session import read_environments, read_folders, read_recent
+        from translucent.preview.viewport_renderer import ViewportRenderer
+        from translucent.preview.window_state import WindowState
 
         implot.create_context()
-        self.desk = Desk(self.work, Stage(open_context("window").gl, self.work.compiler))
+        self.state = WindowState(self.work, ViewportRenderer(open_context("window").gl, self.work.compiler))
         self._drops = accept_drops(self._dropped)
         if self.remembers:
             self.work.recent = read_recent()
-            self.desk.folders = read_folders()
-            self.desk.environments.take(read_environments())
+            self.state.folders = read_folders()
+            self.state.environments.take(read_environments())
 
     def _dropped(self, paths: list[str]) -> None:
-        from translucent.preview.drops import take_dropped
+        from translucent.preview.panels.files import take_dropped
 
-        if self.desk is not None:
-            self._guarded(lambda: take_dropped(self.desk, paths))()
+        if self.state is not None:
+            self._guarded(lambda: take_dropped(self.state, paths))()
 
     def _closed(self) -> None:
         from imgui_bundle import implot
 
-        from translucent.preview.preferences import write_environments, write_folders, write_recent, write_stage
+        from translucent.preview.session import write_environments, write_folders, write_recent, write_stage
 
-        if self.remembers and self.desk is not None:
-            write_folders(self.desk.folders)
-            write_environments(self.desk.environments.path)
+        if self.remembers and self.state is not None:
+            write_folders(self.state.folders)
+            write_environments(self.state.environments.path)
         if self.remembers:
             write_recent(self.work.recent)
             write_stage(self.work.document.look.stage)
-        if self.desk is not None:
-            self.desk.stage.close()
-            self.desk = None
+        if self.state is not None:
+            self.state.view.close()
+            self.state = None
             implot.destroy_context()
 
     def _step(self) -> None:
         from imgui_bundle import hello_imgui
 
-        from translucent.preview.answers import take_answers
+        from translucent.preview.panels.files import take_answers
 
-        if self.desk is None:
+        if self.state is None:
             return
-        take_answers(self.desk)
+        take_answers(self.state)
         if self.work.loaded is None:
             time.sleep(READING)
         idling = hello_imgui.get_runner_params().fps_idling
-        idling.enable_idling = self.desk.waits and self.script is None
-        idling.fps_idle = WAITING_FPS if self.desk.more else IDLE_FPS
-        if self.script is not None and self.script.step(self.desk):
-            for text in filter(None, (self.desk.stage.problem, self.desk.stage.shader_problem)):
+        idling.enable_idling = self.state.waits and self.script is None
+        idling.fps_idle = WAITING_FPS if self.state.more else IDLE_FPS
+        if self.script is not None and self.script.step(self.state):
+            for text in filter(None, (self.state.view.problem, self.state.view.shader_problem)):
                 self.work.refuse(RenderError("the picture is not what it should be", text))
             hello_imgui.get_runner_params().app_shall_exit = True
 
     def _menus(self) -> None:
-        from translucent.preview.menus import menus
+        from translucent.preview.panels.menus import menus
 
-        if self.desk is not None:
-            menus(self.desk)
+        if self.state is not None:
+            menus(self.state)
 
     def _popups(self) -> None:
-        from translucent.preview.panels.browser import file_browser
-        from translucent.preview.panels.keys import handle_keys, keys_page
+        from translucent.preview.panels.files import file_browser
+        from translucent.preview.panels.menus import handle_keys, keys_page
 
-        if self.desk is not None:
-            handle_keys(self.desk)
-            file_browser(self.desk)
-            keys_page(self.desk)
+        if self.state is not None:
+            handle_keys(self.state)
+            file_browser(self.state)
+            keys_page(self.state)
 
     def _status(self) -> None:
-        from translucent.preview.menus import status
+        from translucent.preview.panels.menus import status
 
-        if self.desk is not None:
-            status(self.desk)
+        if self.state is not None:
+            status(self.state)

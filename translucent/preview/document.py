@@ -4,22 +4,29 @@ window.
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.tone import TONES
 from translucent.media.medium import MAX_COEFFICIENT, MAX_EMISSION, MAX_IOR
 from translucent.planning.methods import METHODS
 from translucent.planning.scattering import SCATTERINGS
-from translucent.scene.camera import MAX_COORDINATE
+from translucent.scene.camera import MAX_COORDINATE, Camera
 from translucent.scene.environment import MAX_EXPOSURE
 from translucent.scene.lights import MAX_RADIANCE
-from translucent.scene.showcase import DEFAULT_COLOR
-from translucent.scene.stages import NO_STAGE, STAGES
+from translucent.scene.scene import Object
+from translucent.scene.showcase import DEFAULT_COLOR, framing
+from translucent.scene.stages import NO_STAGE, STAGES, world_vertices
 from translucent.scene.surface import MAX_DISPERSION, MAX_FILM
-from translucent.units import METRES_PER_UNIT
+from translucent.units import METRES_PER_UNIT, metres_per_unit
 
 Triple = tuple[float, float, float]
 Source = Literal["file", "color", "preset", "coefficients"]
@@ -359,3 +366,216 @@ def _number(name: str, value: Any, range_: _Range) -> float:
         least = f"above {range_.low:g}" if range_.above else f"at least {range_.low:g}"
         raise InputError(f"{name} = {value:g}", "out of its range", f"give {least} and at most {range_.high:g}")
     return float(value)
+
+
+#: Factor by which an orthographic camera stands farther back, so that a model around the target is before it.
+_STEP_BACK = 4.0
+
+#: Smallest and largest distance of zooming, in metres.
+_NEAREST, _FARTHEST = 1e-9, 1e12
+
+
+def towards_camera(orbit: Orbit) -> Array:
+    """(3,): unit vector from the target to the camera."""
+    yaw, pitch = math.radians(orbit.yaw), math.radians(orbit.pitch)
+    return np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
+
+
+def camera_of(orbit: Orbit) -> Camera:
+    """Camera of an orbit."""
+    target = np.asarray(orbit.target)
+    if orbit.orthographic:
+        eye = target + _STEP_BACK * orbit.distance * towards_camera(orbit)
+        return Camera.orthographic(eye, target, height=height_at_target(orbit))
+    return Camera.look_at(target + orbit.distance * towards_camera(orbit), target, fov_y=orbit.fov_y)
+
+
+def height_at_target(orbit: Orbit) -> float:
+    """Height of the picture at the target in metres."""
+    return 2.0 * orbit.distance * math.tan(math.radians(orbit.fov_y) / 2)
+
+
+def turned(orbit: Orbit, right: float, up: float) -> Orbit:
+    """Turn the camera to the right and upwards around the target, by degrees."""
+    pitch = min(max(orbit.pitch + up, -MAX_PITCH), MAX_PITCH)
+    return dataclasses.replace(orbit, yaw=math.remainder(orbit.yaw + right, 360.0), pitch=pitch)
+
+
+def panned(orbit: Orbit, right: float, down: float) -> Orbit:
+    """Pan the picture to the right and down, by shares of its height."""
+    camera = camera_of(orbit)
+    step = height_at_target(orbit) * (down * camera.up - right * camera.right)
+    target = np.clip(np.asarray(orbit.target) + step, -MAX_COORDINATE, MAX_COORDINATE)
+    return dataclasses.replace(orbit, target=tuple(target.tolist()))
+
+
+def zoomed(orbit: Orbit, factor: float, at: tuple[float, float] = (0.0, 0.0)) -> Orbit:
+    """Zoom by a factor; what is in the target's plane at `at` (heights right and down of the center) stays there."""
+    distance = min(max(orbit.distance / factor, _NEAREST), _FARTHEST)
+    camera = camera_of(orbit)
+    shift = height_at_target(orbit) * (1.0 - distance / orbit.distance)
+    target = np.asarray(orbit.target) + shift * (at[0] * camera.right - at[1] * camera.up)
+    target = np.clip(target, -MAX_COORDINATE, MAX_COORDINATE)
+    return dataclasses.replace(orbit, target=tuple(target.tolist()), distance=distance)
+
+
+def framed(orbit: Orbit | None, objects: Sequence[Object], size: tuple[int, int]) -> Orbit:
+    """Orbit that frames all of the objects, from the same side as before."""
+    side = orbit or Orbit(yaw=math.degrees(math.atan2(0.45, 1.0)), pitch=math.degrees(math.atan2(0.35, 1.097)))
+    corners = np.concatenate([world_vertices(item) for item in objects]) if orbit else None
+    if corners is None:
+        camera = framing(objects, size, fov_y=side.fov_y)  # as translucent render frames it
+    else:
+        camera = Camera.framing(corners, size, direction=-towards_camera(side), fov_y=side.fov_y)
+    center = np.mean([item.bounds.mean(axis=0) for item in objects], axis=0)
+    return dataclasses.replace(orbit_of(camera, center), orthographic=side.orthographic)
+
+
+def orbit_of(camera: Camera, center: npt.ArrayLike) -> Orbit:
+    """Orbit with the view of a camera, without its roll, around the point of its axis nearest to `center`."""
+    axis = -camera.forward
+    offset = np.asarray(center, dtype=np.float64) - camera.eye
+    distance = max(float(offset @ camera.forward), 1e-3 * float(np.linalg.norm(offset)), _NEAREST)
+    target = camera.eye + distance * camera.forward
+    pitch = math.degrees(math.asin(min(max(float(axis[1]), -1.0), 1.0)))
+    yaw = math.degrees(math.atan2(axis[0], axis[2]))
+    fov = camera.fov_y if camera.fov_y is not None else 30.0
+    if camera.height is not None:
+        distance = camera.height / (2.0 * math.tan(math.radians(fov) / 2))
+    return Orbit(
+        tuple(target.tolist()), yaw, min(max(pitch, -MAX_PITCH), MAX_PITCH), distance, fov, camera.fov_y is None
+    )
+
+
+#: Texts by field.
+TIPS = {
+    "model.unit": "Unit of the file's coordinates. glTF is in metres; most .stl are in mm.",
+    "material.color": (
+        "attenuationColor (glTF): linear color that is left of white light after attenuationDistance.\n"
+        "Never black: what is left after the distance is more than nothing."
+    ),
+    "material.distance": (
+        "attenuationDistance (glTF): length after which attenuationColor is left.\n"
+        "Typical: wine 1 cm, honey 2 cm, water 5 m. Twice as long: half the extinction."
+    ),
+    "material.thickness": (
+        "thicknessFactor (glTF), in metres: written to files, and the sheet of thin layers.\n"
+        "Typical: 0.001 for a leaf or a bottle's wall. The picture uses the mesh's own thickness."
+    ),
+    "material.ior": (
+        "ior (glTF), index of refraction, no unit; 1: light goes straight on.\n"
+        "Typical: water 1.33, wine 1.36, wax 1.44, glass 1.5, crystal 1.55, diamond 2.42."
+    ),
+    "material.roughness": (
+        "roughnessFactor (glTF), 0 to 1, no unit: how much the surface blurs what it mirrors and lets "
+        "through. Typical: polished 0, soap 0.3, frosted glass 0.4, wax 0.35."
+    ),
+    "material.transmission": (
+        "transmissionFactor (glTF), 0 to 1: share of the light that is not mirrored which enters.\n"
+        "Typical: 1; the rest is an opaque, diffuse base."
+    ),
+    "material.dispersion": (
+        "dispersion (glTF), 20 / Abbe number, no unit: how far colors part when they are refracted.\n"
+        "Typical: crown glass 0.3, flint glass 0.55, diamond 0.36; 0: none."
+    ),
+    "material.iridescence": (
+        "iridescenceFactor (glTF), 0 to 1, no unit: share of the surface with a thin film, whose interference\n"
+        "colors what is mirrored. Typical: 0 none; soap bubbles, oil on water and coated glass 1."
+    ),
+    "material.iridescence_ior": (
+        "iridescenceIor (glTF): index of refraction of the film, no unit. Typical: soapy water 1.33, oxides 2 to 2.7."
+    ),
+    "material.iridescence_thickness": (
+        "iridescenceThicknessMaximum (glTF), in nm: thickness of the film, which sets its colors.\n"
+        "Typical: 100 to 1000; below 50 it darkens what is mirrored, above 2000 its colors fade."
+    ),
+    "material.clearcoat": (
+        "clearcoatFactor (glTF), 0 to 1, no unit: share of the surface with a clear coat of ior 1.5, which\n"
+        "mirrors light from outside. Typical: 0 none; lacquer and glaze 1."
+    ),
+    "material.clearcoat_roughness": (
+        "clearcoatRoughnessFactor (glTF), 0 to 1, no unit: how much the coat blurs what it mirrors.\n"
+        "Typical: fresh lacquer 0, satin 0.3."
+    ),
+    "material.absorption": (
+        "sigma_a in 1/m, for red, green and blue: light that is lost. Typical: water 0.3, wine 100."
+    ),
+    "material.scattering": (
+        "sigma_s in 1/m (multiscatterColor of glTF's drafts): light that changes direction.\n"
+        "Typical: clear 0, jade 200, milk 1000 and more."
+    ),
+    "material.emission": "Radiance that the medium adds, per metre of the ray. Typical: 0; a flame 1 to 100.",
+    "material.anisotropy": (
+        "g (scatterAnisotropy of glTF's drafts), -0.99 to 0.99: mean cosine of the angle of scattering.\n"
+        "Typical: 0 isotropic, 0.8 milk and skin (forward), -0.3 backward."
+    ),
+    "look.stage": (
+        "A ground that catches shadows, lamps and soft boxes, as --stage of translucent render; auto: studio,"
+        " unless the model brings a camera, lights or a ground, or an environment is chosen. Quantities and "
+        "the reference go without."
+    ),
+    "look.environment": (
+        "What lights the model from all directions: a name, a color, or a picture (.hdr, .exr, .png)."
+    ),
+    "look.background": "What is seen behind the model; it does not light. Typical: the environment itself.",
+    "look.rotation": "Turn of the environment about +Y in degrees; of a stage with its lamps. Or drag with E held.",
+    "look.exposure": (
+        "Brightness of the picture in stops: 1 is twice as bright. Typical: -2 to 2. Light stays as it is."
+    ),
+    "look.tone": (
+        "Curve from light to the screen; auto: neutral on a stage, where light sources are brighter than "
+        "white, else none."
+    ),
+    "look.light": (
+        "A directional light besides, seen in media that scatter, and on opaque objects. Or drag with L held."
+    ),
+    "look.light_yaw": (
+        "Direction of the light around the model in degrees: 0 from the front, 90 from +X, 180 from behind."
+    ),
+    "look.light_pitch": "Direction of the light above the horizon in degrees. Typical: 30 to 60.",
+    "look.light_irradiance": (
+        "Irradiance of the light in W/m2 (intensity of KHR_lights_punctual, lx there).\n"
+        "Typical: 3 is as bright as white surroundings."
+    ),
+    "display.method": "How thickness is found; auto: the cheapest method that is exact for the scene.",
+    "display.method_b": "The method right of the split, to be compared with the one on its left.",
+    "display.scattering": (
+        "Light scattered many times: it diffuses in the body, leaves as from a flat layer, or is left out; "
+        "auto: what the body needs."
+    ),
+    "display.mode": (
+        "Quantity on show: the picture, thickness along the view ray in false colors, transmittance, or where"
+        " numbers can be trusted."
+    ),
+    "display.compare": (
+        "What is right of the split: another method, the float64 reference, or the error of thickness."
+    ),
+    "display.split": "Position of the split, 0 to 1 from the left. Or drag the line.",
+    "display.inset": (
+        "The float64 reference as a small picture in the corner, while the view is still. It has straight "
+        "rays, paint and opaque surfaces with their textures, and the holes of leaves; nothing mirrors there, "
+        "and what tints clear glass is left out."
+    ),
+    "display.antialias": "More samples of a pixel while the view is still.",
+    "display.converge": (
+        "Path trace the picture while nothing changes (C): all light, with less noise the longer it goes on."
+    ),
+    "display.caustics": (
+        "Photons carry the light of lamps through interfaces onto opaque objects while nothing changes (P): "
+        "--caustics of translucent render, more and more of them. The picture that moves has none, and "
+        "neither has one that converges."
+    ),
+    "display.unit": "Unit of the lengths in panels and scales.",
+    "orbit.fov_y": "Vertical angle of view in degrees (yfov of a glTF camera, there in radians). Typical: 20 to 50.",
+    "orbit.orthographic": "No perspective (O), as glTF's orthographic cameras: parallel rays, for technical views.",
+}
+
+
+def triple_text(values: npt.ArrayLike) -> str:
+    """Text of three numbers, to the digits that ``translucent extinction`` prints."""
+    return " ".join(f"{value:.5g}" for value in np.asarray(values, dtype=np.float64).tolist())
+
+
+def length_text(metres: float, unit: str) -> str:
+    """Text of a length in the user's unit, to five digits."""
+    return f"{metres / metres_per_unit(unit):.5g} {unit}"

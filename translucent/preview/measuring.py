@@ -11,20 +11,93 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.assets import newest_shader
 from translucent.errors import InputError, TranslucentWarning
-from translucent.frames.appearance import thickness_samples
+from translucent.formulas.color import to_hex
+from translucent.frames.appearance import average_color, thickness_samples
 from translucent.frames.frame import Frame
 from translucent.frames.metrics import Errors, compare
+from translucent.media.medium import Medium
 from translucent.planning.methods import Method
-from translucent.preview.numbers import Seen
-from translucent.preview.painting import shows_paint, with_paint
 from translucent.preview.tasks import Report
 from translucent.renderer import Renderer
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Texture
+
+#: Thickness of the sheet that stands for paint, in diagonals of its object.
+THIN = 1e-6
+
+#: Largest side of a texture of paint in pixels: a small picture shows no more.
+MOST = 512
+
+
+def with_paint(straight: Scene, scene: Scene) -> Scene:
+    """Scene of straight rays, with the matt colors of opaque objects, and layers of paint on bodies.
+
+    Parameters
+    ----------
+    straight : Scene
+        Without the optical effects of interfaces.
+    scene : Scene
+        The same with them. Its objects are shown as they are, in their order.
+    """
+    objects: list[Object] = []
+    for plain, item in zip(straight.objects, scene.shown, strict=True):
+        if item.medium is None and item.surface is not None:
+            plain = dataclasses.replace(plain, surface=_matt(item.surface))
+        objects.append(plain)
+        if (paint := _paint(item)) is not None:
+            objects.append(paint)
+    return dataclasses.replace(straight, objects=objects)
+
+
+def shows_paint(scene: Scene) -> bool:
+    """True if its surfaces show more than straight rays do without them."""
+    return any((item.medium is None and item.surface is not None) or _paint(item) is not None for item in scene.shown)
+
+
+def _matt(surface: Surface) -> Surface:
+    return Surface(
+        color=surface.color,
+        color_texture=surface.color_texture,
+        emissive=surface.emissive,
+        emissive_texture=surface.emissive_texture,
+        alpha_cutoff=surface.alpha_cutoff,
+    )
+
+
+def _paint(item: Object) -> Object | None:
+    """Layer that covers as much of a body as does not let light in; None if all does."""
+    surface = item.surface
+    if item.medium is None or surface is None or item.covers:
+        return None
+    if surface.transmission == 1.0 and surface.transmission_texture is None:
+        return None
+    texture = surface.color_texture
+    if surface.transmission_texture is not None:
+        texture = _covering(texture, surface.transmission_texture, surface.transmission)
+    opacity = 1.0 if surface.transmission_texture is not None else 1.0 - surface.transmission
+    paint = Surface(color=surface.color, color_texture=texture, opacity=opacity)
+    thin = THIN * float(np.linalg.norm(np.ptp(item.bounds, axis=0)))
+    return Object(item.mesh, Medium(), transform=item.matrix, surface=paint, sheet_thickness=thin)
+
+
+@lru_cache(maxsize=8)
+def _covering(color: Texture | None, entering: Texture, transmission: float) -> Texture:
+    """Texture of the color of paint, and as its opacity the share of light that does not enter."""
+    pictures = [one for one in (color, entering) if one is not None]
+    height, width = (min(max(one.pixels.shape[i] for one in pictures), MOST) for i in (0, 1))
+    v, u = np.meshgrid(1.0 - (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width, indexing="ij")
+    at = np.stack([u, v], axis=-1)
+    pixels = np.ones((height, width, 4), dtype=np.float32)
+    if color is not None:
+        pixels[..., :3] = color.sample(at)[..., :3]
+    pixels[..., 3] = 1.0 - transmission * entering.sample(at)[..., 0]
+    return Texture(np.clip(pixels, 0.0, 1.0), wrap=entering.wrap)
+
 
 Size = tuple[int, int]
 
@@ -47,6 +120,38 @@ BENT_LEVELS = (16, 8)
 
 
 @dataclass(frozen=True, eq=False)
+class ThicknessStatistics:
+    """Thickness of a model in its picture.
+
+    Attributes
+    ----------
+    thickness : (n,) float64
+        Of the covered, valid pixels, in metres.
+    counts, edges : ndarray
+        Their histogram.
+    pixels, invalid : int
+        Covered pixels, and those of all that cannot be trusted.
+    """
+
+    thickness: Array
+    counts: Array
+    edges: Array
+    pixels: int
+    invalid: int
+
+    @classmethod
+    def of(cls, thickness: Array, pixels: int, invalid: int) -> ThicknessStatistics:
+        """Thickness statistics of a frame, with a histogram of 48 bins."""
+        most = float(thickness.max(initial=0.0)) or 1.0
+        counts, edges = np.histogram(thickness, bins=48, range=(0.0, most))
+        return cls(thickness, counts / max(int(counts.max()), 1), edges, pixels, invalid)
+
+    def average_hex(self, medium: Medium) -> str:
+        """The model's average color before white light."""
+        return to_hex(average_color(self.thickness, medium)) if self.thickness.size else "#ffffff"
+
+
+@dataclass(frozen=True, eq=False)
 class Compared:
     """Comparison of a small picture of the viewport with the truth.
 
@@ -56,19 +161,19 @@ class Compared:
         Of thickness and transmittance; empty if there is nothing to compare.
     doubt : str
         Why they are empty.
-    seen : Seen
+    seen : ThicknessStatistics
     truth : (h, w, 3) uint8
         The reference as a picture, for a corner of the viewport, with the paint of its surfaces.
     """
 
     errors: tuple[Errors, ...]
     doubt: str
-    seen: Seen
+    seen: ThicknessStatistics
     truth: npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
-class Measured(Compared):
+class Measurement(Compared):
     """Comparison together with its scene and method."""
 
     scene: Scene
@@ -76,7 +181,7 @@ class Measured(Compared):
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class ReferencePicture:
     """Reference of a whole picture, at a share of its size; of straight rays, or with refraction."""
 
     scene: Scene
@@ -144,7 +249,7 @@ def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> 
         samples = thickness_samples(frame)
     except InputError:
         samples = np.zeros(0)
-    seen = Seen.of(samples, covered, int(np.count_nonzero(~frame.valid)))
+    seen = ThicknessStatistics.of(samples, covered, int(np.count_nonzero(~frame.valid)))
     shown = _reference(with_paint(plain, scene), small, method) if shows_paint(scene) else truth
     return Compared(errors, doubt, seen, shown.to_srgb8())
 

@@ -4,25 +4,162 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
+from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.formulas.brdf_table import brdf_table
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals, keep_drawn_normals
+from translucent.geometry.solids import Box
 from translucent.media.medium import Medium, color_at
 from translucent.planning.methods import Method, method_from_name
 from translucent.planning.scattering import SCATTERINGS, Scattering
-from translucent.preview.document import AUTO, FINISH, Assigned, Document, Look, Material
-from translucent.preview.loaded import Loaded
-from translucent.preview.orbiting import camera_of
-from translucent.preview.staging import environment_of, stage_name, standing
-from translucent.scene.environment import Environment
+from translucent.preview import document as orbiting
+from translucent.preview.document import AUTO, FINISH, Assigned, Document, Look, Material, Model, Orbit, camera_of
+from translucent.preview.tasks import Lane, Report, Task
+from translucent.preview.worker import Pool, Urgency
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment, filtered
+from translucent.scene.environment_files import READERS
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Object, Scene
-from translucent.scene.showcase import DEFAULT_COLOR, DEFAULT_REACH, fillable
-from translucent.scene.stages import NO_STAGE
+from translucent.scene.shadow_directions import shadow_directions
+from translucent.scene.showcase import (
+    DEFAULT_COLOR,
+    DEFAULT_REACH,
+    LIGHT_TABLE,
+    STAGED_IOR,
+    fillable,
+    framing,
+    named_environment,
+)
+from translucent.scene.stages import (
+    DEFAULT_STAGE,
+    ENVIRONMENT_SHADOWS,
+    NO_STAGE,
+    STAGED_TONE,
+    has_ground,
+    stage_named,
+    staged,
+    view_axes,
+)
 from translucent.scene.surface import Surface
+from translucent.scene.turntable import on_stage
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """Loaded model: its scene, and the material that its bodies came with."""
+
+    model: Model
+    scene: Scene
+    material: Material
+
+    @property
+    def bare(self) -> bool:
+        """True if the model is a mesh, and no scene of a file."""
+        return not hasattr(self.scene, "has_camera")
+
+    @property
+    def triangles(self) -> int:
+        """Number of triangles that are drawn."""
+        return sum(len(item.mesh.faces) for item in self.scene.objects)
+
+
+def stage_name(look: Look, loaded: Loaded) -> str:
+    """Name of the stage that a look asks for; ``auto`` is what ``translucent render`` gives the model."""
+    if look.stage != AUTO:
+        return look.stage
+    scene = loaded.scene
+    own = look.environment or look.background or scene.lights or getattr(scene, "has_camera", False)
+    return NO_STAGE if own or has_ground(scene) else DEFAULT_STAGE
+
+
+def own_material(look: Look, loaded: Loaded) -> Material:
+    """Material that a model comes with: a bare mesh on a stage has an interface, as ``translucent render`` gives it."""
+    if not loaded.bare or stage_name(look, loaded) == NO_STAGE:
+        return loaded.material
+    return dataclasses.replace(loaded.material, ior=STAGED_IOR)
+
+
+def tone_of(look: Look, scene: Scene) -> str:
+    """Tone curve of a picture of the scene."""
+    if look.tone != AUTO:
+        return look.tone
+    return STAGED_TONE if on_stage(scene) else "none"
+
+
+def environment_of(name: str) -> Environment:
+    """Environment of a name, or of a file as it is now; the last ones are cached."""
+    path = Path(name)
+    return _environment_of(name, path.stat().st_mtime_ns if path.is_file() else 0)
+
+
+@lru_cache(maxsize=4)
+def _environment_of(name: str, written: int) -> Environment:
+    return named_environment(name)
+
+
+def own_environment(environment: str, background: str) -> Environment | None:
+    """Environment in place of the stage's; None if a look names none."""
+    if not (environment or background):
+        return None
+    lit = environment_of(environment) if environment else LIGHT_TABLE
+    return lit.with_background(environment_of(background)) if background else lit
+
+
+def shown_from(loaded: Loaded, name: str) -> Camera:
+    """Camera to which a stage is turned: the model's own, or the one that frames it there."""
+    scene = loaded.scene
+    own = getattr(scene, "has_camera", False)
+    return scene.camera if own else framing(scene.objects, (16, 9), stage=stage_named(name))
+
+
+@lru_cache(maxsize=2)
+def standing(loaded: Loaded, name: str, environment: str, background: str, rotation: float) -> Scene:
+    """Loaded scene on a stage; cached, as the ground, the lights and the environment stay while the camera moves."""
+    own = own_environment(environment, background)
+    if own is not None and own.kind == "image":
+        own = dataclasses.replace(own, rotation=own.rotation + rotation)
+    seen = dataclasses.replace(loaded.scene, camera=shown_from(loaded, name))
+    return staged(seen, name, own, rotation)
+
+
+def turn_from(document: Document, loaded: Loaded, camera: Camera) -> float:
+    """Degrees by which the stage is turned about +Y from where `staged` puts it for a camera."""
+    from_, to = (view_axes(one)[2] for one in (camera, shown_from(loaded, stage_name(document.look, loaded))))
+    turn = math.degrees(math.atan2(to[0], to[2]) - math.atan2(from_[0], from_[2]))
+    return math.remainder(turn + document.look.rotation, 360.0)
+
+
+def first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
+    """First orbit of a model: that of the file's own camera, or from where `render` sees it, close as F frames it."""
+    scene = loaded.scene
+    if getattr(scene, "has_camera", False):
+        return orbiting.orbit_of(scene.camera, scene.bounds.mean(axis=0))
+    if stage == NO_STAGE:
+        return orbiting.framed(None, scene.objects, size)
+    seen = orbiting.orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
+    return orbiting.framed(seen, scene.objects, size)
+
+
+def prepare_stage(name: str, environment: str, background: str) -> None:
+    """Compute what takes long about a stage, and is cached."""
+    from translucent.scene.environment import filtered
+
+    stage = stage_named(name)
+    if stage is not None:
+        lit = own_environment(environment, background) or stage.environment()
+        filtered(lit)
+        shadow_directions(lit, ENVIRONMENT_SHADOWS)
 
 
 def material_of(scene: Scene, number: int | None = None) -> Material:
@@ -168,3 +305,127 @@ def method_of(name: str, material: Material) -> Method | None:
 def scattering_of(name: str) -> Scattering | None:
     """Way of showing light that is scattered many times; None leaves it to the planner."""
     return None if name == AUTO else SCATTERINGS[name]()
+
+
+#: Bytes of a file from which on it is read by a worker process: while a picture is on show, and before. Whatever reads
+#: it holds the interpreter's lock now and then, which nobody sees in a window without a picture, and no process need
+#: be started for the first one.
+LARGE_BESIDE_PICTURE, LARGE_FILE = 1 << 18, 1 << 23
+
+Normals: TypeAlias = list[tuple[Mesh, npt.NDArray[np.float32]]]
+
+
+def load_with(task: Task, pool: Pool, model: Model, allow_outside: bool = False, *, pictured: bool = False) -> Loaded:
+    """Load a model here, or if it is large, in a worker process; `pictured` while the window shows another.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    large = LARGE_BESIDE_PICTURE if pictured else LARGE_FILE
+    if not (os.path.isfile(model.path) and os.path.getsize(model.path) > large):
+        return load(model, allow_outside)
+    loaded, normals = pool.call(task, load_elsewhere, model, allow_outside, urgency=Urgency.PICTURE)
+    for mesh, made in normals:
+        keep_drawn_normals(mesh, made)
+    return loaded
+
+
+def load_elsewhere(report: Report, model: Model, allow_outside: bool) -> tuple[Loaded, Normals]:
+    """Load a model; with the normals that have been made of its meshes."""
+    report(None, f"reading {Path(model.path).name}")
+    loaded = load(model, allow_outside)
+    meshes = dict.fromkeys(item.mesh for item in loaded.scene.objects)
+    return loaded, [(mesh, drawn_normals(mesh)) for mesh in meshes if has_drawn_normals(mesh)]
+
+
+def load(model: Model, allow_outside: bool = False) -> Loaded:
+    """Load a model, and compute everything that would delay its first picture.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    from translucent.assets import mesh_names, mesh_path
+    from translucent.gltf.load import SUFFIXES, load_scene
+    from translucent.mesh_files import load_mesh
+    from translucent.scene.showcase import showcase
+
+    if Path(model.path).suffix.lower() in SUFFIXES:
+        scene: Scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
+    elif model.path in mesh_names() and not Path(model.path).exists():
+        scene = showcase(load_mesh(mesh_path(model.path)), stage="none")
+    else:
+        scene = showcase(load_mesh(model.path, unit=model.unit, allow_outside=allow_outside), stage="none")
+    for item in scene.objects:
+        _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
+        if item.has_interface or item.surface is not None:
+            drawn_normals(item.mesh)
+    return Loaded(model, scene, material_of(scene))
+
+
+#: Environments: the one that lights, and the one in the background; and the stage.
+Names = tuple[str, str, str]
+
+
+@dataclass
+class Lighting:
+    """Reader of the environments of documents, and maker of their stages.
+
+    Parameters
+    ----------
+    lane : Lane
+
+    Attributes
+    ----------
+    begun : bool
+        The first picture is there: it is one without a stage, and waits for none.
+    """
+
+    lane: Lane
+    begun: bool = False
+    _ready: Names = ("", "", NO_STAGE)
+    _asked: Names | None = None
+    #: Stages whose light is known.
+    _made: set[str] = field(default_factory=lambda: {NO_STAGE})
+
+    def lit(self, document: Document, loaded: Loaded) -> Document:
+        """Document with the last environments and the last stage in place of its own, if these are not ready."""
+        look = document.look
+        wanted = look.environment, look.background, stage_name(look, loaded)
+        if not any(map(_is_file, wanted[:2])) and wanted[2] in self._made:
+            self._ready, self._asked = wanted, None
+        elif wanted != self._asked and (self.begun or wanted[2] == NO_STAGE):
+            self._asked = wanted
+            name = "reading the environment" if wanted[2] == NO_STAGE else "setting the stage"
+            self.lane.start(name, lambda _: _prepare(wanted), lambda _: self._take(wanted))
+        environment, background, stage = wanted if wanted == self._ready else self._ready
+        return dataclasses.replace(
+            document, look=dataclasses.replace(look, environment=environment, background=background, stage=stage)
+        )
+
+    def _take(self, names: Names) -> None:
+        self._ready = names
+        if not any(names[:2]):
+            self._made.add(names[2])
+
+
+def prepare(_: Task) -> None:
+    """Prepare the data of frames with surfaces or smooth edges, before it is waited for."""
+    corner_normals(Box().tessellate())
+    brdf_table()
+    for name in ("light-table", "studio"):
+        filtered(environment_of(name))
+
+
+def _is_file(name: str) -> bool:
+    return Path(name).suffix.lower() in READERS
+
+
+def _prepare(names: Names) -> None:
+    environment, background, stage = names
+    for name in filter(None, (environment, background)):
+        filtered(environment_of(name))
+    prepare_stage(stage, environment, background)

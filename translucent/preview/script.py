@@ -26,7 +26,7 @@ from translucent.preview.document import Model
 from translucent.preview.session import read_toml
 
 if TYPE_CHECKING:
-    from translucent.preview.desk import Desk
+    from translucent.preview.window_state import WindowState
 
 #: Seconds after which a script continues, whatever work is under way.
 PATIENCE = 120.0
@@ -109,11 +109,11 @@ class Script:
         settle = Step("wait", {"seconds": -1.0})
         return cls([settle, *steps, settle][::-1])
 
-    def step(self, desk: Desk) -> bool:
+    def step(self, state: WindowState) -> bool:
         """Do the next action, if it is time; returns whether all are done."""
-        hold_pointer(desk)
+        hold_pointer(state)
         if self._waiting is not None:
-            if not self._rested(desk):
+            if not self._rested(state):
                 return False
             self._waiting = None
         self._frames += 1
@@ -128,17 +128,17 @@ class Script:
             self._waiting = time.monotonic()
             self._until = step.values["seconds"]
         else:
-            perform(desk, step)
+            perform(state, step)
         return False
 
-    def _rested(self, desk: Desk) -> bool:
+    def _rested(self, state: WindowState) -> bool:
         assert self._waiting is not None
         passed = time.monotonic() - self._waiting
-        if desk.waits:
+        if state.waits:
             time.sleep(PAUSE)
         if self._until >= 0:
             return passed >= self._until
-        return passed > 0.5 and (not (desk.more or desk.work.shelf.busy) or passed > PATIENCE)
+        return passed > 0.5 and (not (state.more or state.work.thumbnails.busy) or passed > PATIENCE)
 
 
 def read_script(path: str | Path) -> Script:
@@ -181,23 +181,23 @@ def read_step(table: Any, where: str) -> Step:
     return Step(verb, found)
 
 
-def perform(desk: Desk, step: Step) -> None:
+def perform(state: WindowState, step: Step) -> None:
     """Do one action."""
-    work, v = desk.work, step.values
+    work, v = state.work, step.values
     verbs: dict[str, Callable[[], object]] = {
-        "change": lambda: desk.change(v["field"], v["value"], step=True),
+        "change": lambda: state.change(v["field"], v["value"], step=True),
         "open": lambda: work.open(Model(v["model"], v["unit"])),
-        "preset": lambda: desk.choose_preset(v["name"]),
+        "preset": lambda: state.choose_preset(v["name"]),
         "library": lambda: setattr(work.library, "search", v["search"]),
-        "pick": lambda: desk.pick((v["x"], v["y"]), desk.select),
-        "object": lambda: desk.select(None if v["number"] < 0 else v["number"]),
-        "hide": lambda: _hide(desk, v["number"], alone=False),
-        "isolate": lambda: _hide(desk, v["number"], alone=True),
-        "drop": lambda: desk.drop_preset(v["preset"], (v["x"], v["y"])),
-        "save_preset": lambda: _save_preset(desk, v["name"]),
-        "ask": lambda: _ask(desk, v["kind"]),
-        "answer": lambda: _answer(desk, v["file"]),
-        "environments": lambda: desk.environments.take(v["folder"]),
+        "pick": lambda: state.pick((v["x"], v["y"]), state.select),
+        "object": lambda: state.select(None if v["number"] < 0 else v["number"]),
+        "hide": lambda: _hide(state, v["number"], alone=False),
+        "isolate": lambda: _hide(state, v["number"], alone=True),
+        "drop": lambda: state.drop_preset(v["preset"], (v["x"], v["y"])),
+        "save_preset": lambda: _save_preset(state, v["name"]),
+        "ask": lambda: _ask(state, v["kind"]),
+        "answer": lambda: _answer(state, v["file"]),
+        "environments": lambda: state.environments.take(v["folder"]),
         "key": lambda: _press(v["name"]),
         "type": lambda: _io().add_input_characters_utf8(v["text"]),
         "turn": lambda: work.do(Turn(v["right"], v["up"])),
@@ -205,14 +205,14 @@ def perform(desk: Desk, step: Step) -> None:
         "zoom": lambda: work.do(Zoom(v["factor"], v["right"], v["down"])),
         "undo": work.undo,
         "redo": work.redo,
-        "frame": desk.frame,
-        "probe": lambda: setattr(desk, "pinned", (v["x"], v["y"])),
+        "frame": state.frame,
+        "probe": lambda: setattr(state, "pinned", (v["x"], v["y"])),
         "select": lambda: _select(v["panel"]),
-        "reload": lambda: desk.stage.reload(work),
+        "reload": lambda: state.view.reload(work),
         "bake": lambda: work.start_bake(v["mode"], v["size"], v["rays"]),
-        "save": lambda: _use_file(desk, v["kind"], v["file"]),
+        "save": lambda: _use_file(state, v["kind"], v["file"]),
         "session": lambda: work.open_session(v["file"]),
-        "point": lambda: setattr(desk, "pointer", (v["x"], v["y"])),
+        "point": lambda: setattr(state, "pointer", (v["x"], v["y"])),
         "press": lambda: _io().add_mouse_button_event(v["button"], True),
         "release": lambda: _io().add_mouse_button_event(v["button"], False),
         "wheel": lambda: _io().add_mouse_wheel_event(0.0, v["steps"]),
@@ -220,35 +220,35 @@ def perform(desk: Desk, step: Step) -> None:
     verbs[step.do]()
 
 
-def _hide(desk: Desk, number: int, *, alone: bool) -> None:
-    from translucent.preview.hiding import hide, isolate
+def _hide(state: WindowState, number: int, *, alone: bool) -> None:
+    from translucent.preview.panels.scene import hide, isolate
 
-    if not 0 <= number < len(desk.objects):
-        raise InputError(f"object {number}", f"the model has {len(desk.objects)}", "give a number from 0 on")
-    (isolate if alone else hide)(desk, number)
-
-
-def _use_file(desk: Desk, kind: str, path: str) -> None:
-    from translucent.preview.answers import use_file
-
-    use_file(desk, kind, path)
+    if not 0 <= number < len(state.objects):
+        raise InputError(f"object {number}", f"the model has {len(state.objects)}", "give a number from 0 on")
+    (isolate if alone else hide)(state, number)
 
 
-def _ask(desk: Desk, kind: str) -> None:
+def _use_file(state: WindowState, kind: str, path: str) -> None:
+    from translucent.preview.panels.files import use_file
+
+    use_file(state, kind, path)
+
+
+def _ask(state: WindowState, kind: str) -> None:
     from translucent.preview.dialogs import QUESTIONS
 
     if kind not in QUESTIONS:
         raise InputError(f"ask {kind!r}", "there is no such question", f"use one of {', '.join(QUESTIONS)}")
-    desk.ask_file(kind, system=False)
+    state.ask_file(kind, system=False)
 
 
-def _answer(desk: Desk, path: str) -> None:
-    from translucent.preview.panels.browser import answer
+def _answer(state: WindowState, path: str) -> None:
+    from translucent.preview.panels.files import accept_answer
 
-    if desk.browser is None:
+    if state.browser is None:
         raise InputError(f"answer {path!r}", "nothing is asked", "ask first")
-    desk.browser.text = path
-    answer(desk)
+    state.browser.text = path
+    accept_answer(state)
 
 
 def _press(name: str) -> None:
@@ -265,19 +265,19 @@ def _press(name: str) -> None:
             _io().add_key_event(key, down)
 
 
-def _save_preset(desk: Desk, name: str) -> None:
-    from translucent.preview.answers import save_preset
+def _save_preset(state: WindowState, name: str) -> None:
+    from translucent.preview.panels.files import save_preset
 
-    save_preset(desk, name)
+    save_preset(state, name)
 
 
-def hold_pointer(desk: Desk) -> None:
+def hold_pointer(state: WindowState) -> None:
     """Keep the mouse where the script has put it, whatever the system reports."""
-    if desk.pointer is not None:
+    if state.pointer is not None:
         from translucent.preview.dialogs import move_pointer
 
         size = _io().display_size
-        place = desk.pointer[0] * size.x, desk.pointer[1] * size.y
+        place = state.pointer[0] * size.x, state.pointer[1] * size.y
         move_pointer(*place)
         _io().add_mouse_pos_event(*place)
 

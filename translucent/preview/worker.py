@@ -6,30 +6,181 @@ Large values are in files that all processes map: see `preview.sharing`.
 
 from __future__ import annotations
 
+import io
 import itertools
+import mmap
 import multiprocessing
 import os
+import pickle
 import signal
 import sys
+import tempfile
 import threading
 import time
 import warnings
 from bisect import insort
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from enum import IntEnum
+from functools import partial
+from multiprocessing import reduction
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 from translucent.errors import RenderError, TranslucentWarning
+from translucent.files.reading import size_text
 from translucent.geometry.mesh import Mesh
 from translucent.media.density import DensityGrid
-from translucent.preview.sharing import Channel, Parcel
 from translucent.preview.tasks import CancelledError, Task
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.texture import Texture
+
+#: Bytes of an array from which on it lies in a file.
+LARGE = 1 << 20
+
+#: Arrays in a file begin at multiples of so many bytes.
+_ALIGNMENT = 64
+
+#: Finds the token that stands for a value, or None if the value itself is to be sent.
+Token = Callable[[object], int | None]
+
+
+class File:
+    """File without a name, closed with this object."""
+
+    def __init__(self, descriptor: int) -> None:
+        self.descriptor = descriptor
+
+    def __del__(self) -> None:
+        os.close(self.descriptor)
+
+
+@dataclass(frozen=True, eq=False)
+class WorkerMessage:
+    """Pickled value.
+
+    Attributes
+    ----------
+    text : bytes
+    spans : tuple of (begin, end)
+        Of its large arrays in the file.
+    file : File, optional
+        None where there are none.
+    """
+
+    text: bytes
+    spans: tuple[tuple[int, int], ...] = ()
+    file: File | None = None
+
+    @classmethod
+    def of(cls, value: object, token: Token | None = None) -> WorkerMessage:
+        """Pack a value; others in it are left out for which there is a token.
+
+        Raises
+        ------
+        RenderError
+            If there is no room for its arrays.
+        """
+        stream, arrays = io.BytesIO(), list[memoryview]()
+        _Pickler(stream, arrays, token).dump(value)
+        if not arrays:
+            return cls(stream.getvalue())
+        spans = []
+        try:
+            with tempfile.TemporaryFile() as file:
+                for array in arrays:
+                    begin = file.seek(-(-file.tell() // _ALIGNMENT) * _ALIGNMENT)
+                    file.write(array)
+                    spans.append((begin, begin + array.nbytes))
+                file.flush()
+                return cls(stream.getvalue(), tuple(spans), File(os.dup(file.fileno())))
+        except OSError as error:
+            size = size_text(sum(array.nbytes for array in arrays))
+            found = f"{tempfile.gettempdir()} has no room for {size} of meshes and pictures ({error.strerror})"
+            raise RenderError("work of another process", found, "make room, or set TMPDIR to another folder") from error
+
+    def open(self, known: Callable[[int], object] | None = None) -> Any:
+        """Unpack the value, whose large arrays are read-only views of the file; `known` has the values for tokens."""
+        views: list[memoryview] = []
+        if self.file is not None:
+            memory = memoryview(mmap.mmap(self.file.descriptor, 0, access=mmap.ACCESS_READ))
+            views = [memory[begin:end] for begin, end in self.spans]
+        return _Unpickler(io.BytesIO(self.text), views, known).load()
+
+
+class _Pickler(pickle.Pickler):
+    def __init__(self, stream: io.BytesIO, arrays: list[memoryview], token: Token | None) -> None:
+        super().__init__(stream, protocol=5, buffer_callback=partial(_stays, arrays))
+        self._token = token
+
+    def persistent_id(self, value: object) -> int | None:
+        return None if self._token is None else self._token(value)
+
+
+def _stays(arrays: list[memoryview], array: pickle.PickleBuffer) -> bool:
+    """True if an array stays in the text; if it is large, it is added to `arrays` instead."""
+    raw = array.raw()
+    if raw.nbytes >= LARGE:
+        arrays.append(raw)
+    return raw.nbytes < LARGE
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, stream: io.BytesIO, views: list[memoryview], known: Callable[[int], object] | None) -> None:
+        super().__init__(stream, buffers=views)
+        self._known = known
+
+    def persistent_load(self, token: Any) -> object:
+        assert self._known is not None
+        return self._known(token)
+
+
+class Channel:
+    """End of a pipe for messages, each with a type and a number.
+
+    Parameters
+    ----------
+    pipe : Connection
+    peer : int
+        Number of the process at the other end.
+    """
+
+    def __init__(self, pipe: Connection, peer: int) -> None:
+        self.pipe, self._peer = pipe, peer
+
+    def send(self, kind: str, number: int, message: WorkerMessage) -> None:
+        """Send a message."""
+        self.pipe.send((kind, number, message.text, message.spans))
+        if message.file is not None:
+            reduction.send_handle(self.pipe, _handle(message.file.descriptor), self._peer)
+
+    def receive(self) -> tuple[str, int, WorkerMessage]:
+        """Kind, number and message that the other end has sent; waits for it."""
+        kind, number, text, spans = self.pipe.recv()
+        file = File(_descriptor(reduction.recv_handle(self.pipe))) if spans else None
+        return kind, number, WorkerMessage(text, spans, file)
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _handle(descriptor: int) -> int:
+        return msvcrt.get_osfhandle(descriptor)
+
+    def _descriptor(handle: int) -> int:
+        return msvcrt.open_osfhandle(handle, os.O_RDONLY)
+
+else:
+
+    def _handle(descriptor: int) -> int:
+        return descriptor
+
+    def _descriptor(handle: int) -> int:
+        return handle
+
 
 #: Seconds between checks whether the result is still wanted.
 PATIENCE = 0.1
@@ -184,22 +335,22 @@ class _Kept:
 
     def __init__(self) -> None:
         self._numbers = itertools.count(1)
-        self._packed: WeakKeyDictionary[object, tuple[int, Parcel]] = WeakKeyDictionary()
+        self._packed: WeakKeyDictionary[object, tuple[int, WorkerMessage]] = WeakKeyDictionary()
         self._lock = threading.RLock()
 
-    def packed(self, value: object) -> tuple[int, Parcel]:
-        """Token and parcel of a value; from then on its arrays, too, are those of the file."""
+    def packed(self, value: object) -> tuple[int, WorkerMessage]:
+        """Token and message of a value; from then on its arrays, too, are those of the file."""
         with self._lock:
             if (found := self._packed.get(value)) is None:
-                found = self.take(value, Parcel.of(value))
+                found = self.take(value, WorkerMessage.of(value))
                 if found[1].file is not None:
                     vars(value).update(vars(found[1].open()))
             return found
 
-    def take(self, value: object, parcel: Parcel) -> tuple[int, Parcel]:
-        """Token of a value that came in a parcel."""
+    def take(self, value: object, message: WorkerMessage) -> tuple[int, WorkerMessage]:
+        """Token of a value that came in a message."""
         with self._lock:
-            found = self._packed[value] = next(self._numbers), parcel
+            found = self._packed[value] = next(self._numbers), message
             return found
 
     @property
@@ -236,17 +387,17 @@ class _Worker:
 
     def ask(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
         """Send work, preceded by the values that it needs and that were not sent before."""
-        found: dict[int, Parcel] = {}
+        found: dict[int, WorkerMessage] = {}
         self._known = {}
 
         def token(value: object) -> int | None:
             if not isinstance(value, KEPT):
                 return None
-            number, parcel = self._kept.packed(value)
-            found[number], self._known[number] = parcel, value
+            number, message = self._kept.packed(value)
+            found[number], self._known[number] = message, value
             return number
 
-        asked = Parcel.of((work, arguments), token)
+        asked = WorkerMessage.of((work, arguments), token)
         self.forget()
         for number in found.keys() - self._sent:
             self._channel.send("keep", number, found[number])
@@ -258,7 +409,7 @@ class _Worker:
     def forget(self) -> None:
         """Have it drop what nobody here holds any more."""
         for number in self._sent - self._kept.tokens:
-            self._channel.send("drop", number, Parcel(b""))
+            self._channel.send("drop", number, WorkerMessage(b""))
             self._sent.discard(number)
 
     def answer(self, task: Task) -> tuple[bool, Any]:
@@ -267,14 +418,14 @@ class _Worker:
             if not self._channel.pipe.poll(PATIENCE):
                 task.report(task.share, task.detail)
                 continue
-            kind, number, parcel = self._channel.receive()
-            content = parcel.open(self._known.__getitem__)
+            kind, number, message = self._channel.receive()
+            content = message.open(self._known.__getitem__)
             if kind in ("done", "failed"):
                 self._known = {}
                 return kind == "failed", content
             if kind == "made":
                 self._known[number] = content
-                self._kept.take(content, parcel)
+                self._kept.take(content, message)
             elif kind == "warning":
                 warnings.warn(content, TranslucentWarning, stacklevel=4)
             else:
@@ -284,7 +435,7 @@ class _Worker:
         """Stop the work at its next report; returns whether it did so in time."""
         end = time.monotonic() + PARTING
         try:
-            self._channel.send("stop", self._number, Parcel(b""))
+            self._channel.send("stop", self._number, WorkerMessage(b""))
             while self._channel.pipe.poll(max(end - time.monotonic(), 0.0)):
                 if self._channel.receive()[0] in ("done", "failed"):
                     return True
@@ -331,20 +482,20 @@ def _run(pipe: Connection) -> None:
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_follow_parent, daemon=True).start()
     channel = Channel(pipe, os.getppid())
-    warnings.showwarning = lambda message, *_, **__: channel.send("warning", 0, Parcel.of(str(message)))
+    warnings.showwarning = lambda message, *_, **__: channel.send("warning", 0, WorkerMessage.of(str(message)))
     kept: dict[int, object] = {}
     while True:
         try:
-            kind, number, parcel = channel.receive()
+            kind, number, message = channel.receive()
         except (EOFError, OSError):
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
             return
         if kind == "keep":
-            kept[number] = parcel.open()
+            kept[number] = message.open()
         elif kind == "drop":
             del kept[number]
         elif kind == "work":
-            _work(channel, kept, number, parcel)
+            _work(channel, kept, number, message)
 
 
 def _end(*_: object) -> None:
@@ -363,12 +514,12 @@ def _follow_parent() -> None:
     os._exit(1)
 
 
-def _work(channel: Channel, kept: dict[int, object], number: int, parcel: Parcel) -> None:
+def _work(channel: Channel, kept: dict[int, object], number: int, message: WorkerMessage) -> None:
     def report(share: float | None, detail: str = "") -> None:
         while channel.pipe.poll():
             if channel.receive()[:2] == ("stop", number):
                 raise CancelledError
-        channel.send("report", number, Parcel.of((share, detail)))
+        channel.send("report", number, WorkerMessage.of((share, detail)))
 
     numbers = {id(value): one for one, value in kept.items()}
     made = list[object]()
@@ -379,14 +530,14 @@ def _work(channel: Channel, kept: dict[int, object], number: int, parcel: Parcel
         if id(value) not in numbers:
             made.append(value)
             numbers[id(value)] = -len(made)
-            channel.send("made", -len(made), Parcel.of(value))
+            channel.send("made", -len(made), WorkerMessage.of(value))
         return numbers[id(value)]
 
     kind = "done"
     try:
-        work, arguments = parcel.open(kept.__getitem__)
-        answer = Parcel.of(work(report, *arguments), token)
+        work, arguments = message.open(kept.__getitem__)
+        answer = WorkerMessage.of(work(report, *arguments), token)
     except Exception as error:  # noqa: BLE001 - raised where the result is waited for
-        kind, answer = "failed", Parcel.of(error)
+        kind, answer = "failed", WorkerMessage.of(error)
     with suppress(OSError):  # nobody is there any more
         channel.send(kind, number, answer)

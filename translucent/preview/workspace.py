@@ -15,23 +15,37 @@ from typing import Any, Literal
 from translucent.errors import InputError, RenderError, TranslucentError
 from translucent.files.paths import remove_partial
 from translucent.planning.methods import Method
-from translucent.preview import orbiting
-from translucent.preview.actions import Action, Adopt, Open, Replace, SetOrbit
-from translucent.preview.baking import Bake, bake_map
+from translucent.preview import document as orbiting
+from translucent.preview.actions import Action, Adopt, History, Open, Replace, SetOrbit
 from translucent.preview.compiling import Compiler
 from translucent.preview.document import Display, Document, Model
-from translucent.preview.exports import check_export
-from translucent.preview.history import History
+from translucent.preview.exports import Bake, bake_map, check_export
 from translucent.preview.library import Library
-from translucent.preview.lighting import Lighting, prepare
-from translucent.preview.loaded import Loaded
-from translucent.preview.loading import load_with
-from translucent.preview.measuring import Crossing, Measured, Truth, crossing, measure, truth_frame, truth_plan
-from translucent.preview.scenes import medium_of, scene_of
+from translucent.preview.measuring import (
+    Crossing,
+    Measurement,
+    ReferencePicture,
+    crossing,
+    measurable,
+    measure,
+    truth_frame,
+    truth_plan,
+)
+from translucent.preview.scenes import (
+    Lighting,
+    Loaded,
+    first_orbit,
+    load_with,
+    medium_of,
+    method_of,
+    own_material,
+    prepare,
+    scene_of,
+    stage_name,
+)
 from translucent.preview.session import load_session, save_session
-from translucent.preview.shelf import Shelf
-from translucent.preview.staging import first_orbit, own_material, stage_name
 from translucent.preview.tasks import Lane, Task, problem
+from translucent.preview.thumbnails import ThumbnailCache
 from translucent.preview.worker import Pool, Urgency
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import fillable
@@ -46,7 +60,7 @@ KEPT_MODELS = 2
 PATIENCE = {"write": 60.0, "bake": 12.0}
 
 #: Kinds of background work, of which each does one thing at a time.
-LANES = ("load", "draw", "diffuse", "trace", "truth", "bake", "ray", "light", "write", "shelf")
+LANES = ("load", "draw", "diffuse", "trace", "truth", "bake", "ray", "light", "write", "thumbnails")
 
 #: Largest number of recently opened files.
 MAX_RECENT = 8
@@ -77,13 +91,13 @@ class Workspace:
     recent : list of str
     size : (width, height)
         Of the viewport in pixels.
-    measured : Measured, optional
+    measured : Measurement, optional
         How the picture compares with the reference; None while that is not known.
-    truth : Truth, optional
+    truth : ReferencePicture, optional
         The reference of the whole picture, if the split shows it.
     bake : Bake, optional
         The last map.
-    shelf : Shelf
+    thumbnails : ThumbnailCache
         Small pictures of media, environments and models.
     library : Library
         Presets of the toolkit and of the user.
@@ -101,14 +115,14 @@ class Workspace:
         self.failure: Exception | None = None
         self.recent: list[str] = []
         self.size = (1280, 720)
-        self.measured: Measured | None = None
-        self.truth: Truth | None = None
+        self.measured: Measurement | None = None
+        self.truth: ReferencePicture | None = None
         self.bake: Bake | None = None
         self.show_bake = True
         self.pool = Pool()
         self.compiler = Compiler(self.pool)
         self.lanes = {name: Lane(name) for name in LANES} | {"compile": self.compiler.lane}
-        self.shelf = Shelf(self.lanes["shelf"], partial(self.pool.call, urgency=Urgency.LATER))
+        self.thumbnails = ThumbnailCache(self.lanes["thumbnails"], partial(self.pool.call, urgency=Urgency.LATER))
         self.library = Library(self.refuse)
         self._lighting = Lighting(self.lanes["light"])
         self._models: list[Loaded] = []
@@ -230,7 +244,7 @@ class Workspace:
     def busy(self) -> list[Task]:
         """Tasks under way that the user may want to see or to cancel."""
         tasks = [lane.task for lane in self.lanes.values() if lane.task is not None]
-        return [task for task in tasks if task.name or task not in (self.compiler.lane.task, self.shelf.lane.task)]
+        return [task for task in tasks if task.name or task not in (self.compiler.lane.task, self.thumbnails.lane.task)]
 
     def prepare(self) -> None:
         """Prepare later pictures, now that the first is there."""
@@ -239,13 +253,13 @@ class Workspace:
             self.lanes["light"].start("", prepare, lambda _: None)
 
     def measure(
-        self, scene: Scene, method: Method | None, size: tuple[int, int], then: Callable[[Measured], None]
+        self, scene: Scene, method: Method | None, size: tuple[int, int], then: Callable[[Measurement], None]
     ) -> None:
         """Compare a small picture with the reference, in the background."""
 
-        def work(task: Task) -> Measured:
+        def work(task: Task) -> Measurement:
             found = self.pool.call(task, measure, scene, method, size)
-            return Measured(**vars(found), scene=scene, method=method)
+            return Measurement(**vars(found), scene=scene, method=method)
 
         self.lanes["draw"].start("measuring", work, then)
 
@@ -266,7 +280,7 @@ class Workspace:
                 task.report(number / len(shares), f"at 1/{level}")
                 small = max(size[0] // level, 1), max(size[1] // level, 1)
                 frame = self.pool.call(task, truth_frame, seen, method, small, urgency=Urgency.LATER)
-                self.truth = Truth(scene, method, frame, level, straight=levels is not None)
+                self.truth = ReferencePicture(scene, method, frame, level, straight=levels is not None)
 
         self.lanes["truth"].start("float64 reference", work, lambda _: None)
 
@@ -398,3 +412,65 @@ def _lit_alike(first: Document, second: Document) -> bool:
     """True if two looks differ only in exposure and tone curve, before the same kind of backdrop."""
     developed = dataclasses.replace(first.look, exposure=second.look.exposure, tone=second.look.tone)
     return developed == second.look and first.display.pictured == second.display.pictured
+
+
+def relights(workspace: Workspace) -> bool:
+    """True if another environment or stage is being prepared, so that what is drawn now will not stay."""
+    task = workspace.lanes["light"].task
+    return task is not None and bool(task.name)
+
+
+def prepares(workspace: Workspace) -> bool:
+    """True if processes are at work on what the picture waits for, which may take all the memory that there is."""
+    lanes = workspace.lanes["trace"], workspace.compiler.lane
+    return relights(workspace) or any(lane.task is not None and lane.task.name for lane in lanes)
+
+
+#: Seconds after which a view is still.
+STILL = 0.25
+
+
+@dataclass
+class Comparing:
+    """Comparer of the views of a workspace, one after the other."""
+
+    work: Workspace
+    _view: object = None
+    _since: float = 0.0
+    _begun: bool = False
+
+    def step(self, size: tuple[int, int]) -> bool:
+        """Begin, if it is time; returns whether a view is still to be compared.
+
+        Parameters
+        ----------
+        size : (width, height)
+            Of the viewport, in pixels.
+        """
+        scene, display = self.work.scene(), self.work.document.display
+        measured = scene is not None and (display.inset or measurable(scene))
+        view = scene, display.method, display.compare, measured
+        if view != self._view:
+            self._view, self._since, self._begun = view, time.monotonic(), False
+            if (last := self.work.lanes["draw"].task) is not None:
+                last.cancel()
+        if scene is None or self._begun:
+            return False
+        if time.monotonic() - self._since <= STILL or prepares(self.work):
+            return True
+        self._begun = True
+        if self.work.shown_bake is None:
+            self._begin(scene, size, measured=measured)
+        return False
+
+    def _begin(self, scene: Scene, size: tuple[int, int], *, measured: bool) -> None:
+        display = self.work.document.display
+        method = method_of(display.method, self.work.document.material)
+        if measured:
+            self.work.measure(scene, method, size, self._take)
+        if display.compare in ("reference", "error"):
+            levels = (1,) if display.compare == "error" else None
+            self.work.draw_truth(scene, method, size, levels)
+
+    def _take(self, measured: Measurement) -> None:
+        self.work.measured = measured

@@ -9,13 +9,12 @@ from imgui_bundle import ImVec2, imgui
 
 from translucent.arrays import Array
 from translucent.frames.aovs import false_colors, marks
-from translucent.preview import numbers
 from translucent.preview.actions import Pan, Turn, Zoom
-from translucent.preview.desk import Desk, Probed, em
+from translucent.preview.document import camera_of, length_text, triple_text
 from translucent.preview.measuring import Crossing
-from translucent.preview.orbiting import camera_of
-from translucent.preview.panels.library import PRESET
-from translucent.preview.scales import thickest, worst
+from translucent.preview.panels.material import PRESET
+from translucent.preview.viewport_renderer import thickest, worst
+from translucent.preview.window_state import Probed, WindowState, em
 from translucent.scene.camera import Camera
 from translucent.units import metres_per_unit
 
@@ -31,88 +30,88 @@ SMALLEST = 32
 WHITE, BLACK, SHADE = 0xFFFFFFFF, 0xFF000000, 0xB0181818
 
 
-def viewport_panel(desk: Desk) -> None:
+def viewport_panel(state: WindowState) -> None:
     """Draw the picture in the whole window, and its overlays."""
     corner, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
     scale = imgui.get_io().display_framebuffer_scale
     pixels = int(room.x * scale.x), int(room.y * scale.y)
     if min(pixels) < SMALLEST:
         return  # panels have no places yet: a model would be framed for a viewport that nobody sees
-    desk.more = desk.draw(pixels)
+    state.more = state.draw(pixels)
     if imgui.is_window_docked():
         # Behind all panels, of which this one is transparent: on a software rasterizer imgui takes long for pictures.
         bottom = imgui.get_io().display_size.y - corner.y - room.y
-        desk.stage.show_in((round(corner.x * scale.x), round(bottom * scale.y), *pixels))
+        state.view.show_in((round(corner.x * scale.x), round(bottom * scale.y), *pixels))
     else:
-        texture = desk.stage.viewport.texture
+        texture = state.view.viewport.texture
         imgui.image(imgui.ImTextureRef(texture.glo), room, ImVec2(0, 1), ImVec2(1, 0))
         imgui.set_cursor_screen_pos(corner)
     buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
     imgui.invisible_button("##viewport", room, buttons | imgui.ButtonFlags_.mouse_button_middle)
-    _take_dragged(desk, corner, room)
-    _mouse(desk, corner, room)
+    _take_dragged(state, corner, room)
+    _mouse(state, corner, room)
     over = imgui.get_window_draw_list()
     over.push_clip_rect(corner, ImVec2(corner.x + room.x, corner.y + room.y), True)
-    _selected(desk, over, corner, room)
-    _split(desk, over, corner, room)
-    _scale(desk, over, corner, room)
-    _inset(desk, over, corner, room)
-    _probe(desk, over, corner, room)
-    _status(desk, over, corner, room)
+    _selected(state, over, corner, room)
+    _split(state, over, corner, room)
+    _scale(state, over, corner, room)
+    _inset(state, over, corner, room)
+    _probe(state, over, corner, room)
+    _status(state, over, corner, room)
     over.pop_clip_rect()
 
 
-def _take_dragged(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
+def _take_dragged(state: WindowState, corner: ImVec2, room: ImVec2) -> None:
     """Take a preset that is dragged from the library."""
     if not imgui.begin_drag_drop_target():
         return
     if imgui.accept_drag_drop_payload_py_id(PRESET) is not None:
         place = imgui.get_io().mouse_pos
-        desk.drop_preset(desk.dragged, ((place.x - corner.x) / room.x, (place.y - corner.y) / room.y))
+        state.drop_preset(state.dragged, ((place.x - corner.x) / room.x, (place.y - corner.y) / room.y))
     imgui.end_drag_drop_target()
 
 
-def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
+def _mouse(state: WindowState, corner: ImVec2, room: ImVec2) -> None:
     io = imgui.get_io()
     if imgui.is_item_activated():
-        desk.drag += 1
-        desk.pressed_at = io.mouse_pos.x, io.mouse_pos.y
+        state.drag += 1
+        state.pressed_at = io.mouse_pos.x, io.mouse_pos.y
     if imgui.is_item_active() and (io.mouse_delta.x or io.mouse_delta.y):
         right, down = io.mouse_delta.x, io.mouse_delta.y
         turning = imgui.is_mouse_dragging(0, 0.0)
-        split = desk.get("display.split") if desk.get("display.compare") != "off" else None
-        started = desk.pressed_at[0] - corner.x
-        if split is not None and turning and (desk.dragging_split or abs(started - split * room.x) < em(0.7)):
-            desk.dragging_split = True
+        split = state.get("display.split") if state.get("display.compare") != "off" else None
+        started = state.pressed_at[0] - corner.x
+        if split is not None and turning and (state.dragging_split or abs(started - split * room.x) < em(0.7)):
+            state.dragging_split = True
             share = (io.mouse_pos.x - corner.x) / room.x
-            desk.change("display.split", min(max(share, 0.0), 1.0))
+            state.change("display.split", min(max(share, 0.0), 1.0))
         elif turning and imgui.is_key_down(imgui.Key.l):
-            desk.turn_light(180.0 * right / room.x, -180.0 * down / room.y)
+            state.turn_light(180.0 * right / room.x, -180.0 * down / room.y)
         elif turning and imgui.is_key_down(imgui.Key.e):
-            desk.change("look.rotation", math.remainder(desk.get("look.rotation") + DEGREES * right / room.x, 360.0))
+            state.change("look.rotation", math.remainder(state.get("look.rotation") + DEGREES * right / room.x, 360.0))
         elif turning and not io.key_shift:
-            desk.work.do(Turn(-DEGREES * right / room.x, DEGREES * down / room.x))
+            state.work.do(Turn(-DEGREES * right / room.x, DEGREES * down / room.x))
         else:
-            desk.work.do(Pan(right / room.y, down / room.y))
+            state.work.do(Pan(right / room.y, down / room.y))
     if not imgui.is_mouse_down(0):
-        desk.dragging_split = False
+        state.dragging_split = False
     if imgui.is_item_hovered() and io.mouse_wheel:
         at = io.mouse_pos.x - corner.x - 0.5 * room.x, io.mouse_pos.y - corner.y - 0.5 * room.y
-        desk.work.do(Zoom(WHEEL**io.mouse_wheel, at[0] / room.y, at[1] / room.y))
-    moved = math.hypot(io.mouse_pos.x - desk.pressed_at[0], io.mouse_pos.y - desk.pressed_at[1])
+        state.work.do(Zoom(WHEEL**io.mouse_wheel, at[0] / room.y, at[1] / room.y))
+    moved = math.hypot(io.mouse_pos.x - state.pressed_at[0], io.mouse_pos.y - state.pressed_at[1])
     if imgui.is_item_deactivated() and moved < em(0.3):
-        desk.pick(((io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y), desk.select)
-    desk.hovered = None
+        state.pick(((io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y), state.select)
+    state.hovered = None
     if imgui.is_item_hovered() and not imgui.is_any_mouse_down():
-        desk.hovered = (io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y
+        state.hovered = (io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y
 
 
-def _selected(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+def _selected(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
     """Draw the corners of the selected object's box, and its name."""
-    orbit = desk.work.document.orbit
-    if desk.target is None or orbit is None or desk.target in desk.work.document.hidden:
+    orbit = state.work.document.orbit
+    if state.target is None or orbit is None or state.target in state.work.document.hidden:
         return
-    item, camera = desk.objects[desk.target], camera_of(orbit)
+    item, camera = state.objects[state.target], camera_of(orbit)
     places = on_screen(camera, item.bounds, (room.x, room.y))
     if places is None:
         return
@@ -124,7 +123,7 @@ def _selected(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) 
             for color, wide in ((BLACK, 0.25), (WHITE, 0.1)):
                 over.add_line(at, ImVec2(at.x + right * side, at.y), color, em(wide))
                 over.add_line(at, ImVec2(at.x, at.y + down * side), color, em(wide))
-    _label(over, ImVec2(corner.x + low[0], corner.y + low[1] - em(1.4)), desk.name_of(desk.target))
+    _label(over, ImVec2(corner.x + low[0], corner.y + low[1] - em(1.4)), state.name_of(state.target))
 
 
 def on_screen(camera: Camera, bounds: Array, size: tuple[float, float]) -> Array | None:
@@ -139,23 +138,23 @@ def on_screen(camera: Camera, bounds: Array, size: tuple[float, float]) -> Array
     return np.asarray((local[:, :2] / half * (1.0, -1.0) + 1.0) / 2.0 * size)
 
 
-def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
-    display = desk.work.document.display
+def _split(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    display = state.work.document.display
     if display.compare == "off":
         return
     x = corner.x + display.split * room.x
     for color, wide in ((BLACK, 0.12), (WHITE, 0.0)):  # seen on every background
         over.add_line(ImVec2(x, corner.y), ImVec2(x, corner.y + room.y), color, em(0.1 + wide))
         over.add_circle_filled(ImVec2(x, corner.y + 0.5 * room.y), em(0.45 + 0.5 * wide), color)
-    plans = desk.stage.plans
+    plans = state.view.plans
     left = type(plans[0].method).__name__ if plans[0] is not None else display.method
     right = {"method": display.method_b, "reference": "float64 reference", "error": "thickness less the reference"}
     name = right[display.compare]
     if display.compare == "method" and plans[1] is not None:
         name = type(plans[1].method).__name__
     if display.compare in ("reference", "error"):
-        truth = desk.work.truth
-        if not desk.stage.has_truth():
+        truth = state.work.truth
+        if not state.view.has_truth():
             name += ": being drawn ..."
         elif truth is not None and truth.level > 1:
             name += f", 1/{truth.level} so far"
@@ -165,14 +164,14 @@ def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
         _label(over, ImVec2(x - width - em(0.8), top), left)
     if corner.x + room.x - x > imgui.calc_text_size(name).x + em(1.2):
         _label(over, ImVec2(x + em(0.8), top), name)
-    if display.compare == "error" and desk.stage.has_truth():
-        _error_scale(desk, over, ImVec2(corner.x + room.x, corner.y + room.y))
+    if display.compare == "error" and state.view.has_truth():
+        _error_scale(state, over, ImVec2(corner.x + room.x, corner.y + room.y))
 
 
-def _error_scale(desk: Desk, over: imgui.ImDrawList, end: ImVec2) -> None:
+def _error_scale(state: WindowState, over: imgui.ImDrawList, end: ImVec2) -> None:
     """Draw the scale of differences of thickness in the lower right corner."""
-    unit = desk.get("display.unit")
-    most = worst(desk.work) / metres_per_unit(unit)
+    unit = state.get("display.unit")
+    most = worst(state.work) / metres_per_unit(unit)
     width, height, line = em(18.0), em(0.8), imgui.get_text_line_height()
     left, top = end.x - width - em(1.4), end.y - em(1.6) - height - line
     over.add_rect_filled(ImVec2(left - em(0.6), top - 1.3 * line), ImVec2(end.x - em(0.6), end.y - em(0.7)), SHADE)
@@ -196,9 +195,9 @@ def error_color(share: float) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+def _scale(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
     """Draw the scale of false colors with lengths, or the legend of validity."""
-    display = desk.work.document.display
+    display = state.work.document.display
     if display.mode not in ("thickness", "validity"):
         return
     left, bottom = corner.x + em(1.0), corner.y + room.y - em(1.0)
@@ -215,7 +214,7 @@ def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
         color = 0xFF000000 | blue << 16 | green << 8 | red
         begin, end = left + width * i / parts, left + width * (i + 1) / parts
         over.add_rect_filled(ImVec2(begin, top), ImVec2(end + 1.0, top + height), color)
-    most = thickest(desk.work) / metres_per_unit(display.unit)
+    most = thickest(state.work) / metres_per_unit(display.unit)
     free = left - em(1.0)
     for value in marks(most):
         text = f"{value:.4g}"
@@ -227,12 +226,12 @@ def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
             free = x + half + em(0.4)
 
 
-def _inset(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+def _inset(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
     """Draw the reference of the measurement in the corner."""
-    measured = desk.work.measured
-    if not desk.get("display.inset") or measured is None or measured.scene is not desk.work.scene():
+    measured = state.work.measured
+    if not state.get("display.inset") or measured is None or measured.scene is not state.work.scene():
         return
-    texture = desk.inset_texture(measured.truth)
+    texture = state.inset_texture(measured.truth)
     width = min(em(14.0), 0.3 * room.x)
     height = width * texture.height / texture.width
     low = ImVec2(corner.x + room.x - width - em(0.6), corner.y + room.y - height - em(0.6))
@@ -241,15 +240,15 @@ def _inset(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
     over.add_rect(low, high, WHITE)
     text = "reference, straight rays"
     if measured.errors:
-        text += f"; error {numbers.length_text(measured.errors[0].median, desk.get('display.unit'))}"
+        text += f"; error {length_text(measured.errors[0].median, state.get('display.unit'))}"
     _label(over, ImVec2(min(low.x, high.x - imgui.calc_text_size(text).x - em(0.6)), low.y - em(1.5)), text)
 
 
-def _probe(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
-    position = desk.hovered or desk.pinned
+def _probe(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    position = state.hovered or state.pinned
     if position is None:
         return
-    lines = probe_lines(desk, position)
+    lines = probe_lines(state, position)
     if not lines:
         return
     x, y = corner.x + position[0] * room.x, corner.y + position[1] * room.y
@@ -264,67 +263,67 @@ def _probe(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
         over.add_text(ImVec2(left + em(0.5), at), WHITE, line)
 
 
-def probe_lines(desk: Desk, position: tuple[float, float]) -> list[str]:
+def probe_lines(state: WindowState, position: tuple[float, float]) -> list[str]:
     """Lines about a probed pixel: values of the frame on show, and of the float64 reference when they are there."""
-    scene, viewport = desk.work.scene(), desk.stage.viewport
+    scene, viewport = state.work.scene(), state.view.viewport
     if scene is None:
         return []
     pixel = (
         min(max(int(position[0] * viewport.size[0]), 0), viewport.size[0] - 1),
         min(max(int(position[1] * viewport.size[1]), 0), viewport.size[1] - 1),
     )
-    display = desk.work.document.display
+    display = state.work.document.display
     right = display.compare == "method" and position[0] > display.split
-    probe = desk.stage.probe(*pixel, 1 if right else 0)
-    if desk.probed is None or desk.probed.pixel != pixel or desk.probed.scene is not scene:
-        desk.probed = Probed(pixel, scene)
+    probe = state.view.probe(*pixel, 1 if right else 0)
+    if state.probed is None or state.probed.pixel != pixel or state.probed.scene is not scene:
+        state.probed = Probed(pixel, scene)
     if probe is None:
         return []
-    known = desk.probed.crossing
-    if known is None and not desk.probed.asked:
-        _ask_crossing(desk, desk.probed)
+    known = state.probed.crossing
+    if known is None and not state.probed.asked:
+        _ask_crossing(state, state.probed)
     if not probe.covered and probe.valid:
         return ["no medium"]
     with np.errstate(under="ignore"):
         passed = np.exp(-np.asarray(probe.optical_depth))
     lines = [
-        f"thickness {numbers.length_text(probe.thickness, display.unit)}",
-        f"sigma_t d {numbers.triple_text(probe.optical_depth)}",
-        f"T {numbers.triple_text(passed)}",
-        "valid" if probe.valid else f"not valid: {why_not(desk, right)}",
+        f"thickness {length_text(probe.thickness, display.unit)}",
+        f"sigma_t d {triple_text(probe.optical_depth)}",
+        f"T {triple_text(passed)}",
+        "valid" if probe.valid else f"not valid: {why_not(state, right)}",
     ]
     if known is not None:
-        lines.insert(1, f"reference {numbers.length_text(known.thickness, display.unit)}, {known.layers} layers")
+        lines.insert(1, f"reference {length_text(known.thickness, display.unit)}, {known.layers} layers")
         if known.body is not None:
             lines.insert(0, scene.objects[known.body].mesh.name)
     return lines
 
 
-def why_not(desk: Desk, right: bool) -> str:
+def why_not(state: WindowState, right: bool) -> str:
     """Reason why a pixel is invalid."""
-    plan = desk.stage.plans[1 if right else 0]
+    plan = state.view.plans[1 if right else 0]
     return "; ".join(plan.limits) if plan is not None and plan.limits else "its surfaces do not balance"
 
 
-def _ask_crossing(desk: Desk, probed: Probed) -> None:
-    scene, size = desk.work.scene(), desk.stage.viewport.size
-    if scene is None or desk.work.lanes["ray"].task is not None:
+def _ask_crossing(state: WindowState, probed: Probed) -> None:
+    scene, size = state.work.scene(), state.view.viewport.size
+    if scene is None or state.work.lanes["ray"].task is not None:
         return
     probed.asked = True
 
     def take(found: Crossing) -> None:
         probed.crossing = found
 
-    desk.work.cross(scene, size, probed.pixel, take)
+    state.work.cross(scene, size, probed.pixel, take)
 
 
-def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+def _status(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
     """Draw the status: why the picture is incomplete or simpler, and work under way."""
-    y = corner.y + em(0.4) + (em(1.8) if desk.get("display.compare") != "off" else 0.0)
-    stage = desk.stage
-    known = stage.simpler, *stage.ways.told, stage.converging.told, stage.photons.told
+    y = corner.y + em(0.4) + (em(1.8) if state.get("display.compare") != "off" else 0.0)
+    stage = state.view
+    known = stage.simpler, *stage.quality.told, stage.converging.told, stage.photons.told
     lines = [text for text in (stage.problem, stage.shader_problem, *known) if text]
-    slow = [task for task in desk.work.busy if task.name and task.seconds > 1.0]
+    slow = [task for task in state.work.busy if task.name and task.seconds > 1.0]
     lines += [task.told for task in slow]
     for text in lines:
         for line in folded(text, room.x - em(2.0)):

@@ -17,42 +17,40 @@ import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
 from translucent.planning.render_plan import RenderPlan
-from translucent.preview import diffusing, presenting
-from translucent.preview import stage as stages
-from translucent.preview.actions import Change, ChoosePreset, Turn
-from translucent.preview.diffusing import SMALL
+from translucent.preview import quality, viewport_renderer
+from translucent.preview.actions import ChoosePreset, SetField, Turn
 from translucent.preview.document import Model
 from translucent.preview.measuring import crossing
-from translucent.preview.stage import Stage
+from translucent.preview.quality import SMALL, StepTimes
 from translucent.preview.tasks import Task
-from translucent.preview.timing import Pace
+from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 
 
 @pytest.fixture
-def stage() -> Iterator[Stage]:
-    made = Stage()
+def view() -> Iterator[ViewportRenderer]:
+    made = ViewportRenderer()
     yield made
     made.close()
 
 
 @pytest.mark.parametrize("budget", [1e9, 0.0])
 def test_the_picture_is_the_one_that_render_makes(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch, budget: float
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch, budget: float
 ) -> None:
     """At once, and from the smallest steps: these differ by float32 rounding at silhouettes only."""
-    monkeypatch.setattr(stages, "BUDGET", budget)
-    finish(stage, work)
+    monkeypatch.setattr(viewport_renderer, "BUDGET", budget)
+    finish(view, work)
     work.do(Turn(20.0, 10.0))  # by now the stage knows what a step takes
-    finish(stage, work)
+    finish(view, work)
     scene = work.scene()
     assert scene is not None
-    with stage.current():
-        frame = stage.renderer.render(scene, SIZE)
-    different = np.abs(pixels(stage) - frame.to_srgb8()).max(axis=2) > 1
+    with view.current():
+        frame = view.renderer.render(scene, SIZE)
+    different = np.abs(pixels(view) - frame.to_srgb8()).max(axis=2) > 1
     assert different.mean() < 2e-3
     y, x = np.argwhere(frame.coverage)[frame.coverage.sum() // 2]
-    probe = stage.probe(int(x), int(y))
+    probe = view.probe(int(x), int(y))
     assert probe is not None
     assert probe.thickness == pytest.approx(frame.thickness[y, x], rel=1e-5)
     assert (probe.covered, probe.valid) == (True, True)
@@ -64,223 +62,225 @@ def test_the_picture_is_the_one_that_render_makes(
 
 @pytest.mark.parametrize("slow", [False, True])
 def test_slow_traced_interfaces_wait_until_the_view_is_still(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch, slow: bool
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch, slow: bool
 ) -> None:
-    work.do(Change("material.ior", 1.5))
-    finish(stage, work)
-    assert stage.plans[0] is not None
-    usual = stage.plans[0].interfaces
+    work.do(SetField("material.ior", 1.5))
+    finish(view, work)
+    assert view.plans[0] is not None
+    usual = view.plans[0].interfaces
     assert usual == tl.TracedInterfaces(depth=12)
-    monkeypatch.setattr(stages, "BUDGET", 0.0 if slow else 1e9)
-    monkeypatch.setattr(Pace, "stride", lambda *_: 4 if slow else 1)  # not 256 steps for a picture
+    monkeypatch.setattr(viewport_renderer, "BUDGET", 0.0 if slow else 1e9)
+    monkeypatch.setattr(StepTimes, "stride", lambda *_: 4 if slow else 1)  # not 256 steps for a picture
     drawn: list[RenderPlan] = []
-    draw = stage.renderer.draw
+    draw = view.renderer.draw
 
     def spied(*given: Any, **options: Any) -> RenderPlan:
         drawn.append(draw(*given, **options))
         return drawn[-1]
 
-    monkeypatch.setattr(stage.renderer, "draw", spied)
+    monkeypatch.setattr(view.renderer, "draw", spied)
     for _ in range(2):
         work.do(Turn(20.0, 10.0))
-        assert stage.draw(work, SIZE)
-        assert ("interfaces in screen space while the picture moves" in stage.simpler) is slow
+        assert view.draw(work, SIZE)
+        assert ("interfaces in screen space while the picture moves" in view.simpler) is slow
     assert [plan.interfaces for plan in drawn] == 2 * [tl.ScreenInterfaces() if slow else usual]
-    finish(stage, work)
-    assert (stage.simpler, stage.plans[0].interfaces) == ("", usual)
+    finish(view, work)
+    assert (view.simpler, view.plans[0].interfaces) == ("", usual)
     scene = work.scene()
     assert scene is not None
-    with stage.current():
-        frame = stage.renderer.render(scene, SIZE)
-    assert np.abs(pixels(stage) - frame.to_srgb8().astype(int)).mean() < 1.0
+    with view.current():
+        frame = view.renderer.render(scene, SIZE)
+    assert np.abs(pixels(view) - frame.to_srgb8().astype(int)).mean() < 1.0
 
 
 def test_samples_wait_for_an_environment_that_is_being_read(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All pixels of the last picture are drawn, once, and smoothed when it is known to stay."""
-    monkeypatch.setattr(stages, "BUDGET", 1e9)
-    work.do(Change("display.antialias", True))
-    finish(stage, work)
-    assert stage.viewport.steps(0) > 1
+    monkeypatch.setattr(viewport_renderer, "BUDGET", 1e9)
+    work.do(SetField("display.antialias", True))
+    finish(view, work)
+    assert view.viewport.steps(0) > 1
     reads = threading.Event()
     work.lanes["light"].start("reading the environment", lambda _: reads.wait(60.0), lambda _: None)
-    stage.viewport.restart()
+    view.viewport.restart()
     for _ in range(4):
-        assert stage.draw(work, SIZE)
-    assert stage.viewport.steps(0) == 1
+        assert view.draw(work, SIZE)
+    assert view.viewport.steps(0) == 1
     reads.set()
-    finish(stage, work)
-    assert stage.viewport.steps(0) > 1
+    finish(view, work)
+    assert view.viewport.steps(0) > 1
 
 
 def test_light_diffuses_as_soon_as_it_is_solved_for(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Until then, and in every picture for which it is not known, bodies are layers; a camera may move."""
-    monkeypatch.setattr(stages, "PREPARING", 1e9)  # what is solved for in a frame is drawn in it
+    monkeypatch.setattr(viewport_renderer, "PREPARING", 1e9)  # what is solved for in a frame is drawn in it
     work.do(ChoosePreset("whole_milk"))
-    assert stage.draw(work, SIZE)
-    assert "until its diffusion is solved for" in stage.ways.told[1]
-    assert stage.plans[0] is not None
-    assert stage.plans[0].given_back.layered == (0,)
-    finish(stage, work)
-    assert stage.ways.told[1] == ""
-    assert stage.plans[0].given_back.diffused == (0,)
+    assert view.draw(work, SIZE)
+    assert "until its diffusion is solved for" in view.quality.told[1]
+    assert view.plans[0] is not None
+    assert view.plans[0].given_back.layered == (0,)
+    finish(view, work)
+    assert view.quality.told[1] == ""
+    assert view.plans[0].given_back.diffused == (0,)
     scene = work.scene()
     assert scene is not None
-    with stage.current():
-        frame = stage.renderer.render(scene, SIZE)
-    assert np.abs(pixels(stage) - frame.to_srgb8().astype(int)).mean() < 1.0
-    work.do(Change("look.light", True))
-    finish(stage, work)
-    for action, told in ((Turn(20.0, 10.0), ""), (Change("look.light_yaw", 3.0), "on a small grid")):
+    with view.current():
+        frame = view.renderer.render(scene, SIZE)
+    assert np.abs(pixels(view) - frame.to_srgb8().astype(int)).mean() < 1.0
+    work.do(SetField("look.light", True))
+    finish(view, work)
+    for action, told in ((Turn(20.0, 10.0), ""), (SetField("look.light_yaw", 3.0), "on a small grid")):
         work.do(action)
-        stage.draw(work, SIZE)
-        assert (told in stage.ways.told[1]) if told else not stage.ways.told[1]
-        assert stage.plans[0].given_back.diffusion == (SMALL if told else tl.Diffusion())
+        view.draw(work, SIZE)
+        assert (told in view.quality.told[1]) if told else not view.quality.told[1]
+        assert view.plans[0].given_back.diffusion == (SMALL if told else tl.Diffusion())
         assert work.lanes["diffuse"].task is None  # while the light moves, nothing is looked for that nobody will see
-    finish(stage, work)
-    assert stage.plans[0].given_back.diffusion == tl.Diffusion()
-    work.do(Change("display.scattering", "single"))
-    finish(stage, work)
-    assert not stage.plans[0].given_back
+    finish(view, work)
+    assert view.plans[0].given_back.diffusion == tl.Diffusion()
+    work.do(SetField("display.scattering", "single"))
+    finish(view, work)
+    assert not view.plans[0].given_back
 
 
 def test_light_that_takes_long_to_solve_for_is_drawn_in_the_next_frame(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Solve in one frame and draw that light in the next, though another is wanted by then: what moves is drawn."""
     work.do(ChoosePreset("whole_milk"))
-    work.do(Change("look.light", True))
-    finish(stage, work)
-    monkeypatch.setattr(stages, "PREPARING", 0.0)
-    monkeypatch.setattr(diffusing, "LONGEST", 1e9)
+    work.do(SetField("look.light", True))
+    finish(view, work)
+    monkeypatch.setattr(viewport_renderer, "PREPARING", 0.0)
+    monkeypatch.setattr(quality, "LONGEST", 1e9)
     drawn: list[tl.Scene] = []
-    draw = stage.renderer.draw
-    monkeypatch.setattr(stage.renderer, "draw", lambda scene, *a, **k: (drawn.append(scene), draw(scene, *a, **k))[1])
+    draw = view.renderer.draw
+    monkeypatch.setattr(view.renderer, "draw", lambda scene, *a, **k: (drawn.append(scene), draw(scene, *a, **k))[1])
     scenes = []
     for yaw in range(1, 7):
-        work.do(Change("look.light_yaw", float(yaw)))
+        work.do(SetField("look.light_yaw", float(yaw)))
         scenes.append(work.scene())
-        assert stage.draw(work, SIZE)
+        assert view.draw(work, SIZE)
     assert [id(scene) for scene in drawn] == [id(scene) for scene in scenes[::2]]
     assert work.lanes["diffuse"].task is None
-    finish(stage, work)
-    assert stage.ways.told[1] == ""
+    finish(view, work)
+    assert view.quality.told[1] == ""
 
 
 def test_a_picture_that_takes_long_to_be_shown_has_frames_for_that(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stages, "BUDGET", 0.0)
-    monkeypatch.setattr(Pace, "stride", lambda *_: 4)  # steps of 4 x 4: in fewer frames than the 16 x 16 of that budget
-    work.do(Change("display.antialias", False))
-    finish(stage, work)
-    whole = pixels(stage)
-    monkeypatch.setattr(presenting, "QUICK", 0.0)
-    monkeypatch.setattr(presenting, "APART", 0.0)
+    monkeypatch.setattr(viewport_renderer, "BUDGET", 0.0)
+    monkeypatch.setattr(
+        StepTimes, "stride", lambda *_: 4
+    )  # steps of 4 x 4: in fewer frames than the 16 x 16 of that budget
+    work.do(SetField("display.antialias", False))
+    finish(view, work)
+    whole = pixels(view)
+    monkeypatch.setattr(viewport_renderer, "QUICK", 0.0)
+    monkeypatch.setattr(viewport_renderer, "APART", 0.0)
     frame: list[str] = []
     for name in ("step", "present"):
-        done = getattr(stage.viewport, name)
+        done = getattr(view.viewport, name)
         monkeypatch.setattr(
-            stage.viewport, name, lambda *a, done=done, name=name, **k: (frame.append(name), done(*a, **k))
+            view.viewport, name, lambda *a, done=done, name=name, **k: (frame.append(name), done(*a, **k))
         )
     work.do(Turn(20.0, 10.0))
     frames = []
-    while stage.draw(work, SIZE):
+    while view.draw(work, SIZE):
         frames.append(tuple(frame))
         frame.clear()
     assert frames[1] == ("step", "present")  # the first that is sharper than what moved
     assert set(frames[2:]) == {("step",), ("present",)}
     work.do(Turn(-20.0, -10.0))
-    finish(stage, work)
-    assert (pixels(stage) != whole).mean() < 1e-3  # the last step is shown, too
+    finish(view, work)
+    assert (pixels(view) != whole).mean() < 1e-3  # the last step is shown, too
 
 
 def test_light_that_cannot_be_solved_for_is_told_once(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
         raise tl.RenderError("diffusion in a body", "the solver is not there", "render layers")
 
-    monkeypatch.setattr(stage.renderer.gpu.diffusion, "solve", fail)
+    monkeypatch.setattr(view.renderer.gpu.diffusion, "solve", fail)
     work.do(ChoosePreset("whole_milk"))
-    finish(stage, work)
-    assert "since it could not be solved for" in stage.ways.told[1]
+    finish(view, work)
+    assert "since it could not be solved for" in view.quality.told[1]
     assert [message.kind for message in work.messages] == ["error"]
-    assert stage.plans[0] is not None
-    assert stage.plans[0].given_back.layered == (0,)
+    assert view.plans[0] is not None
+    assert view.plans[0].given_back.layered == (0,)
 
 
-def test_smooth_edges_are_those_of_many_samples(stage: Stage, work: Workspace) -> None:
-    work.do(Change("display.antialias", True))
-    finish(stage, work)
+def test_smooth_edges_are_those_of_many_samples(view: ViewportRenderer, work: Workspace) -> None:
+    work.do(SetField("display.antialias", True))
+    finish(view, work)
     scene = work.scene()
     assert scene is not None
-    with stage.current():
-        frames = [stage.renderer.render(scene, SIZE, samples=n) for n in (64, 1)]
+    with view.current():
+        frames = [view.renderer.render(scene, SIZE, samples=n) for n in (64, 1)]
     smooth, sharp = (frame.to_srgb8().astype(int) for frame in frames)
-    shown = pixels(stage)
+    shown = pixels(view)
     assert np.abs(shown - smooth).mean() < 0.5 * np.abs(sharp - smooth).mean()
 
 
 def test_a_split_shows_another_method_and_then_the_reference(
-    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stages, "BUDGET", 1e9)  # both sides take steps of one size
-    work.do(Change("display.mode", "thickness"))
-    work.do(Change("display.compare", "method"))
-    finish(stage, work)
+    monkeypatch.setattr(viewport_renderer, "BUDGET", 1e9)  # both sides take steps of one size
+    work.do(SetField("display.mode", "thickness"))
+    work.do(SetField("display.compare", "method"))
+    finish(view, work)
     scene = work.scene()
     assert scene is not None
-    left, right = (stage.viewport.steps(side) for side in (0, 1))
+    left, right = (view.viewport.steps(side) for side in (0, 1))
     assert left == right > 0
-    sheet = stage.probe(80, 48, 1)
-    solid = stage.probe(80, 48, 0)
+    sheet = view.probe(80, 48, 1)
+    solid = view.probe(80, 48, 0)
     assert sheet is not None
     assert solid is not None
     assert sheet.thickness != solid.thickness
-    work.do(Change("display.compare", "reference"))
+    work.do(SetField("display.compare", "reference"))
     work.draw_truth(scene, None, SIZE, (1,))
     wait(work, lambda: work.truth is not None and work.lanes["truth"].task is None)
-    finish(stage, work)
-    assert stage.has_truth()
-    truth = stage.probe(80, 48, 1)
+    finish(view, work)
+    assert view.has_truth()
+    truth = view.probe(80, 48, 1)
     assert truth is not None
     assert truth.thickness == pytest.approx(solid.thickness, rel=1e-4, abs=1e-9)
 
 
 def test_a_shader_that_does_not_compile_leaves_the_last_good_one(
-    stage: Stage, work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    view: ViewportRenderer, work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    finish(stage, work)
-    before = pixels(stage)
+    finish(view, work)
+    before = pixels(view)
     shutil.copytree(data._folder("shaders"), tmp_path / "shaders")
     monkeypatch.setattr(data, "_folder", lambda kind: tmp_path / kind)
     broken = tmp_path / "shaders" / "thickness" / "signed_depth.frag"
     good = broken.read_text()
     broken.write_text(good + "\nvoid broken( {\n")
-    stage.reload(work)
-    assert "shaders/thickness/signed_depth.frag:" in stage.shader_problem
+    view.reload(work)
+    assert "shaders/thickness/signed_depth.frag:" in view.shader_problem
     work.do(Turn(1.0, 0.0))
     work.do(Turn(-1.0, 0.0))
-    finish(stage, work)
-    assert stage.problem == ""
-    assert (np.abs(pixels(stage) - before).max(axis=2) > 1).mean() < 2e-3
+    finish(view, work)
+    assert view.problem == ""
+    assert (np.abs(pixels(view) - before).max(axis=2) > 1).mean() < 2e-3
     broken.write_text(good)
-    stage.reload(work)
-    assert stage.shader_problem == ""
-    finish(stage, work)
-    assert (np.abs(pixels(stage) - before).max(axis=2) > 1).mean() < 2e-3
+    view.reload(work)
+    assert view.shader_problem == ""
+    finish(view, work)
+    assert (np.abs(pixels(view) - before).max(axis=2) > 1).mean() < 2e-3
 
 
-def test_a_picture_that_is_too_large_is_told_and_the_stage_goes_on(stage: Stage, work: Workspace) -> None:
-    finish(stage, work)
-    assert not stage.draw(work, (1 << 20, 8))
-    assert "this OpenGL ends at" in stage.problem
-    finish(stage, work)
-    assert stage.problem == ""
+def test_a_picture_that_is_too_large_is_told_and_the_stage_goes_on(view: ViewportRenderer, work: Workspace) -> None:
+    finish(view, work)
+    assert not view.draw(work, (1 << 20, 8))
+    assert "this OpenGL ends at" in view.problem
+    finish(view, work)
+    assert view.problem == ""
 
 
 @pytest.mark.parametrize("content", [b"", b"glTF\x02\x00\x00\x00\xff\x00\x00\x00", None])

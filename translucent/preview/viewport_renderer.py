@@ -1,4 +1,4 @@
-"""Stage that draws the viewport: a renderer in the window's context, short steps, and shaders that may change."""
+"""Viewport renderer: short steps in the window's context, shaders that may change, and the picture as it is shown."""
 
 from __future__ import annotations
 
@@ -12,23 +12,129 @@ from translucent.errors import TranslucentError
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.compile_budget import PostponedError, ProgramName
 from translucent.gpu.context import open_context
-from translucent.gpu.viewport import Probe, Viewport
+from translucent.gpu.viewport import PixelProbe, Shown, Viewport
 from translucent.planning.methods import Method
 from translucent.planning.render_plan import RenderPlan
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
-from translucent.preview.converging import Converging
-from translucent.preview.photons import Photons
-from translucent.preview.preparations import relights
-from translucent.preview.presenting import Presenting
-from translucent.preview.scenes import method_of
-from translucent.preview.staging import tone_of
-from translucent.preview.strides import Strides, samples_of
+from translucent.preview.measuring import ReferencePicture
+from translucent.preview.quality import (
+    COARSEST_TRACED,
+    FACTORS,
+    PREPARING,
+    SCREEN,
+    FrameBudget,
+    InteractiveQuality,
+    StepTimes,
+    StepTiming,
+    Strides,
+    samples_of,
+)
+from translucent.preview.refining import Converging, Photons
+from translucent.preview.scenes import method_of, tone_of
 from translucent.preview.tasks import Task
-from translucent.preview.timing import COARSEST_TRACED, FACTORS, PREPARING, FrameBudget, Pace, Timing
-from translucent.preview.ways import SCREEN, Ways
-from translucent.preview.workspace import Workspace
+from translucent.preview.workspace import Workspace, relights
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
+
+
+def thickest(workspace: Workspace) -> float:
+    """Length in metres of the last false color: the thickest that was measured, or a guess."""
+    measured = workspace.measured
+    if measured is not None and measured.seen.thickness.size:
+        return float(measured.seen.thickness.max()) or 1.0
+    return workspace.loaded.scene.diagonal or 1.0 if workspace.loaded else 1.0
+
+
+def worst(workspace: Workspace) -> float:
+    """Largest error in metres that has a color of its own."""
+    measured = workspace.measured
+    least = 1e-7 * thickest(workspace)
+    return max(measured.errors[0].p99, least) if measured is not None and measured.errors else 10 * least
+
+
+#: Seconds up to which a presentation is quick: whatever changes is shown at once. Others are as many seconds apart, and
+#: have frames of their own, as the first of each kind has, which is compiled.
+QUICK, APART = 0.006, 0.25
+
+
+class Presenting:
+    """Presentation of a viewport.
+
+    Attributes
+    ----------
+    truth : ReferencePicture, optional
+        The reference right of the split.
+    shown : tuple
+        Key of what is on show; empty: nothing of the samples.
+    """
+
+    def __init__(self) -> None:
+        self.truth: ReferencePicture | None = None
+        self.shown: tuple[object, ...] = ()
+        self._wanted: tuple[Shown, tuple[object, ...]] | None = None
+        self._pending = self._alone = False
+        self._seconds = self._when = 0.0
+
+    def begin(self, workspace: Workspace, scene: Scene, viewport: Viewport, key: tuple[object, ...]) -> bool:
+        """Begin a frame that shows samples of a picture with a key; returns whether it is to do nothing else."""
+        display, look = workspace.document.display, workspace.document.look
+        wanted_method = method_of(display.method, workspace.document.material)
+        if display.compare in ("reference", "error"):
+            truth = workspace.truth
+            straight = display.compare == "error"
+            if self.truth is not None and straight and not self.truth.straight:
+                self.truth = None
+            fits = truth is not None and truth.scene is scene and truth.method == wanted_method
+            if fits and truth is not None and truth is not self.truth and truth.straight >= straight:
+                viewport.put(truth.frame)
+                self.truth, self._pending = truth, True
+        right = {"off": "same", "method": "second", "reference": "second", "error": "difference"}[display.compare]
+        if display.compare in ("reference", "error") and self.truth is None:
+            right = "same"
+        shown = Shown(
+            display.mode,
+            right,
+            display.split,
+            thickest(workspace),
+            worst(workspace),
+            look.exposure,
+            tone_of(look, scene),
+        )
+        self._wanted = shown, key
+        waits = self._wanted != self.shown or (self._pending and time.perf_counter() - self._when > APART)
+        first = self._is_first(viewport)
+        self._alone = (first or (waits and self._seconds > QUICK)) and viewport.steps(0) > 0
+        return self._alone
+
+    def present(self, viewport: Viewport, *, changed: bool, last: bool) -> bool:
+        """Show the samples so far, unless they are on show, or can be shown later; returns whether they have to be.
+
+        Parameters
+        ----------
+        viewport : Viewport
+        changed : bool
+            There are others than before.
+        last : bool
+            No others are to come.
+        """
+        assert self._wanted is not None
+        self._pending = self._pending or changed
+        now = self._alone or last or self._seconds <= QUICK
+        if self._wanted == self.shown and not (self._pending and now):
+            return False
+        if not self._alone and self._is_first(viewport):
+            return True
+        begun = time.perf_counter()
+        viewport.present(self._wanted[0])
+        viewport.engine.context.gl.finish()
+        self.shown, self._pending, self._when = self._wanted, False, time.perf_counter()
+        self._seconds = self._when - begun
+        return False
+
+    def _is_first(self, viewport: Viewport) -> bool:
+        """True if nothing has been shown so before."""
+        return self._wanted is not None and not viewport.presents_at_once(self._wanted[0])
+
 
 #: Largest time of a step in seconds, where the rest of the window takes little.
 BUDGET = 0.045
@@ -40,7 +146,7 @@ LAST = "the last picture, until the new one is prepared"
 WATCH = 0.5
 
 
-class Stage:
+class ViewportRenderer:
     """Stage: draws a workspace's scene into a texture.
 
     Parameters
@@ -54,12 +160,12 @@ class Stage:
     ----------
     plans : list of RenderPlan or None
         Of both sides; what ran and why.
-    timings : list of Timing
+    timings : list of StepTiming
     problem : str
         Why the picture is not what it should be, or nothing.
     shader_problem : str
         The compiler's message, while the last good shaders go on.
-    ways : Ways
+    quality : InteractiveQuality
         In which light that is scattered and interfaces are shown.
     converging : Converging
         Paths of the still picture.
@@ -88,7 +194,7 @@ class Stage:
         if compiler is not None:
             compiler.device = self.renderer.gpu.context.renderer
         self.plans: list[RenderPlan | None] = [None, None]
-        self.timings = [Timing(), Timing()]
+        self.timings = [StepTiming(), StepTiming()]
         self.problem = self.shader_problem = self.simpler = self.state = ""
         self.drawing, self.waits, self._begun = 0.0, False, False
         self._moving: RenderPlan | None = None
@@ -96,10 +202,10 @@ class Stage:
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
         self._asked: Task | None = None
-        self._presenting, self._pace = Presenting(), Pace()
+        self._presenting, self._pace = Presenting(), StepTimes()
         self._frame_budget, self._budget = FrameBudget(), BUDGET
         self._strides = Strides(self._pace)
-        self.ways = Ways(traced_at_once=compiler is None)
+        self.quality = InteractiveQuality(traced_at_once=compiler is None)
         self.converging, self.photons = Converging(), Photons()
         self._watched, self._newest = time.monotonic(), newest_shader()
 
@@ -148,13 +254,13 @@ class Stage:
         methods = [method_of(display.method, material), method_of(display.method_b, material)]
         if held is None:
             begun = time.perf_counter()
-            self.ways.choose(workspace, scene, methods[0], self.renderer)
+            self.quality.choose(workspace, scene, methods[0], self.renderer)
             spent = time.perf_counter() - begun
-            if self.ways.solved and spent > PREPARING * self._budget:
+            if self.quality.solved and spent > PREPARING * self._budget:
                 self._held = scene  # the next frame draws this one, or what moves all the time would not be drawn
                 return True
             self._budget -= min(spent, PREPARING * self._budget)
-        scattering, interfaces = self.ways.scattering, self.ways.interfaces
+        scattering, interfaces = self.quality.scattering, self.quality.interfaces
         second = methods[1] if both else None
         wanted = (scene, methods[0], second, scattering, interfaces, self.viewport.size, self.renderer)
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
@@ -184,7 +290,7 @@ class Stage:
         # One side at a time, the one that is behind: two would take twice as long.
         sides = sorted((0, 1), key=self.viewport.steps) if both else [0]
         lit = display.follows_photons and self.viewport.steps(0) >= self._strides.of[0] ** 2
-        still = (display.converges or display.follows_photons) and self.ways.traceable(workspace, scene)
+        still = (display.converges or display.follows_photons) and self.quality.traceable(workspace, scene)
         lit = lit and still
         # A large picture takes as long to be shown as a step: it has a frame for that alone.
         alone = self._presenting.begin(workspace, scene, self.viewport, self._shown)
@@ -202,8 +308,8 @@ class Stage:
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
-        look, scattering, interfaces = workspace.document.look, self.ways.scattering, self.ways.interfaces
-        shadows = self.ways.quick_shadows(scene)
+        look, scattering, interfaces = workspace.document.look, self.quality.scattering, self.quality.interfaces
+        shadows = self.quality.quick_shadows(scene)
         planned = partial(self.renderer.plan, scene, method, scattering=scattering, shadows=shadows)
         if shadows is not None:
             self._moving = planned(interfaces=interfaces)
@@ -230,7 +336,7 @@ class Stage:
             raise
         self._finish(0, plan, factor, begun)
         self.state = "moving" if factor == 1.0 else f"moving, {1 / factor:.0%} of the resolution"
-        if interfaces is not self.ways.interfaces:
+        if interfaces is not self.quality.interfaces:
             self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
         elif shadows is not None:
             self.simpler = f"shadows from {shadows.directions} directions of the environment while the picture moves"
@@ -256,7 +362,7 @@ class Stage:
         """Follow photons, or draw a step of the picture with their light; whether more is to come, and it changed."""
         photons = self.photons
         expected = 0.0 if self.plans[0] is None else self._pace.known(self.plans[0])
-        given = self.renderer, self.viewport, method, self.ways.scattering
+        given = self.renderer, self.viewport, method, self.quality.scattering
         if not photons.ready(workspace, scene, *given, self._budget, expected):
             if (plan := photons.show_media(self.viewport)) is not None:
                 self.plans[0], self._strides.of[0] = plan, self._pace.stride(plan, self._budget)
@@ -277,13 +383,13 @@ class Stage:
         self.renderer.gpu.context.gl.finish()
         wall = time.perf_counter() - begun
         self._pace.note(plan, wall * stride * stride)
-        self.timings[side] = Timing(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
+        self.timings[side] = StepTiming(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
 
     def has_truth(self) -> bool:
         """True if the split shows the reference."""
         return self._presenting.truth is not None
 
-    def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
+    def probe(self, x: int, y: int, side: int = 0) -> PixelProbe | None:
         """Values of a pixel of a side, once it is final."""
         done = self._strides.of[side] ** 2 if side == 0 or self.plans[1] is not None else 1
         if self.viewport.steps(side) < done:
@@ -361,7 +467,7 @@ class Stage:
         scene = workspace.scene()
         with self.current():
             fresh = Renderer(context=self._gl)
-            anew, viewport = partial(fresh.plan, scattering=self.ways.scattering), None
+            anew, viewport = partial(fresh.plan, scattering=self.quality.scattering), None
             try:
                 viewport = Viewport(fresh.gpu)
                 viewport.resize(FRAME)

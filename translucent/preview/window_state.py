@@ -1,6 +1,4 @@
-"""Window state that panels share: the workspace, the stage, and what is not part of a document. And the ways of a
-row.
-"""
+"""State of the window beside the document, and the widgets that panels share: rows, fields, cards."""
 
 from __future__ import annotations
 
@@ -9,24 +7,21 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from imgui_bundle import hello_imgui, imgui
+from imgui_bundle import ImVec2, hello_imgui, imgui
 
 from translucent.errors import TranslucentError
-from translucent.preview.actions import Assign, Change, ChoosePreset, changed_material, preset_material
-from translucent.preview.browser import Browser
-from translucent.preview.comparing import Comparing
-from translucent.preview.dialogs import browser_for, open_dialog
-from translucent.preview.document import RANGES, Material
-from translucent.preview.environments import EnvironmentFolder
+from translucent.preview.actions import Assign, ChoosePreset, SetField, changed_material, preset_material
+from translucent.preview.dialogs import Browser, browser_for, open_dialog
+from translucent.preview.document import RANGES, TIPS, Material
+from translucent.preview.library import EnvironmentFolder
 from translucent.preview.measuring import Crossing, first_object
-from translucent.preview.picturing import model_key, model_picture
 from translucent.preview.scenes import material_of
-from translucent.preview.stage import Stage
-from translucent.preview.tips import TIPS
-from translucent.preview.workspace import Workspace
+from translucent.preview.thumbnails import model_key, model_picture
+from translucent.preview.viewport_renderer import ViewportRenderer
+from translucent.preview.workspace import Comparing, Workspace
 from translucent.scene.scene import Object
 from translucent.scene.showcase import fillable
 
@@ -48,11 +43,11 @@ class Probed:
 
 
 @dataclass
-class Desk:
+class WindowState:
     """Window state, none of which is part of the document."""
 
     work: Workspace
-    stage: Stage
+    view: ViewportRenderer
     drag: int = 0
     more: bool = True
     drawn: bool = False
@@ -88,7 +83,7 @@ class Desk:
         section, _, key = name.partition(".")
         drag = None if step else self.drag
         if section != "material" or self.target is None:
-            return self.work.do(Change(name, value, drag))
+            return self.work.do(SetField(name, value, drag))
         return self._assign(self.target, lambda material: changed_material(material, key, value), drag)
 
     def get(self, name: str) -> Any:
@@ -148,7 +143,7 @@ class Desk:
 
     def pick(self, position: tuple[float, float], then: Callable[[int | None], None]) -> None:
         """Find the first object at a position, in shares of the viewport, in the background; None: there is none."""
-        scene, size = self.work.scene(), self.stage.viewport.size
+        scene, size = self.work.scene(), self.view.viewport.size
         if scene is None:
             return
 
@@ -182,14 +177,14 @@ class Desk:
         """Draw a step, and start measurements of a still view; returns whether more steps are to come."""
         self.work.size = pixels
         self.work.update()
-        more = self.stage.draw(self.work, pixels)
+        more = self.view.draw(self.work, pixels)
         self.drawn = not more
-        self.waits = self.stage.waits or not more
+        self.waits = self.view.waits or not more
         # All pixels are there; edges may become smooth later.
-        self.work.shelf.begin_frame(idle=not more or self.stage.state.startswith("full"))
+        self.work.thumbnails.begin_frame(idle=not more or self.view.state.startswith("full"))
         if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:
             self._keep_picture()
-        uncompared = self.comparing.step(self.stage.viewport.size)
+        uncompared = self.comparing.step(self.view.viewport.size)
         return more or uncompared or bool(self.work.busy)
 
     def frame(self) -> None:
@@ -238,16 +233,16 @@ class Desk:
         if self.kept_of == path or not os.path.isfile(path) or not self.work.document.display.pictured:
             return
         self.kept_of = path
-        with self.stage.current():
-            seen = self.stage.viewport.pixels()
-        self.work.shelf.put(model_key(path), model_picture(seen))
+        with self.view.current():
+            seen = self.view.viewport.pixels()
+        self.work.thumbnails.put(model_key(path), model_picture(seen))
 
     def texture(self, key: str, pixels: Any) -> Any:
         """Texture of a small picture."""
         if key not in self._textures:
             height, width = pixels.shape[:2]
             content = np.ascontiguousarray(pixels[..., :3]).tobytes()
-            self._textures[key] = self.stage.renderer.gpu.context.gl.texture((width, height), 3, content, alignment=1)
+            self._textures[key] = self.view.renderer.gpu.context.gl.texture((width, height), 3, content, alignment=1)
         return self._textures[key]
 
     def inset_texture(self, pixels: Any) -> Any:
@@ -256,7 +251,7 @@ class Desk:
             if self._inset is not None:
                 self._inset[1].release()
             height, width = pixels.shape[:2]
-            gl = self.stage.renderer.gpu.context.gl
+            gl = self.view.renderer.gpu.context.gl
             self._inset = pixels, gl.texture((width, height), 3, np.ascontiguousarray(pixels).tobytes(), alignment=1)
         return self._inset[1]
 
@@ -287,7 +282,7 @@ def row(label: str, tip: str = "") -> None:
 
 
 def slider(
-    desk: Desk,
+    state: WindowState,
     label: str,
     name: str,
     low: float,
@@ -300,34 +295,34 @@ def slider(
     """Slider for a number of the document, shown in a unit."""
     row(label, TIPS.get(name, ""))
     flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if log else 0)
-    changed, value = imgui.slider_float(f"##{name}", desk.get(name) / unit, low / unit, high / unit, form, flags)
+    changed, value = imgui.slider_float(f"##{name}", state.get(name) / unit, low / unit, high / unit, form, flags)
     if not imgui.is_item_active():
         tooltip(TIPS.get(name, ""))
     if imgui.is_item_activated():
-        desk.drag += 1
+        state.drag += 1
     if changed and math.isfinite(value):
-        desk.change(name, value * unit)
+        state.change(name, value * unit)
 
 
-def triple(desk: Desk, label: str, name: str, speed: float, form: str = "%.5g", *, tip: str = "") -> None:
+def triple(state: WindowState, label: str, name: str, speed: float, form: str = "%.5g", *, tip: str = "") -> None:
     """Fields for three numbers of the document, at least 0, on a line of their own; not in a table."""
     wide_row(label, tip or TIPS.get(name, ""))
-    value = list(desk.get(name))
+    value = list(state.get(name))
     changed, values = imgui.drag_float3(f"##{name}", value, speed, 0.0, min(RANGES[name].high, 1e9), form)
     if imgui.is_item_activated():
-        desk.drag += 1
+        state.drag += 1
     if changed and all(math.isfinite(v) for v in values):
-        desk.change(name, [max(v, 0.0) for v in values])
+        state.change(name, [max(v, 0.0) for v in values])
 
 
-def choice(desk: Desk, label: str, name: str, words: tuple[str, ...], *, tip: str = "") -> None:
+def choice(state: WindowState, label: str, name: str, words: tuple[str, ...], *, tip: str = "") -> None:
     """Choice of one of some words."""
     row(label, tip or TIPS.get(name, ""))
-    now = desk.get(name)
+    now = state.get(name)
     if imgui.begin_combo(f"##{name}", str(now)):
         for word in words:
             if imgui.selectable(word, word == now)[0]:
-                desk.change(name, word, step=True)
+                state.change(name, word, step=True)
         imgui.end_combo()
 
 
@@ -347,12 +342,12 @@ def wide_row(label: str, tip: str = "") -> None:
     imgui.set_next_item_width(-1.0)
 
 
-def check(desk: Desk, label: str, name: str, *, tip: str = "") -> None:
+def check(state: WindowState, label: str, name: str, *, tip: str = "") -> None:
     """Checkbox."""
     row(label, tip or TIPS.get(name, ""))
-    changed, value = imgui.checkbox(f"##{name}", bool(desk.get(name)))
+    changed, value = imgui.checkbox(f"##{name}", bool(state.get(name)))
     if changed:
-        desk.change(name, value, step=True)
+        state.change(name, value, step=True)
 
 
 def fact(label: str, text: str, color: tuple[float, float, float, float] | None = None) -> None:
@@ -374,3 +369,44 @@ def wrapped(text: str, color: tuple[float, float, float, float]) -> None:
     imgui.push_text_wrap_pos(0.0)
     imgui.text_colored(color, text)
     imgui.pop_text_wrap_pos()
+
+
+#: Ems between two cards.
+GAP = 0.5
+
+CHOSEN, HOVERED, PLAIN = 0xFFFFB050, 0xFFC0C0C0, 0x40FFFFFF
+
+T = TypeVar("T")
+
+
+def draw_cards(
+    members: Sequence[T], least: float, height: Callable[[float], float], draw: Callable[[T, ImVec2], None]
+) -> None:
+    """Draw the cards of a list in rows, as far as they can be seen.
+
+    Parameters
+    ----------
+    members : sequence
+    least : float
+        Width of a card in ems, at least.
+    height : callable
+        From the width of a card to its height, in pixels.
+    draw : callable
+        Draws the card of a member, in a size.
+    """
+    room = imgui.get_content_region_avail().x
+    across = max(int((room + em(GAP)) / em(least + GAP)), 1)
+    width = (room - em(GAP) * (across - 1)) / across
+    size = ImVec2(width, height(width))
+    for i, member in enumerate(members):
+        if i % across:
+            imgui.same_line(0.0, em(GAP))
+        if imgui.is_rect_visible(size):
+            draw(member, size)
+        else:
+            imgui.dummy(size)
+
+
+def draw_frame(over: imgui.ImDrawList, low: ImVec2, high: ImVec2, *, chosen: bool, hovered: bool) -> None:
+    """Draw the frame of a card's picture, which tells whether it is chosen."""
+    over.add_rect(low, high, CHOSEN if chosen else HOVERED if hovered else PLAIN, 0.0, em(0.12) if chosen else 1.0)
