@@ -10,8 +10,7 @@ from translucent.arrays import Array
 from translucent.assets import mesh_path
 from translucent.cpu.caster import Caster
 from translucent.geometry.solids import Box, Sphere
-from translucent.reference.boxes import Lines
-from translucent.reference.tracer import Tracer
+from translucent.reference.tracer import Lines, Tracer
 
 GLASS = tl.Medium(ior=1.5)
 

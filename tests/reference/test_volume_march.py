@@ -17,9 +17,8 @@ from translucent.geometry.solids import Box, Torus
 from translucent.media.density import Density, DensityGrid, ExponentialDensity, LinearDensity
 from translucent.media.medium import Medium
 from translucent.planning.methods import METHODS, RayMarched, method_from_name
-from translucent.reference import blending, march, render
-from translucent.reference.equiangular import equiangular
-from translucent.reference.quadrature import even_steps, gauss_steps, hashed
+from translucent.reference import compositing, march, render
+from translucent.reference.quadrature import equiangular, even_steps, gauss_steps, hashed
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight
@@ -157,12 +156,12 @@ def test_schemes_agree(scheme: str, quadrature: Any, aligned: bool) -> None:
 
 def test_an_opaque_layer_hides_what_is_behind(rng: np.random.Generator) -> None:
     color, depth = rng.random((2, 5, 3))
-    front, back = blending.Layer(color, depth), blending.Layer(rng.random((5, 3)), np.full((5, 3), np.inf))
-    both = blending.over(front, back)
+    front, back = compositing.Layer(color, depth), compositing.Layer(rng.random((5, 3)), np.full((5, 3), np.inf))
+    both = compositing.over(front, back)
     np.testing.assert_allclose(both.color, color + np.exp(-depth) * back.color, rtol=1e-15)
     assert (both.opacity == 1).all()
-    np.testing.assert_array_equal(blending.over(both, front).color, both.color)
-    np.testing.assert_allclose(blending.associated(blending.unassociated(front)).color, color, rtol=1e-15)
+    np.testing.assert_array_equal(compositing.over(both, front).color, both.color)
+    np.testing.assert_allclose(compositing.associated(compositing.unassociated(front)).color, color, rtol=1e-15)
 
 
 @pytest.mark.parametrize("ratio", [0.1, 0.5, 2.0, 37.0])
@@ -176,7 +175,7 @@ def test_steps_of_another_length(ratio: float, extinction: float) -> None:
     assert optics.opacity_for_step(alpha, ratio) == pytest.approx(
         optics.opacity(extinction * ratio * length), rel=1e-12
     )
-    assert blending.color_for_step(color, alpha, ratio) == pytest.approx(other, rel=1e-12)
+    assert compositing.color_for_step(color, alpha, ratio) == pytest.approx(other, rel=1e-12)
 
 
 @pytest.mark.parametrize("termination", [1e-3, 0.1, 0.6])

@@ -10,8 +10,7 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere, SphericalShell, Torus
 from translucent.media.medium import Medium
 from translucent.reference import line_hits, pixel_rays
-from translucent.reference.boxes import BoxTree, Lines
-from translucent.reference.tracer import Tracer
+from translucent.reference.tracer import BoxTree, Lines, Tracer
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 

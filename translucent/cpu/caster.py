@@ -16,8 +16,7 @@ from translucent.arrays import Array, Integers
 from translucent.cpu.vectors import dot
 from translucent.geometry.embree import STEP, embree_scene
 from translucent.geometry.normals import drawn_normals
-from translucent.reference.boxes import Lines
-from translucent.reference.tracer import TracedObject, center_from
+from translucent.reference.tracer import Lines, TracedObject, center_from
 from translucent.scene.scene import Object
 
 #: Shortest way from a surface to the next, in radii of the scene: anything nearer counts as behind.

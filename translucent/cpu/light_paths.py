@@ -11,11 +11,10 @@ import numpy as np
 from translucent.arrays import Integers
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
-from translucent.reference.boxes import Lines
 from translucent.reference.hits import Hits, from_eye, sorted_hits
 from translucent.reference.intervals import sum_signs
 from translucent.reference.light_paths import LightPaths
-from translucent.reference.tracer import TracedObject, Tracer
+from translucent.reference.tracer import Lines, TracedObject, Tracer
 from translucent.scene.scene import Scene
 
 #: Number of faces of one object on a line after which Embree is not asked for more.

@@ -12,8 +12,8 @@ from translucent.cpu.beams import Beams
 from translucent.cpu.footprints import ellipses
 from translucent.cpu.vectors import dot
 from translucent.formulas.footprint import ALPHA_OF_DEVIATION, LEAST_BREADTH, MOST_LOOKUPS
-from translucent.reference.ray_ends import places_on_backdrop
 from translucent.reference.rays import Rays
+from translucent.reference.refracted import places_on_backdrop
 from translucent.scene.environment import Environment, FilteredEnvironment, equirectangular_uv, filtered
 from translucent.scene.environment_map import bilinear
 from translucent.scene.scene import Scene

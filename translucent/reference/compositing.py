@@ -1,14 +1,94 @@
-"""Absorption and emission of ordered media along rays (Max 1995)."""
+"""Compositing of media and of partly transparent layers along rays (Porter & Duff 1984; Max 1995)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
+from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.reference.segments import Segments
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Layer: a color and its opacity.
+
+    Attributes
+    ----------
+    color : (k, 3) float64
+    optical_depth : (k, 3) float64
+        -log(1 - opacity), which keeps its digits near an opacity of 0 and of 1.
+    """
+
+    color: Array
+    optical_depth: Array
+
+    @property
+    def transmittance(self) -> Array:
+        """(k, 3): 1 - opacity."""
+        return optics.transmittance(self.optical_depth)
+
+    @property
+    def opacity(self) -> Array:
+        """(k, 3)."""
+        return optics.opacity(self.optical_depth)
+
+
+@np.errstate(under="ignore", over="ignore")
+def over(front: Layer, back: Layer) -> Layer:
+    """Composite of two layers of associated colors: C = C_f + (1 - a_f) C_b."""
+    return Layer(front.color + front.transmittance * back.color, front.optical_depth + back.optical_depth)
+
+
+@np.errstate(under="ignore", over="ignore")
+def over_unassociated(front: Layer, back: Layer) -> Layer:
+    """Composite of two layers of unassociated colors: C = (a_f C_f + (1 - a_f) a_b C_b) / a."""
+    both = front.opacity * front.color + front.transmittance * back.opacity * back.color
+    depth = front.optical_depth + back.optical_depth
+    return Layer(_divided(both, optics.opacity(depth)), depth)
+
+
+@np.errstate(under="ignore")
+def associated(layer: Layer) -> Layer:
+    """Layer with its unassociated color converted to the associated color, a C."""
+    return Layer(layer.opacity * layer.color, layer.optical_depth)
+
+
+@np.errstate(under="ignore")
+def unassociated(layer: Layer) -> Layer:
+    """Layer with its associated color converted to the unassociated color, C / a.
+
+    Raises
+    ------
+    InputError
+        If something without opacity has a color: no unassociated color stands for it.
+    """
+    if ((layer.opacity == 0) & (layer.color > 0)).any():
+        raise InputError(
+            "unassociated colors", "a step that shines without being opaque at all", "use associated colors"
+        )
+    return Layer(_divided(layer.color, layer.opacity), layer.optical_depth)
+
+
+def _divided(color: Array, opacity: Array) -> Array:
+    """Quotient color / opacity; 0 where there is no opacity."""
+    return np.asarray(np.where(opacity > 0, color / np.where(opacity > 0, opacity, 1.0), 0.0))
+
+
+def color_for_step(color: npt.ArrayLike, opacity: npt.ArrayLike, step_ratio: npt.ArrayLike) -> Array:
+    """Associated color of a step that is `step_ratio` times the reference step; opacity as `optics.opacity_for_step`.
+
+    In a homogeneous step the color is in proportion to the opacity: C' = C a' / a; without opacity, to the length.
+    """
+    alpha = np.asarray(opacity, dtype=np.float64)
+    some = alpha > 0
+    corrected = optics.opacity_for_step(alpha, step_ratio) / np.where(some, alpha, 1.0)
+    return np.asarray(np.asarray(color, dtype=np.float64) * np.where(some, corrected, step_ratio))
 
 
 @np.errstate(over="ignore", under="ignore")

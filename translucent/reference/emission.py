@@ -8,7 +8,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.formulas import optics
-from translucent.reference.adaptive import integrate
+from translucent.reference.quadrature import integrate
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
 from translucent.reference.volume import Volume, points_on

@@ -1,9 +1,9 @@
 """Random paths of light through interfaces and media: one branch at each interface, chosen by its share of the light.
 
 Fresnel and Snell choose at polished interfaces, a walk among visible microfacets at rough ones, as
-`translucent.reference.meetings` says. Free paths by delta tracking of what media scatter (Woodcock et al. 1965); what
-they absorb and emit is integrated along each segment (Novak et al. 2018, section 5), so that paths without scattering
-have no noise of it.
+`translucent.reference.interactions` says. Free paths by delta tracking of what media scatter (Woodcock et al. 1965).
+Absorption and emission are integrated along each segment (Novak et al. 2018, section 5), so that paths without
+scattering have no noise of it.
 """
 
 from __future__ import annotations
@@ -15,22 +15,20 @@ import numpy as np
 from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import optics
 from translucent.planning.limits import SHEET_ON_OPAQUE
-from translucent.reference.boxes import Lines
 from translucent.reference.compositing import _layers, composite
 from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits
+from translucent.reference.interactions import Legs, Meetings, StraightLight, joined
 from translucent.reference.interfaces import Inside, Interfaces, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge
-from translucent.reference.legs import Legs, joined
-from translucent.reference.meetings import Meetings
 from translucent.reference.opaque import OpaqueHits, nearest_opaque
 from translucent.reference.phase import scattered_directions
-from translucent.reference.ray_ends import RayEnds
 from translucent.reference.rays import Rays
+from translucent.reference.refracted import RayEnds
 from translucent.reference.segments import Segments
 from translucent.reference.sheets import scene_crossings
-from translucent.reference.straight_light import StraightLight
 from translucent.reference.surface_light import SurfaceLight
+from translucent.reference.tracer import Lines
 from translucent.reference.volume import Volume, _weights, points_on, volume_segments
 
 #: Share of light below which paths end by Russian roulette, or go on with this share.

@@ -10,13 +10,12 @@ import numpy as np
 from translucent.arrays import Array, Mask
 from translucent.formulas import optics
 from translucent.planning.limits import SHEET_ON_OPAQUE
-from translucent.reference.boxes import Lines
 from translucent.reference.hits import Hits
 from translucent.reference.intervals import Intervals, body_intervals, merge, sum_signs
-from translucent.reference.painted import without_cut_out
+from translucent.reference.opaque import without_cut_out
 from translucent.reference.rays import Rays
 from translucent.reference.sheets import scene_crossings
-from translucent.reference.tracer import Tracer
+from translucent.reference.tracer import Lines, Tracer
 from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Scene

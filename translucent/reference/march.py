@@ -19,9 +19,8 @@ from translucent.planning.methods import Method, RayMarched
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
-from translucent.reference import blending
-from translucent.reference.blending import Layer
-from translucent.reference.compositing import _layers
+from translucent.reference import compositing as blending
+from translucent.reference.compositing import Layer, _layers
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.quadrature import Steps, even_steps, gauss_steps, hashed
 from translucent.reference.rays import Rays, pixel_rays

@@ -12,19 +12,18 @@ import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.errors import InputError
-from translucent.reference.boxes import Lines
 from translucent.reference.hits import world_normals
+from translucent.reference.interactions import Legs
 from translucent.reference.interface_paths import InterfacePaths, _Flight
 from translucent.reference.interfaces import Optics
-from translucent.reference.legs import Legs
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.path_trace import BENT_BATCH, _alike
-from translucent.reference.ray_ends import RayEnds
 from translucent.reference.rays import Rays
+from translucent.reference.refracted import RayEnds
 from translucent.reference.refraction import check_untextured
 from translucent.reference.sheets import sheet_thicknesses
 from translucent.reference.surface_light import SurfaceLight
-from translucent.reference.tracer import Tracer
+from translucent.reference.tracer import Lines, Tracer
 from translucent.scene.camera import check_size
 from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Scene

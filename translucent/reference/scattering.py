@@ -13,10 +13,9 @@ import numpy as np
 from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import optics
 from translucent.media.medium import MAX_COEFFICIENT
-from translucent.reference.adaptive import integrate
 from translucent.reference.compositing import _layers
-from translucent.reference.equiangular import equiangular
 from translucent.reference.light_paths import LightPaths
+from translucent.reference.quadrature import equiangular, integrate
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
 from translucent.reference.shadow_edges import cone_edges, outline_edges, shadow_edges

@@ -16,9 +16,9 @@ from translucent.frames.frame import Frame
 from translucent.frames.metrics import interior
 from translucent.media.medium import Medium
 from translucent.planning.shadow_maps import ShadowMaps
-from translucent.reference.boxes import Lines
 from translucent.reference.light_paths import LightPaths, way_of
 from translucent.reference.sheets import sheet_thicknesses
+from translucent.reference.tracer import Lines
 from translucent.renderer import Renderer
 from translucent.scene.scene import Object, Scene
 
