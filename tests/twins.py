@@ -13,6 +13,7 @@ from translucent.formulas import (
     interface,
     lights,
     optics,
+    phase,
     spherical_harmonics,
     thin_film,
     tone,
@@ -26,6 +27,7 @@ MODULES: dict[str, ModuleType] = {
     "interface": interface,
     "thin_film": thin_film,
     "lights": lights,
+    "phase": phase,
     "two_stream": two_stream,
     "diffusion": diffusion,
     "spherical_harmonics": spherical_harmonics,
@@ -194,6 +196,16 @@ def _cell_arguments() -> list[np.ndarray]:
     return [values.astype(np.float32) for values in (low, high, share)]
 
 
+ANISOTROPIES = np.array([-0.99, -0.5, 0, 1e-7, 0.3, 0.9, 0.999])
+#: Parameters of phase functions.
+PHASES = np.array([[g, 0.0, 0.0, 0.0] for g in ANISOTROPIES], np.float32)
+
+
+def _phase_arguments(values: np.ndarray) -> list[np.ndarray]:
+    numbers, at = _mixed(np.arange(len(PHASES)), values)
+    return [PHASES[numbers.astype(int)], at]
+
+
 #: Within the box, on its boundary, and what rounding puts outside.
 ALONG = np.concatenate([np.linspace(0, 1, 13), [-1e-6, 1 + 1e-6, 1e-30, 1 - 1e-7]])
 
@@ -218,7 +230,10 @@ ARGUMENTS = {
     "fresnel_dielectric": _mixed(UNIT, np.array([0.5, 1 / 1.5, 0.9, 1.0, 1.0001, 1.33, 1.5, 2.4])),
     "refracted_cosine": _mixed(UNIT, np.array([1 / 1.5, 1.0, 1.0001, 1.33, 1.5, 2.4])),
     "thin_layer_thickness": _mixed(np.array([1e-6, 1e-3, 1.0]), COSINES, np.array([1.0, 1.33, 1.5])),
-    "henyey_greenstein": _mixed(np.clip(COSINES, -1, 1), np.array([-0.99, -0.5, 0, 1e-7, 0.3, 0.9, 0.999])),
+    "henyey_greenstein": _mixed(np.clip(COSINES, -1, 1), ANISOTROPIES),
+    "henyey_greenstein_cosine": _mixed(UNIT, ANISOTROPIES),
+    "phase_value": _phase_arguments(np.clip(COSINES, -1, 1)),
+    "phase_cosine": _phase_arguments(UNIT),
     "reflected_direction": _directions_and_normals()[:2],
     "refracted_direction": _directions_and_normals(),
     "channel_iors": _mixed(np.array([1.0, 1.0001, 1.33, 1.5, 2.4]), np.array([0.0, 0.1, 0.36, 1.0, 20.0, 100.0])),
@@ -272,6 +287,7 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
     "srgb_to_linear": 64.0,  # pow multiplies the error of the logarithm by 2.4 log(x)
     "linear_to_srgb": 64.0,
     "henyey_greenstein": 64.0,  # a power of 1.5 of a small difference
+    "phase_value": 64.0,
     "equirectangular_uv": 4096.0,
     "tone_agx": 64.0,  # powers
 }
@@ -321,6 +337,12 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
     if name == "scattered_radiance":
         # Of both signs, too.
         allowed = allowed + 8 * eps * np.abs(arguments[0] * arguments[1]).sum(axis=1)
+    if name in ("henyey_greenstein_cosine", "phase_cosine"):
+        # (1 + g^2 - (1 - g^2)^2 / q^2) / (2 g) of q = 1 + g (2 u - 1), a sum that is good to a rounding of 1.
+        share, g = (arguments[0], arguments[1]) if name[0] == "h" else (arguments[1], arguments[0][:, 0])
+        share, g = share.astype(np.float64), g.astype(np.float64)
+        slope = ((1.0 - g) * (1.0 + g)) ** 2 / (1.0 + g * (2.0 * share - 1.0)) ** 3
+        allowed = allowed + 4 * eps * (1.0 + slope / np.maximum(np.abs(g), 0.5))
     if name == "cone_attenuation":
         # Each component of the chord is a difference of numbers as large as the length of the cone's vector; the offset
         # is as large as the squared chord at the edge.

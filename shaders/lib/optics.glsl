@@ -1,6 +1,6 @@
 // Formulas of light in a medium. Inputs: extinction in 1/m, distance in m, optical depth without unit, cosines.
 // Pure: needs only <constants>. Each function is the float32 twin of the same name in translucent/formulas/optics.py, where the
-// sources are cited: Beer-Lambert; Max 1995; Porter & Duff 1984; Fresnel; Drobot 2017; Henyey & Greenstein 1941.
+// sources are cited: Beer-Lambert; Max 1995; Porter & Duff 1984; Fresnel; Drobot 2017.
 
 #include <constants>
 
@@ -95,12 +95,4 @@ float refracted_cosine(float cos_incident, float ior) {
 // Path through a thin sheet: t / max(0.001, cosine inside).
 float thin_layer_thickness(float thickness, float cos_view, float ior) {
     return thickness / max(refracted_cosine(max(cos_view, 0.0), ior), MIN_THIN_LAYER_COSINE);
-}
-
-// Phase function in 1/sr; cos_scatter = 1 is straight on. Turned around for g < 0, the base does not cancel.
-float henyey_greenstein(float cos_scatter, float anisotropy) {
-    float g = abs(anisotropy);
-    float cos_turned = anisotropy < 0.0 ? -cos_scatter : cos_scatter;
-    float base = (1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - cos_turned);
-    return (1.0 - g) * (1.0 + g) / (4.0 * PI * base * sqrt(base));
 }

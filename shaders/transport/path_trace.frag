@@ -12,6 +12,7 @@
 #include <TracedBody>
 #include "lib/interface.glsl"
 #include "lib/optics.glsl"
+#include "lib/phase.glsl"
 #include "lib/ray.glsl"
 #include "shade/background.glsl"
 #include "shade/environment_light.glsl"
@@ -89,7 +90,7 @@ vec3 unblocked_irradiance(vec3 point, vec3 normal) {
 // Share of the light of each channel that the media of a place turn by an angle, in 1/sr.
 vec3 phase_of(uvec4 record, int dominant, vec3 scattering, float cosine) {
 #if ONE_OBJECT || PRIORITY
-    return vec3(henyey_greenstein(cosine, traced_body(dominant).anisotropy));
+    return vec3(phase_value(traced_body(dominant).phase, cosine));
 #else
     vec3 sum = vec3(0.0);
     for (int i = 0; i < RECORD_SIZE; ++i) {
@@ -97,31 +98,31 @@ vec3 phase_of(uvec4 record, int dominant, vec3 scattering, float cosine) {
         if (entry == 0u) { break; }
         if (!counts_in(record, i)) { continue; }
         TracedBody body = traced_body(int(entry) - 1);
-        sum += body.scattering * henyey_greenstein(cosine, body.anisotropy);
+        sum += body.scattering * phase_value(body.phase, cosine);
     }
     return sum / max(scattering, vec3(1e-30));
 #endif
 }
 
-// Anisotropy of one of the media of a place, chosen by what it scatters of the light.
-float chosen_anisotropy(uvec4 record, int dominant, vec3 scattering, vec3 carried, float share) {
+// Phase function of one of the media of a place, chosen by what it scatters of the light.
+vec4 chosen_phase(uvec4 record, int dominant, vec3 scattering, vec3 carried, float share) {
 #if ONE_OBJECT || PRIORITY
-    return traced_body(dominant).anisotropy;
+    return traced_body(dominant).phase;
 #else
     vec3 each = carried / max(scattering, vec3(1e-30));
     float left = share * dot(each, scattering);
-    float anisotropy = 0.0;
+    vec4 phase = vec4(0.0);
     for (int i = 0; i < RECORD_SIZE; ++i) {
         uint entry = record_entry(record, i);
         if (entry == 0u) { break; }
         if (!counts_in(record, i)) { continue; }
         TracedBody body = traced_body(int(entry) - 1);
         float own = dot(each, body.scattering);
-        if (own > 0.0) { anisotropy = body.anisotropy; }
+        if (own > 0.0) { phase = body.phase; }
         left -= own;
         if (left < 0.0) { break; }
     }
-    return anisotropy;
+    return phase;
 #endif
 }
 
@@ -174,9 +175,9 @@ void scatter(inout Path path, Filling filling, int dominant, inout Draws draws) 
     vec3 arriving = straight_share(path.origin, 0.0, path.record, lamp.towards, lamp.distance_m, CHANNEL);
     path.light += path.share * phase * arriving * lamp.irradiance * float(light_count);
 #endif
-    float g = chosen_anisotropy(path.record, dominant, filling.scattering, path.share, shares.x);
+    vec4 phase_function = chosen_phase(path.record, dominant, filling.scattering, path.share, shares.x);
     vec3 before = path.direction;
-    path.direction = turned_by(before, henyey_greenstein_cosine(shares.y, g), shares.z);
+    path.direction = turned_by(before, phase_cosine(phase_function, shares.y), shares.z);
 #if !(ONE_OBJECT || PRIORITY)
     vec3 turned = phase_of(path.record, dominant, filling.scattering, dot(before, path.direction));
     float density = dot(path.share, turned) / max(dot(path.share, vec3(1.0)), 1e-30);

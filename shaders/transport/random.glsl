@@ -40,14 +40,6 @@ mat3 frame_around(vec3 axis) {
         vec3(b, side + axis.y * axis.y * a, -axis.y), axis);
 }
 
-// Cosine between the directions before and after an event, distributed as Henyey and Greenstein have it (Witt 1977).
-float henyey_greenstein_cosine(float share, float anisotropy) {
-    float g = anisotropy;
-    float a = 2.0 * share - 1.0;
-    float root = (1.0 - g) * (1.0 + g) / (1.0 + g * a);
-    return clamp(0.5 * ((a + g) * (1.0 + root) / (1.0 + g * a) + g), -1.0, 1.0);
-}
-
 vec3 turned_by(vec3 direction, float cosine, float turn) {
     float sine = sqrt(max((1.0 - cosine) * (1.0 + cosine), 0.0));
     return normalize(frame_around(direction) * vec3(sine * cos(2.0 * PI * turn), sine * sin(2.0 * PI * turn), cosine));

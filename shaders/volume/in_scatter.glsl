@@ -8,6 +8,7 @@
 
 #include "intervals/slots.glsl"
 #include "lib/lights.glsl"
+#include "lib/phase.glsl"
 #include "volume/light_views.glsl"
 
 struct ViewRay {
@@ -35,7 +36,7 @@ vec3 scattering_phase(float turns[SLOTS], float cos_scatter) {
     vec3 sum = vec3(0.0);
     for (int slot = 0; slot < SLOTS; ++slot) {
         if (turns[slot] > 0.0) {
-            sum += turns[slot] * slot_scattering[slot].rgb * henyey_greenstein(cos_scatter, slot_scattering[slot].a);
+            sum += turns[slot] * slot_scattering[slot].rgb * phase_value(slot_phase[slot], cos_scatter);
         }
     }
     return sum;

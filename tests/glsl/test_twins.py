@@ -14,6 +14,7 @@ from translucent.gpu.probe import run_function, signatures
 
 #: Functions of these modules that are no formulas of light, and so have no twin.
 HOST_ONLY = {
+    "phase": {"parse_phase"},
     "color": {"to_hex"},
     "diffusion": {"haze_shares"},
     "lights": {"light_cone"},
@@ -75,12 +76,12 @@ def test_the_probe_finds_a_wrong_formula(
     renderer: tl.Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The phase function with a plus where a product belongs, as one public library had it, does not pass."""
-    wrong = tmp_path / "optics.glsl"
-    text = next(p for p in shader_library() if p.stem == "optics").read_text()
+    wrong = tmp_path / "phase.glsl"
+    text = next(p for p in shader_library() if p.stem == "phase").read_text()
     wrong.write_text(text.replace("4.0 * PI * base", "(4.0 + PI) * base"))
     from translucent.gpu import shaders
 
     original = shaders.shader_path
-    monkeypatch.setattr(shaders, "shader_path", lambda name: wrong if name == "lib/optics.glsl" else original(name))
+    monkeypatch.setattr(shaders, "shader_path", lambda name: wrong if name == "lib/phase.glsl" else original(name))
     with pytest.raises(AssertionError, match="henyey_greenstein"):
-        test_function_equals_its_twin(renderer, "optics", "henyey_greenstein")
+        test_function_equals_its_twin(renderer, "phase", "henyey_greenstein")

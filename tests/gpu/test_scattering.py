@@ -11,7 +11,7 @@ import pytest
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.formulas import optics
+from translucent.formulas.phase import henyey_greenstein
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes.light_views import LightViewsPass
 
@@ -68,7 +68,7 @@ def exact_radiance(scene: tl.Scene, extinction: float, anisotropy: float = 0.0) 
             way = np.minimum(way, r)
         with np.errstate(under="ignore"):
             seen = np.exp(-extinction * (s + way)) * power
-        phase = optics.henyey_greenstein((towards * directions[:, None]).sum(axis=-1), anisotropy)
+        phase = henyey_greenstein((towards * directions[:, None]).sum(axis=-1), anisotropy)
         total += (high - low) * half * (weights * seen * phase).sum(axis=1)
     return 0.5 * extinction * total, half
 

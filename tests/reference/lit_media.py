@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import quad
 
-from translucent.formulas import optics
+from translucent.formulas.phase import henyey_greenstein
 from translucent.geometry.solids import Box, Solid
 from translucent.media.density import Density
 from translucent.media.medium import Medium
@@ -71,7 +71,7 @@ def single_scatter(
             strength = np.asarray(light.irradiance)
         chord = solid.chord(source, travel) - solid.chord(point, travel)
         chord = chord + solid.chord(origin, direction) - solid.chord(point, direction)
-        phase = optics.henyey_greenstein(-travel @ direction, medium.anisotropy)
+        phase = henyey_greenstein(-travel @ direction, medium.anisotropy)
         values = medium.scattering * phase[:, None] * strength * np.exp(-chord[:, None] * medium.extinction)
         total += np.tile(weights * 0.5 * width, 8192) @ values
     return total

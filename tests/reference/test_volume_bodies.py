@@ -9,6 +9,7 @@ import pytest
 
 from tests.reference.lit_media import MEDIUM, SLAB, SUN, Array, integral, middle, middle_ray, scene, slab
 from translucent.formulas import optics
+from translucent.formulas.phase import henyey_greenstein
 from translucent.geometry.solids import Box
 from translucent.media.density import DensityGrid
 from translucent.media.medium import Medium
@@ -26,9 +27,7 @@ def layers(light: DirectionalLight, *found: tuple[float, float, list[Medium]]) -
     total, above, slope = np.zeros(3), np.zeros(3), 1 / -ray[2] + 1 / -travel[2]
     for low, high, media in found:
         extinction = np.sum([medium.extinction for medium in media], axis=0)
-        scattering = sum(
-            np.asarray(m.scattering) * optics.henyey_greenstein(-travel @ ray, m.anisotropy) for m in media
-        )
+        scattering = sum(np.asarray(m.scattering) * henyey_greenstein(-travel @ ray, m.anisotropy) for m in media)
         # In metres of height, of which the ray is longer.
         own = optics.emitted_radiance(scattering * light.irradiance / -ray[2], extinction * slope, high - low)
         total += np.exp(-above) * own
@@ -109,7 +108,7 @@ def test_an_opaque_object_throws_a_shadow() -> None:
         height = -(origin + t * direction)[2]
         return float(np.exp(-MEDIUM.extinction[channel] * (height + t - start)))
 
-    phase = optics.henyey_greenstein(direction[2], MEDIUM.anisotropy)
+    phase = henyey_greenstein(direction[2], MEDIUM.anisotropy)
     integrals = [integral(lambda t, c=c: integrand(t, c), edge, end) for c in range(3)]
     found = middle(scene(Object(SLAB.tessellate(), MEDIUM), roof, lights=[sun], camera=shadowed))
     np.testing.assert_allclose(found, np.asarray(MEDIUM.scattering) * phase * 2.0 * integrals, rtol=2e-6)
@@ -126,7 +125,7 @@ def test_the_shadow_of_a_pole(width: float) -> None:
     assert ends.min() > 0
     # From a depth where the ray has gone so far in the slab.
     slope = MEDIUM.extinction * (1 - direction[2])
-    phase = optics.henyey_greenstein(direction[2], MEDIUM.anisotropy)
+    phase = henyey_greenstein(direction[2], MEDIUM.anisotropy)
     source = np.asarray(MEDIUM.scattering) * phase * 2.0
     missing = source * np.exp(-slope * ends[0]) * -np.expm1(-slope * (ends[1] - ends[0])) / slope
     plain, found = (

@@ -20,7 +20,7 @@ from tests.reference.lit_media import (
     single_scatter,
     slab,
 )
-from translucent.formulas import optics
+from translucent.formulas.phase import henyey_greenstein
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box
 from translucent.media.density import Density, DensityGrid, ExponentialDensity, LinearDensity
@@ -56,7 +56,7 @@ def test_a_slab_of_varying_density(name: str) -> None:
         depth = mass(origin + start * direction, point) + mass(point + travel * point[2] / -travel[2], point)
         return float(density.at(in_box(point))) * np.exp(-MEDIUM.extinction[channel] * depth)
 
-    phase = optics.henyey_greenstein(-travel @ direction, MEDIUM.anisotropy)
+    phase = henyey_greenstein(-travel @ direction, MEDIUM.anisotropy)
     integrals = [integral(lambda t, c=c: integrand(t, c), start, end) for c in range(3)]
     frame = render(slab(SUN, MEDIUM, density), (1, 1))
     expected = np.asarray(MEDIUM.scattering) * phase * 2.0 * integrals

@@ -23,6 +23,7 @@ from tests.reference.lit_media import (
 )
 from translucent.errors import InputError
 from translucent.formulas import optics
+from translucent.formulas.phase import henyey_greenstein
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Solid, Sphere, SphericalShell, TwoSpheres
 from translucent.media.medium import Medium
@@ -47,7 +48,7 @@ def test_a_slab_in_the_sun(direction: tuple[float, ...], g: float) -> None:
     # Per metre of the ray; from below the path is longest where the ray begins.
     slope = ray[2] / travel[2]
     start = 0.0 if travel[2] < 0 else medium.extinction / travel[2]
-    source = medium.scattering * optics.henyey_greenstein(-travel @ ray, g) * [1, 2, 3] * np.exp(-start)
+    source = medium.scattering * henyey_greenstein(-travel @ ray, g) * [1, 2, 3] * np.exp(-start)
     expected = optics.emitted_radiance(source, medium.extinction * (1 + slope), length)
     np.testing.assert_allclose(middle(slab(light, medium)), expected, rtol=1e-9)
 

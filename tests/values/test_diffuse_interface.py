@@ -19,6 +19,7 @@ from translucent.formulas.diffuse_interface import (
     half_space_reflectances,
 )
 from translucent.formulas.diffusion import emergent_radiance
+from translucent.formulas.phase import HenyeyGreenstein
 
 Array = npt.NDArray[np.float64]
 
@@ -174,8 +175,10 @@ def test_light_at_a_slant_comes_back_as_chandrasekhar_found(albedo: float) -> No
         nodes, weights = np.polynomial.legendre.leggauss(512)
         outside = 0.5 * (nodes + 1)
         flux = weights * outside * (1 - optics.fresnel_dielectric(outside, 1.5))
-        shares = half_space_reflectances(optics.refracted_cosine(outside, 1.5), albedo, 1.5, anisotropy)
-        whole = half_space_reflectance(albedo, 1.5, anisotropy)
+        shares = half_space_reflectances(
+            optics.refracted_cosine(outside, 1.5), albedo, 1.5, HenyeyGreenstein(anisotropy)
+        )
+        whole = half_space_reflectance(albedo, 1.5, HenyeyGreenstein(anisotropy))
         assert float((flux * shares).sum() / flux.sum()) == pytest.approx(whole, abs=2e-4)
 
 

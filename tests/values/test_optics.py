@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -298,50 +297,3 @@ def test_thin_layer_is_the_path_by_snells_law(angle: float, ior: float) -> None:
 @pytest.mark.parametrize("cosine", [0.001, 1e-9, 0.0, -0.0, -0.3, -1.0])
 def test_thin_layer_is_at_most_1000_times_as_long(cosine: float) -> None:
     assert optics.thin_layer_thickness(2e-3, cosine) == pytest.approx(2.0, rel=4 * EPS)
-
-
-# Phase function
-
-
-def _sphere_rule() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Cosines and weights (2 pi included) of 24 Gauss points in each of panels that shrink to both ends."""
-    nodes, weights = np.polynomial.legendre.leggauss(24)
-    edges = np.concatenate([[0.0], 2.0 ** np.arange(-24, 1)])
-    low, high = edges[:-1, None], edges[1:, None]
-    from_end = (low + (high - low) * (nodes + 1) / 2).ravel()
-    weight = ((high - low) * weights / 2).ravel()
-    return np.concatenate([1 - from_end, from_end - 1]), 2 * np.pi * np.concatenate([weight, weight])
-
-
-G_VALUES = [-0.99, -0.75, -0.3, 0.0, 1e-9, 0.5, 0.9, 0.99]
-
-
-@pytest.mark.parametrize("g", G_VALUES)
-def test_phase_function_integrates_to_one_with_mean_cosine_g(g: float) -> None:
-    # Rounding of the cosine, EPS/2, against the width (1 - |g|)^2 / 2 of the peak, with the exponent 3/2.
-    tolerance = 4 * EPS / (1 - abs(g)) ** 2 + 1e-14
-    cosine, weight = _sphere_rule()
-    phase = optics.henyey_greenstein(cosine, g)
-    assert float(weight @ phase) == pytest.approx(1.0, abs=tolerance)
-    assert float(weight @ (phase * cosine)) == pytest.approx(g, abs=tolerance)
-
-
-@pytest.mark.parametrize("cosine", [-1.0, -0.3, 0.0, 1.0])
-def test_phase_function_without_anisotropy_is_uniform(cosine: float) -> None:
-    assert optics.henyey_greenstein(cosine, 0.0) == pytest.approx(1 / (4 * math.pi), rel=2 * EPS)
-
-
-@pytest.mark.parametrize("g", G_VALUES)
-def test_phase_function_straight_on_and_back(g: float) -> None:
-    forward = (1 + g) / (4 * math.pi * (1 - g) ** 2)
-    backward = (1 - g) / (4 * math.pi * (1 + g) ** 2)
-    # Backwards the base is (1 - g)^2 + 4 g: EPS of 4, against (1 + g)^2.
-    assert optics.henyey_greenstein(1.0, g) == pytest.approx(forward, rel=8 * EPS)
-    assert optics.henyey_greenstein(-1.0, g) == pytest.approx(backward, rel=8 * EPS / (1 + g) ** 2 + 8 * EPS)
-
-
-@pytest.mark.parametrize("g", [1 - 1e-9, -1 + 1e-9])
-def test_phase_function_is_finite_and_positive_next_to_the_limit(g: float) -> None:
-    phase = optics.henyey_greenstein(np.linspace(-1, 1, 101) * (1 - 1e-6), g)
-    assert np.isfinite(phase).all()
-    assert (phase > 0).all()

@@ -13,6 +13,7 @@ import pytest
 import translucent as tl
 from translucent.formulas.color import to_hex
 from translucent.formulas.diffuse_interface import diffuse_interface, half_space_reflectance
+from translucent.formulas.phase import HenyeyGreenstein
 from translucent.media.preset import PAPERS, Preset
 
 NAMES = sorted(tl.presets())
@@ -155,7 +156,7 @@ def test_a_thick_slab_that_scatters_ahead_gives_back_less() -> None:
     """Than by its reduced albedo, unless little is absorbed."""
     through_air = half_space_reflectance(100 / 101, 1.0)
     assert medium(1, 100).diffuse_reflectance == pytest.approx(np.full(3, through_air), rel=1e-6)
-    exact = half_space_reflectance(1000 / 1001, 1.0, 0.9)
+    exact = half_space_reflectance(1000 / 1001, 1.0, HenyeyGreenstein(0.9))
     assert medium(1, 1000, 0.9).diffuse_reflectance == pytest.approx(np.full(3, exact), rel=1e-6)
     assert exact == pytest.approx(through_air, rel=1e-3)
     assert medium(1, 1, 0.9).diffuse_reflectance[0] < 0.95 * half_space_reflectance(0.1 / 1.1, 1.0)

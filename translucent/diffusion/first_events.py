@@ -24,6 +24,7 @@ from translucent.formulas.diffuse_interface import (
     half_space_reflectance,
     half_space_reflectances,
 )
+from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 
 #: First events above the depth at which the fluence is read, and below it, for each sample.
 EVENTS, DEEP_EVENTS = 4, 2
@@ -182,9 +183,10 @@ class FirstEvents:
     grid : BodyGrid
     layer : Layer
         Below each sample.
-    ior, anisotropy : float
+    ior : float
     absorption, scattering : float
         The reduced one, in 1/m.
+    phase : PhaseFunction
     chord : float
         Mean chord of the body in m, weighted by the density.
     """
@@ -196,10 +198,10 @@ class FirstEvents:
         ior: float,
         absorption: float,
         scattering: float,
-        anisotropy: float,
+        phase: PhaseFunction,
         chord: float,
     ) -> None:
-        self._grid, self._layer, self._ior, self._anisotropy = grid, layer, ior, anisotropy
+        self._grid, self._layer, self._ior, self._phase = grid, layer, ior, phase
         self._extinction = absorption + scattering
         self._albedo = scattering / self._extinction
         self._d = float(diffusion_coefficient(absorption, scattering))
@@ -215,7 +217,7 @@ class FirstEvents:
         relative = 1.0 / layer.u(layer.depth)
         # What of the entering light the exact half-space gives back less than diffusion would.
         asked = None if ways.diffuse else np.asarray(cosine)
-        straight = straight_back(self._albedo, self._ior, self._anisotropy, asked) * self._thick
+        straight = straight_back(self._albedo, self._ior, self._phase, asked) * self._thick
         excess = (
             self._flat * half_space_excess(self._albedo, self._ior, asked) / diffuse_interface(self._ior).conductance
         )
@@ -274,10 +276,10 @@ def half_space_excess(albedo: float, ior: float, cosine: Array | None = None) ->
 
     Of light that is uniform outside, or goes on inside at cosines (k,) with the normal.
     """
-    return diffused_share(albedo, ior, cosine) - _exact(round(albedo, 6), ior, 0.0, cosine)
+    return diffused_share(albedo, ior, cosine) - _exact(round(albedo, 6), ior, ISOTROPIC, cosine)
 
 
-def straight_back(albedo: float, ior: float, anisotropy: float, cosine: Array | None = None) -> Array | float:
+def straight_back(albedo: float, ior: float, phase: PhaseFunction, cosine: Array | None = None) -> Array | float:
     """Share of the first events at the surface that do not count, as media that scatter ahead turn less light back.
 
     After an optical path t it is exp(-STRAIGHT t) times as much: so much in all that a half-space gives back what the
@@ -287,22 +289,23 @@ def straight_back(albedo: float, ior: float, anisotropy: float, cosine: Array | 
     ----------
     albedo : float
         The reduced one, which both have.
-    ior, anisotropy : float
+    ior : float
+    phase : PhaseFunction
     cosine : (k,), optional
         Of the way of the light inside, with the normal; default: of light that is uniform outside.
     """
-    if anisotropy == 0.0:
+    if phase == ISOTROPIC:
         return 0.0
     reduced = max(round(albedo, 6), _LEAST_ALBEDO)
-    own = reduced / (reduced + (1.0 - reduced) * (1.0 - anisotropy))
-    less = _exact(reduced, ior, 0.0, cosine) - _exact(own, ior, anisotropy, cosine)
+    own = reduced / (reduced + (1.0 - reduced) * (1.0 - phase.mean_cosine))
+    less = _exact(reduced, ior, ISOTROPIC, cosine) - _exact(own, ior, phase, cosine)
     return less / diffused_share(reduced, ior, cosine, STRAIGHT)
 
 
-def _exact(albedo: float, ior: float, anisotropy: float, cosine: Array | None) -> Array | float:
+def _exact(albedo: float, ior: float, phase: PhaseFunction, cosine: Array | None) -> Array | float:
     if cosine is None:
-        return half_space_reflectance(albedo, ior, anisotropy)
-    return half_space_reflectances(cosine, albedo, ior, anisotropy)
+        return half_space_reflectance(albedo, ior, phase)
+    return half_space_reflectances(cosine, albedo, ior, phase)
 
 
 def diffused_share(albedo: float, ior: float, cosine: Array | None = None, dimmed: float = 0.0) -> Array | float:

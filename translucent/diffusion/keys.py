@@ -77,7 +77,8 @@ def place_of(item: Object) -> tuple[object, bytes]:
 
 def coefficients_of(medium: Medium) -> Hashable:
     """Fields of a medium, as a key."""
-    return tuple(map(_bytes, astuple(medium)))
+    coefficients = medium.absorption, medium.scattering, medium.emission, medium.ior
+    return (*map(_bytes, coefficients), medium.phase_function)
 
 
 def roughness_of(item: Object) -> float:

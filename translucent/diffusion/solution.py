@@ -26,6 +26,7 @@ from translucent.diffusion.first_events import Beam, FirstEvents, Layer, Ways, d
 from translucent.diffusion.grid import BodyGrid
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient, half_space_reflectance
+from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 from translucent.media.medium import Medium
 
 #: Largest number of times that light of the body falls on the body again, and the change at which it is enough.
@@ -103,7 +104,7 @@ class BodySystem:
                 float(scattering),
                 self._dense,
                 ways,
-                medium.anisotropy,
+                medium.phase_function,
                 corrected=corrected,
             )
             for channel, (absorption, scattering) in enumerate(zip(np.asarray(medium.absorption), reduced, strict=True))
@@ -165,7 +166,7 @@ class _Channel:
         scattering: float,
         dense: Densities,
         ways: Ways,
-        anisotropy: float = 0.0,
+        phase: PhaseFunction = ISOTROPIC,
         *,
         corrected: bool,
     ) -> None:
@@ -181,7 +182,7 @@ class _Channel:
         self._attenuated = optics.transmittance(layer.attenuation * depth) * self._relative
         # 4 V / S is the mean chord (Cauchy).
         chord = 4.0 * float(dense.cells @ grid.volumes) / (grid.area * len(depth))
-        self._first = FirstEvents(grid, layer, ior, absorption, scattering, anisotropy, chord)
+        self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord)
         diffuse = self._first.of(ways)
         self._near, self._into_cells = diffuse.near, diffuse.matrix(grid, self._read)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.formulas import interface, optics
 from translucent.formulas.half_space import bare_half_space
+from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 
 #: Points of the quadratures, and of the sums over microfacets of a rough interface.
 NODES, FACETS = 64, 1 << 14
@@ -110,7 +111,7 @@ def emergent_fluxes(ior: float, mean_cosine: float) -> tuple[float, float, float
 
 
 @lru_cache(maxsize=1024)
-def half_space_reflectance(albedo: float, ior: float = 1.0, anisotropy: float = 0.0) -> float:
+def half_space_reflectance(albedo: float, ior: float = 1.0, phase: PhaseFunction = ISOTROPIC) -> float:
     """Share of the diffuse light entering a half-space that leaves again after it has been scattered; exact.
 
     Parameters
@@ -119,44 +120,45 @@ def half_space_reflectance(albedo: float, ior: float = 1.0, anisotropy: float = 
         Of single scattering, 0 to 1; not the reduced one.
     ior : float
         Index of the half-space relative to what is above; polished.
-    anisotropy : float
-        g of Henyey and Greenstein, -1 < g < 1.
+    phase : PhaseFunction
     """
-    cosine, flux, shares = _half_space(albedo, ior, anisotropy)
+    cosine, flux, shares = _half_space(albedo, ior, phase)
     # Uniform radiance from outside stays uniform inside the cone that it refracts to, but for Fresnel's share.
     down = flux * (1.0 - _inside_reflectance(cosine, ior))
     return float((down * shares).sum() / down.sum())
 
 
-def half_space_reflectances(cosine: npt.ArrayLike, albedo: float, ior: float = 1.0, anisotropy: float = 0.0) -> Array:
+def half_space_reflectances(
+    cosine: npt.ArrayLike, albedo: float, ior: float = 1.0, phase: PhaseFunction = ISOTROPIC
+) -> Array:
     """Share of the light entering a half-space in one direction that leaves again after it has been scattered.
 
     Parameters
     ----------
     cosine : array_like (...)
         Of the direction with the normal, inside, 0 to 1.
-    albedo, ior, anisotropy : float
+    albedo, ior, phase
         See `half_space_reflectance`.
     """
-    at, _, shares = _half_space(albedo, ior, anisotropy)
+    at, _, shares = _half_space(albedo, ior, phase)
     return np.asarray(np.interp(np.asarray(cosine, np.float64), at, shares))
 
 
 @lru_cache(maxsize=1024)
-def _half_space(albedo: float, ior: float, anisotropy: float) -> tuple[Array, Array, Array]:
+def _half_space(albedo: float, ior: float, phase: PhaseFunction) -> tuple[Array, Array, Array]:
     """Cosines inside, flux of uniform radiance around each, and the share of light that enters there and leaves again.
 
     The bare half-space reflects as Chandrasekhar's H functions say where it scatters to all sides alike, else as its
     modes do (`bare_half_space`); its interface mirrors part of that back, and the half-space reflects it again: one
     linear system on a quadrature.
     """
-    if anisotropy == 0.0:
+    if phase == ISOTROPIC:
         cosine, weight = _nodes(ior)
         h = _chandrasekhar_h(albedo, cosine, weight)
         bare = 0.5 * albedo * np.outer(h, h * cosine * weight) / (cosine[:, None] + cosine)
     else:
         cosine, weight = _nodes(ior, MODE_NODES)
-        bare = bare_half_space(albedo, anisotropy, cosine, weight, 2 * MODE_NODES)
+        bare = bare_half_space(albedo, phase, cosine, weight, 2 * MODE_NODES)
     mirrored, flux = _inside_reflectance(cosine, ior), cosine * weight
     # The transposed system: what leaves for each radiance that goes up for the first time.
     leaving = np.linalg.solve((np.eye(len(cosine)) - bare * mirrored).T, flux * (1.0 - mirrored))

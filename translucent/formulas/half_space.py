@@ -4,7 +4,7 @@ References
 ----------
 Chandrasekhar 1960, "Radiative transfer", chapter VI; Stamnes et al. 1988, "Numerically stable algorithm for discrete-
 ordinate-method radiative transfer", for the modes; Wiscombe 1977, "The delta-M method", for phase functions that are
-sharper than the quadrature; Henyey and Greenstein 1941.
+sharper than the quadrature.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ from __future__ import annotations
 import numpy as np
 
 from translucent.arrays import Array
+from translucent.formulas.phase import PhaseFunction
 
 #: Even and odd Legendre moments.
 _PARTS = slice(0, None, 2), slice(1, None, 2)
 
 
 @np.errstate(under="ignore")
-def bare_half_space(albedo: float, anisotropy: float, cosine: Array, weight: Array, moments: int) -> Array:
+def bare_half_space(albedo: float, phase: PhaseFunction, cosine: Array, weight: Array, moments: int) -> Array:
     """Matrix (n, n) that turns radiance into a half-space without an interface into that out of it, around the normal.
 
     What goes up and what goes down are modes that decay with the depth, each with its own length: together they go
@@ -28,8 +29,7 @@ def bare_half_space(albedo: float, anisotropy: float, cosine: Array, weight: Arr
     ----------
     albedo : float
         Of single scattering, 0 to 1.
-    anisotropy : float
-        g of Henyey and Greenstein, -1 < g < 1.
+    phase : PhaseFunction
     cosine, weight : (n,)
         Quadrature over 0 to 1.
     moments : int
@@ -38,10 +38,11 @@ def bare_half_space(albedo: float, anisotropy: float, cosine: Array, weight: Arr
     """
     from scipy.linalg import eigh  # late: a window opens without it
 
-    peak = anisotropy**moments
+    known = phase.moments(moments + 1)
+    peak = float(known[-1])
     albedo = albedo * (1.0 - peak) / (1.0 - albedo * peak)
     order = np.arange(moments)
-    share = (2 * order + 1) * (anisotropy**order - peak) / (1.0 - peak)
+    share = (2 * order + 1) * (known[:-1] - peak) / (1.0 - peak)
     root = np.sqrt(weight)
     values = root[:, None] * np.polynomial.legendre.legvander(cosine, moments - 1)
     one = np.eye(len(cosine))

@@ -139,20 +139,3 @@ def thin_layer_thickness(thickness: npt.ArrayLike, cos_view: npt.ArrayLike, ior:
     """
     cosine = refracted_cosine(np.maximum(np.asarray(cos_view, np.float64), 0.0), ior)
     return np.asarray(thickness, np.float64) / np.maximum(cosine, MIN_THIN_LAYER_COSINE)
-
-
-def henyey_greenstein(cos_scatter: npt.ArrayLike, anisotropy: npt.ArrayLike) -> Array:
-    """Henyey & Greenstein 1941 phase function in 1/sr: (1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^(3/2)).
-
-    Parameters
-    ----------
-    cos_scatter : array_like
-        Cosine between the directions of travel before and after the event: 1 is straight on.
-    anisotropy : array_like
-        g, the mean cosine, -1 < g < 1.
-    """
-    g = np.asarray(anisotropy, dtype=np.float64)
-    a, c = np.abs(g), np.where(g < 0, -1.0, 1.0) * np.asarray(cos_scatter, dtype=np.float64)
-    # Turned around for g < 0, (1 - a)^2 + 2 a (1 - c) is 1 + g^2 - 2 g cos without its cancellation.
-    base = (1.0 - a) ** 2 + 2.0 * a * (1.0 - c)
-    return (1.0 - a) * (1.0 + a) / (4.0 * np.pi * base * np.sqrt(base))

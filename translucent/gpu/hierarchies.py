@@ -168,7 +168,7 @@ class SceneHierarchies:
             "node_count": divmod(span.count, 1 << 12),
             "extinction": metres * extinction,
             "scattering": metres * extinction * albedo,
-            "anisotropy": medium.anisotropy,
+            "phase": medium.phase_function.parameters,
             "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
             "emission": metres * np.asarray(medium.emission),
             "kind": _kind(body, sheet),

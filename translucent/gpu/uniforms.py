@@ -92,19 +92,21 @@ def center_aside(camera: Camera, size: tuple[int, int]) -> Array:
 def media_uniforms(placed: PlacedScene, slots: tuple[Slot, ...]) -> bytes:
     """Contents of the Media block."""
     scene = placed.scene
-    extinction, emission, scattering = (np.zeros((MAX_SLOTS, 4)) for _ in range(3))
+    extinction, emission, scattering, phase = (np.zeros((MAX_SLOTS, 4)) for _ in range(4))
     for i, slot in enumerate(slots[:MAX_SLOTS]):
         density = scene.objects[slot.objects[0]].density
         densest = 1.0 if density is None else max(density.maximum, 1.0)
         extinction[i, :3] = bounded_extinction(slot.medium, densest * scene.diagonal)
         emission[i, :3] = slot.medium.emission
         share = extinction[i, :3] / np.where(slot.medium.extinction > 0, slot.medium.extinction, 1.0)
-        scattering[i] = *(share * np.asarray(slot.medium.scattering)), slot.medium.anisotropy
+        scattering[i, :3] = share * np.asarray(slot.medium.scattering)
+        phase[i] = slot.medium.phase_function.parameters
         extinction[i, 3], emission[i, 3] = placed.expected_counts[list(slot.objects)].sum(axis=0)
     return MEDIA.pack(
         slot_extinction=extinction,
         slot_emission=emission,
         slot_scattering=scattering,
+        slot_phase=phase,
         media_length=placed.media.length,
         slot_bits=slot_bits(len(slots)),
     )

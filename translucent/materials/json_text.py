@@ -11,16 +11,20 @@ import numpy as np
 
 from translucent.errors import InputError
 from translucent.files.reading import json_value
+from translucent.formulas.phase import parse_phase
 from translucent.media.medium import Medium
 
 _TRIPLES = ("absorption", "scattering", "emission")
 _NUMBERS = ("anisotropy", "ior")
+_PHASE = "phase"
 
 
 def write_json(medium: Medium) -> str:
     """The medium as one JSON object."""
     triples = {field: np.asarray(getattr(medium, field)).tolist() for field in _TRIPLES}
-    return json.dumps({**triples, **{field: float(getattr(medium, field)) for field in _NUMBERS}}, indent=2) + "\n"
+    numbers = {field: float(getattr(medium, field)) for field in _NUMBERS}
+    phase = {_PHASE: str(medium.phase)} if medium.phase else {}
+    return json.dumps({**triples, **numbers, **phase}, indent=2) + "\n"
 
 
 def read_json(text: str) -> Medium:
@@ -37,9 +41,12 @@ def read_json(text: str) -> Medium:
         raise InputError("medium as JSON", f"it is broken ({error})", "write it again") from error
     if not isinstance(values, dict):
         raise InputError("medium as JSON", "not an object", "write it again")
-    if unknown := sorted(set(values) - {*_TRIPLES, *_NUMBERS}):
-        raise InputError("medium as JSON", f"unknown {', '.join(unknown)}", f"use {', '.join(_TRIPLES + _NUMBERS)}")
+    known = (*_TRIPLES, *_NUMBERS, _PHASE)
+    if unknown := sorted(set(values) - set(known)):
+        raise InputError("medium as JSON", f"unknown {', '.join(unknown)}", f"use {', '.join(known)}")
     for field in _NUMBERS:
         if isinstance(number := values.get(field, 0), bool) or not isinstance(number, int | float):
             raise InputError("medium as JSON", f"{field} is {number!r}, not a number", "write it again")
+    if _PHASE in values:
+        values[_PHASE] = parse_phase(str(values[_PHASE]))
     return Medium(**values)

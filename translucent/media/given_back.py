@@ -19,7 +19,7 @@ class LayeredMedium(Medium):
     @classmethod
     def of(cls, medium: Medium) -> Self:
         """The medium, marked."""
-        return cls(medium.absorption, medium.scattering, medium.emission, medium.anisotropy, medium.ior)
+        return cls(medium.absorption, medium.scattering, medium.emission, medium.anisotropy, medium.ior, medium.phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class DiffusedVolume(Medium):
     @classmethod
     def of(cls, medium: Medium) -> Self:
         """The medium, marked."""
-        return cls(medium.absorption, medium.scattering, medium.emission, medium.anisotropy, medium.ior)
+        return cls(medium.absorption, medium.scattering, medium.emission, medium.anisotropy, medium.ior, medium.phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,4 +49,4 @@ class DiffusedMedium(Medium):
     @classmethod
     def of(cls, medium: Medium, emission: npt.ArrayLike) -> Self:
         """The medium, marked; `emission` (3,) is what it emits along rays, with the ambient light that it scatters."""
-        return cls(medium.extinction, 0.0, emission, 0.0, medium.ior, medium)
+        return cls(medium.extinction, 0.0, emission, 0.0, medium.ior, original=medium)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.formulas import optics
+from translucent.formulas.phase import HenyeyGreenstein, PhaseFunction
 from translucent.media import conversion
 from translucent.media.colors import parse_color
 
@@ -41,9 +42,12 @@ class Medium(Frozen):
     emission : array_like (3,)
         q in radiance per metre, >= 0.
     anisotropy : float
-        Henyey-Greenstein g, -1 < g < 1.
+        Mean cosine g of the angle that scattered light turns by, -1 < g < 1: by the phase function of Henyey and
+        Greenstein, where no other is given.
     ior : float
         Index of refraction, >= 1; 1 is index-matched.
+    phase : PhaseFunction, optional
+        Phase function in place of Henyey and Greenstein's; it determines `anisotropy`.
 
     Raises
     ------
@@ -59,10 +63,17 @@ class Medium(Frozen):
     emission: Channels = (0.0, 0.0, 0.0)
     anisotropy: float = 0.0
     ior: float = 1.0
+    phase: PhaseFunction | None = None
 
     def __post_init__(self) -> None:
         for field in ("absorption", "scattering", "emission"):
             object.__setattr__(self, field, _channels(field, getattr(self, field)))
+        if self.phase is not None:
+            if self.anisotropy not in (0.0, self.phase.mean_cosine):
+                raise InputError(
+                    f"medium anisotropy {self.anisotropy}", f"its phase function is {self.phase}", "give one of the two"
+                )
+            object.__setattr__(self, "anisotropy", self.phase.mean_cosine)
         if not -1 < self.anisotropy < 1:
             raise InputError(f"medium anisotropy {self.anisotropy}", "not between -1 and 1", "give for example 0.8")
         if not 1 <= self.ior <= MAX_IOR:
@@ -203,9 +214,14 @@ class Medium(Frozen):
         """True if any channel scatters."""
         return bool(np.any(np.asarray(self.scattering) > 0))
 
+    @cached_property
+    def phase_function(self) -> PhaseFunction:
+        """Phase function of the scattered light: `phase`, or that of Henyey and Greenstein."""
+        return self.phase or HenyeyGreenstein(self.anisotropy)
+
     def _key(self) -> tuple[object, ...]:
         triples = (np.asarray(v) for v in (self.absorption, self.scattering, self.emission))
-        return (*(tuple(t.tolist()) for t in triples), self.anisotropy, self.ior)
+        return (*(tuple(t.tolist()) for t in triples), self.phase_function, self.ior)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Medium) and self._key() == other._key()

@@ -21,6 +21,7 @@ from translucent.files.reading import json_value, read_text, toml_value
 from translucent.formulas.card import reflectance_on_card
 from translucent.formulas.color import to_hex
 from translucent.formulas.diffuse_interface import diffuse_interface, half_space_reflectance
+from translucent.formulas.phase import HenyeyGreenstein, PhaseFunction, parse_phase
 from translucent.media.colors import parse_color
 from translucent.media.medium import Medium
 from translucent.media.swatches import html_card
@@ -148,8 +149,9 @@ class Preset:
         times `half_space_reflectance`: exact, with each channel's own anisotropy.
         """
         ior = self.medium.ior
-        channels = zip(self.albedo.tolist(), self.channel_anisotropy, strict=True)
-        given_back = [half_space_reflectance(min(albedo, 1.0), ior, float(g)) for albedo, g in channels]
+        phases = [self.medium.phase or HenyeyGreenstein(float(g)) for g in self.channel_anisotropy]
+        channels = zip(self.albedo.tolist(), phases, strict=True)
+        given_back = [half_space_reflectance(min(albedo, 1.0), ior, phase) for albedo, phase in channels]
         return diffuse_interface(ior).entering * np.array(given_back)
 
     @property
@@ -277,7 +279,7 @@ _ALWAYS = {"kind", "source", "ior"}
 _OPTIONAL = {"group", "note", "aliases", "roughness"}
 _BY_COLOR = {"color", "distance"}
 _BY_COEFFICIENTS = {"unit", "absorption"}
-_UNREDUCED = {"scattering", "anisotropy"}
+_UNREDUCED = {"scattering", "anisotropy", "phase"}
 _KNOWN = _ALWAYS | _OPTIONAL | _BY_COLOR | _BY_COEFFICIENTS | _UNREDUCED | {"reduced_scattering", "emission"}
 
 
@@ -331,7 +333,8 @@ def preset_text(one: Preset) -> str:
     if one.reduced:
         values |= {"reduced_scattering": one.scattering.tolist()}
     elif medium.scatters:
-        values |= {"scattering": one.scattering.tolist(), "anisotropy": list(one.channel_anisotropy)}
+        values |= {"scattering": one.scattering.tolist()}
+        values |= {"phase": str(medium.phase)} if medium.phase else {"anisotropy": list(one.channel_anisotropy)}
     emission = np.asarray(medium.emission, dtype=np.float64).tolist()
     values |= {"emission": emission} if any(emission) else {}
     values |= {"ior": float(medium.ior)}
@@ -390,7 +393,9 @@ class _Entry:
             return
         if "reduced_scattering" in given:
             self._exclude(given & _UNREDUCED, "reduced_scattering")
-        self._require(_ALWAYS | _BY_COEFFICIENTS | ({"scattering"} if "anisotropy" in given else set()), given)
+        if "phase" in given:
+            self._exclude(given & {"anisotropy"}, "phase")
+        self._require(_ALWAYS | _BY_COEFFICIENTS | ({"scattering"} if given & _UNREDUCED else set()), given)
 
     def _check_by_color(self, given: set[str]) -> None:
         self._exclude(given & {"absorption"}, "color")
@@ -419,7 +424,9 @@ class _Entry:
             raise self._wrong("kind", '"measured" or "estimated"')
         anisotropy = self._triple("anisotropy") if "anisotropy" in self.entry else (0.0, 0.0, 0.0)
         try:
-            medium = self._medium(anisotropy)
+            phase = parse_phase(self._text("phase")) if "phase" in self.entry else None
+            anisotropy = (phase.mean_cosine,) * 3 if phase else anisotropy
+            medium = self._medium(anisotropy, phase)
         except InputError as error:
             if str(error).startswith(self.where):
                 raise
@@ -437,7 +444,7 @@ class _Entry:
             self._text("group") if "group" in self.entry else "",
         )
 
-    def _medium(self, anisotropy: Triple) -> Medium:
+    def _medium(self, anisotropy: Triple, phase: PhaseFunction | None) -> Medium:
         ior = self._number("ior", self.entry["ior"])
         for g in anisotropy:
             if not -1 < g < 1:
@@ -448,7 +455,7 @@ class _Entry:
             total = float(scattering.sum())
             mean = float(scattering @ np.array(anisotropy)) / total if total > 0 else 0.0
         emission = self._per_metre("emission") if "emission" in self.entry else np.zeros(3)
-        return Medium(self._absorption(), scattering, emission, mean, ior)
+        return Medium(self._absorption(), scattering, emission, 0.0 if phase else mean, ior, phase)
 
     def _absorption(self) -> Array:
         """sigma_a in 1/m."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from translucent.errors import InputError
+from translucent.formulas.phase import ISOTROPIC
 from translucent.media.medium import Medium
 from translucent.planning.bodies import count_of, indices
 from translucent.planning.caustics import Caustics
@@ -166,7 +167,7 @@ def _left_out(scene: Scene, lit: tuple[int, ...], fogs: tuple[int, ...], opengl:
         hidden = "which are out of the picture or hidden by what is opaque"
         texts.append(f"caustics on receivers that interfaces alone show, {hidden}")
     dark = indices(scene, lambda body: body.medium is not None and body.medium.scatters)
-    uneven = indices(scene, lambda body: body.medium is not None and body.medium.anisotropy != 0.0)
+    uneven = indices(scene, lambda body: body.medium is not None and body.medium.phase_function != ISOTROPIC)
     if others := tuple(i for i in dark if i not in lit):
         texts.append(f"caustics in media that scatter: {_names(scene, others)}")
     if dark:

@@ -121,7 +121,5 @@ def _told(medium: Medium | None, lit: bool) -> Hashable:
     """Properties that matter of a medium that fills a point; None for one that is like no other."""
     if medium is None or isinstance(medium, DiffusedVolume):
         return None
-    told = [*medium.extinction, *np.asarray(medium.emission)]
-    if lit:
-        told += [*np.asarray(medium.scattering), medium.anisotropy]
-    return tuple(map(float, told))
+    told = (*medium.extinction.tolist(), *np.asarray(medium.emission).tolist())
+    return (*told, *np.asarray(medium.scattering).tolist(), medium.phase_function) if lit else told

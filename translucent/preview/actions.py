@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from translucent.errors import InputError
+from translucent.formulas.phase import parse_phase
 from translucent.gltf.load import SUFFIXES
 from translucent.media.medium import MAX_COEFFICIENT, Medium, color_at
 from translucent.media.presets import preset
@@ -111,7 +112,7 @@ CAMERA_ACTIONS = (SetOrbit, Turn, Pan, Zoom)
 #: Fields that define the medium by a color at a distance, or by coefficients.
 _BY_COLOR = ("color", "distance")
 _BY_COEFFICIENTS = ("absorption",)
-_OF_PRESET = ("scattering", "anisotropy", "emission")
+_OF_PRESET = ("scattering", "anisotropy", "phase", "emission")
 
 
 def apply(document: Document, action: Action) -> Document:
@@ -169,7 +170,12 @@ def _changed(document: Document, action: SetField) -> Document:
 def changed_material(material: Material, name: str, value: Any) -> Material:
     """Material with another value of a field; raises `InputError` if that is out of its range."""
     value = checked(f"material.{name}", value, getattr(material, name))
-    return _resourced(dataclasses.replace(material, **{name: value}), name)
+    values = {name: value}
+    if name == "phase":
+        values["anisotropy"] = parse_phase(value).mean_cosine if value else 0.0
+    elif name == "anisotropy":
+        values["phase"] = ""
+    return _resourced(dataclasses.replace(material, **values), name)
 
 
 def _assigned(document: Document, action: Assign) -> Document:
@@ -226,6 +232,7 @@ def preset_material(material: Material, name: str) -> Material:
         scattering=tuple(found.scattering.tolist()),
         emission=tuple(np.asarray(medium.emission).tolist()),
         anisotropy=float(medium.anisotropy),
+        phase=str(medium.phase or ""),
         ior=float(medium.ior),
         roughness=found.roughness or kept,
     )

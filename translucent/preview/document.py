@@ -86,7 +86,9 @@ class Material:
     emission : tuple of 3 floats
         Radiance per metre.
     anisotropy : float
-        Henyey-Greenstein g.
+        Mean cosine g, by the phase function of Henyey and Greenstein where no other is given.
+    phase : str
+        Another phase function, as `parse_phase` reads it, or nothing.
     ior, roughness, transmission, dispersion : float
     iridescence, iridescence_ior, iridescence_thickness : float
         Of a thin film on the surface; its thickness in metres.
@@ -103,6 +105,7 @@ class Material:
     scattering: Triple = (0.0, 0.0, 0.0)
     emission: Triple = (0.0, 0.0, 0.0)
     anisotropy: float = 0.0
+    phase: str = ""
     ior: float = 1.0
     roughness: float = 0.0
     transmission: float = 1.0

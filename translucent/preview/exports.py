@@ -344,7 +344,8 @@ def _filling_lines(shot: Recipe, material: Material, number: int | None) -> list
         f"{name}=({_numbers(np.asarray(getattr(medium, name)), ', ')})"
         for name in ("absorption", "scattering", "emission")
     )
-    told = f"{', '.join(triples)}, anisotropy={medium.anisotropy:.12g}, ior={medium.ior:.12g}"
+    phase = f"phase=tl.{medium.phase!r}" if medium.phase else f"anisotropy={medium.anisotropy:.12g}"
+    told = f"{', '.join(triples)}, {phase}, ior={medium.ior:.12g}"
     among = "" if number is None else f", [scene.objects[{number}]]"
     chosen = "item.medium is not None" if number is None else f"item is scene.objects[{number}]"
     lines = [f"scene = filled(scene, tl.Medium({told}){among})"]

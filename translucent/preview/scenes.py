@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.formulas.brdf_table import brdf_table
+from translucent.formulas.phase import parse_phase
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals, keep_drawn_normals
 from translucent.geometry.solids import Box
@@ -184,6 +185,7 @@ def material_of(scene: Scene, number: int | None = None) -> Material:
         scattering=given[2],
         emission=given[3],
         anisotropy=medium.anisotropy,
+        phase=str(medium.phase or ""),
         ior=medium.ior,
         **{name: getattr(surface, name) for name in FINISH},
         thickness=body.sheet_thickness or 0.1 * diagonal,
@@ -195,7 +197,9 @@ def medium_of(material: Material) -> Medium:
     absorption: object = material.absorption
     if material.source == "color":
         absorption = Medium.from_color(material.color, material.distance).absorption
-    return Medium(absorption, material.scattering, material.emission, material.anisotropy, material.ior)  # type: ignore[arg-type]
+    phase = parse_phase(material.phase) if material.phase else None
+    g = 0.0 if phase else material.anisotropy
+    return Medium(absorption, material.scattering, material.emission, g, material.ior, phase)  # type: ignore[arg-type]
 
 
 def scene_of(document: Document, loaded: Loaded) -> Scene:

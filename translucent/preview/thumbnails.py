@@ -54,7 +54,14 @@ LOOK = 1
 def ball_key(one: Preset) -> str:
     """Key of the picture of a preset: of its content, and of the version."""
     medium = one.medium
-    values = (medium.absorption, medium.scattering, medium.emission, medium.anisotropy, medium.ior, one.roughness)
+    values = (
+        medium.absorption,
+        medium.scattering,
+        medium.emission,
+        medium.phase_function.parameters,
+        medium.ior,
+        one.roughness,
+    )
     return _key("ball", BALL, *(np.asarray(value, dtype=np.float64).tolist() for value in values))
 
 

@@ -273,8 +273,10 @@ class InterfacePaths:
             return legs
         self.events[legs.owner] += 1
         self._add(legs, self.straight.scattered(legs, weights, int(self.channels[0])))
-        g = self._anisotropy(weights)
-        rays = replace(legs.rays, directions=scattered_directions(legs.rays.directions, g, self.rng))
+        chosen = self._chosen_phases(weights)
+        rays = replace(
+            legs.rays, directions=scattered_directions(legs.rays.directions, self.light.volume.phases, chosen, self.rng)
+        )
         always = np.ones(len(legs), dtype=bool)
         return self._roulette(replace(legs, rays=rays, bent=always, reflected=always))
 
@@ -283,11 +285,11 @@ class InterfacePaths:
         hits = [line.before(np.where(np.isfinite(event), event, 0.0)) for line in flight.hits]
         return self.own.crossed(hits, inside).where(some)
 
-    def _anisotropy(self, weights: Array) -> Array:
-        """(k,): of one of the media at each place, chosen by how much they scatter."""
+    def _chosen_phases(self, weights: Array) -> Integers:
+        """(k,): numbers of the phase functions of one of the media at each place, chosen by how much they scatter."""
         shares = np.cumsum(weights * self.scattering, axis=1)
         chosen = (shares < self.rng.random((len(weights), 1)) * shares[:, -1:]).sum(axis=1)
-        return np.asarray(self.light.volume.anisotropy[np.minimum(chosen, len(self.scattering) - 1)])
+        return np.asarray(self.light.volume.phase[np.minimum(chosen, len(self.scattering) - 1)])
 
     def _roulette(self, legs: Legs) -> Legs:
         """Paths that go on, and carry more for those that do not (Arvo & Kirk 1990)."""

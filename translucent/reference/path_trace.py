@@ -87,8 +87,8 @@ class StraightPaths:
             self._add_lights(rays, met.weights, throughput, owner)
             lives, throughput = self._roulette(throughput)
             rays, throughput, owner = rays.where(lives), throughput[lives], owner[lives]
-            g = self._anisotropy(met.weights[lives])
-            rays = replace(rays, directions=scattered_directions(rays.directions, g, self.rng))
+            chosen = self._chosen_phases(met.weights[lives])
+            rays = replace(rays, directions=scattered_directions(rays.directions, self.volume.phases, chosen, self.rng))
         return self.found
 
     def _media(self, rays: Rays) -> CrossedMedia:
@@ -157,11 +157,11 @@ class StraightPaths:
         """(k,): share of the light that an event scatters."""
         return np.asarray((weights @ self.scattering) / (weights @ self.extinction))
 
-    def _anisotropy(self, weights: Array) -> Array:
-        """(k,): of one of the media at each place, chosen by how much they scatter."""
+    def _chosen_phases(self, weights: Array) -> Integers:
+        """(k,): numbers of the phase functions of one of the media at each place, chosen by how much they scatter."""
         shares = np.cumsum(weights * self.scattering, axis=1)
         chosen = (shares < self.rng.random((len(weights), 1)) * shares[:, -1:]).sum(axis=1)
-        return np.asarray(self.volume.anisotropy[np.minimum(chosen, len(self.scattering) - 1)])
+        return np.asarray(self.volume.phase[np.minimum(chosen, len(self.scattering) - 1)])
 
     def _roulette(self, throughput: Array) -> tuple[Integers, Array]:
         """Russian roulette: mask of paths that go on, and the weight that each would then carry."""

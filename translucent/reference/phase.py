@@ -1,26 +1,45 @@
-"""Random directions after a scattering event."""
+"""Phase functions of the reference: their values, and random directions after a scattering event."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Integers
+from translucent.formulas.phase import HenyeyGreenstein, PhaseFunction
 
 
-def scattered_directions(directions: Array, anisotropy: Array, rng: np.random.Generator) -> Array:
-    """Unit vectors (k, 3) distributed by the phase function of Henyey and Greenstein around `directions` (k, 3).
+def phase_value(phase: PhaseFunction, cosine: Array) -> Array:
+    """Phase function in 1/sr at cosines between the directions of travel before and after the event."""
+    match phase:
+        case HenyeyGreenstein(g):
+            return _henyey_greenstein(cosine, g)
+    raise NotImplementedError(f"the reference has no {phase.name}")
+
+
+def scattered_directions(
+    directions: Array, phases: Sequence[PhaseFunction], chosen: Integers, rng: np.random.Generator
+) -> Array:
+    """Unit vectors (k, 3) distributed by phase functions around `directions` (k, 3).
 
     Parameters
     ----------
     directions : (k, 3) float64
         Of travel before the event; unit vectors.
-    anisotropy : (k,) float64
+    phases : sequence of PhaseFunction
+    chosen : (k,) int
+        Number of that of each event.
     rng : numpy.random.Generator
     """
-    cosine = henyey_greenstein_cosine(rng.random(len(directions)), anisotropy)
-    sine = np.sqrt(np.maximum((1.0 - cosine) * (1.0 + cosine), 0.0))
+    u = rng.random(len(directions))
+    cosine = np.empty(len(directions))
     angle = 2.0 * np.pi * rng.random(len(directions))
+    for number, phase in enumerate(phases):
+        own = chosen == number
+        cosine[own] = _cosines(phase, u[own])
+    sine = np.sqrt(np.maximum((1.0 - cosine) * (1.0 + cosine), 0.0))
     across, up = _frame(directions)
     with np.errstate(under="ignore"):
         turned = across * np.cos(angle)[:, None] + up * np.sin(angle)[:, None]
@@ -28,12 +47,26 @@ def scattered_directions(directions: Array, anisotropy: Array, rng: np.random.Ge
     return np.asarray(scattered / np.linalg.norm(scattered, axis=1, keepdims=True))
 
 
-def henyey_greenstein_cosine(u: npt.ArrayLike, anisotropy: npt.ArrayLike) -> Array:
+def _cosines(phase: PhaseFunction, u: Array) -> Array:
+    """Cosines distributed by a phase function, for numbers `u` (k,) evenly distributed over 0 to 1."""
+    match phase:
+        case HenyeyGreenstein(g):
+            return henyey_greenstein_cosine(u, g)
+    raise NotImplementedError(f"the reference has no {phase.name}")
+
+
+def _henyey_greenstein(cosine: Array, g: float) -> Array:
+    """Henyey and Greenstein 1941: (1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^(3/2))."""
+    ahead = 1.0 - cosine if g >= 0 else 1.0 + cosine
+    base = (1.0 - abs(g)) ** 2 + 2.0 * abs(g) * ahead
+    return np.asarray((1.0 - g) * (1.0 + g) / (4.0 * np.pi * base * np.sqrt(base)))
+
+
+def henyey_greenstein_cosine(u: npt.ArrayLike, g: float) -> Array:
     """Cosine between the directions before and after the event, from `u` in 0 to 1 (Witt 1977).
 
     Rearranged so that nothing is divided by g, which may be 0.
     """
-    g = np.asarray(anisotropy, dtype=np.float64)
     a = 2.0 * np.asarray(u, dtype=np.float64) - 1.0
     with np.errstate(under="ignore"):
         root = (1.0 - g) * (1.0 + g) / (1.0 + g * a)

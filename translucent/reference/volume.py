@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
-from translucent.formulas import optics
+from translucent.formulas.phase import ISOTROPIC
 from translucent.reference.intervals import Intervals
+from translucent.reference.phase import phase_value
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments, _pieces, scene_segments
 from translucent.reference.sheets import Crossings
@@ -31,7 +32,10 @@ class Volume:
     ----------
     extinction, scattering, emission : (n, 3) float64
         Where the density is 1. Emission counts what is scattered of the ambient radiance.
-    anisotropy : (n,) float64
+    phases : tuple of PhaseFunction
+        Those of the media, each once.
+    phase : (n,) int64
+        Number of that of each object.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -41,7 +45,9 @@ class Volume:
             for name in ("extinction", "scattering")
         )
         self.emission = np.stack([scene.source(body) for body in scene.objects])
-        self.anisotropy = np.array([medium.anisotropy if medium else 0.0 for medium in media])
+        own = [medium.phase_function if medium else ISOTROPIC for medium in media]
+        self.phases = tuple(dict.fromkeys(own))
+        self.phase = np.array([self.phases.index(one) for one in own], dtype=np.int64)
         self._densities = [(i, body.density) for i, body in enumerate(scene.objects) if body.density is not None]
         self._boxes = {i: _UnitBox(scene, i) for i, _ in self._densities}
 
@@ -91,10 +97,9 @@ class Volume:
         """
         total = np.zeros((len(weights), 3))
         scattering = np.flatnonzero((self.scattering > 0).any(axis=1))
-        for g in np.unique(self.anisotropy[scattering]):
-            alike = scattering[self.anisotropy[scattering] == g]
-            phase = optics.henyey_greenstein(cosine, g)
-            total += weights[:, alike] @ self.scattering[alike] * phase[:, None]
+        for number, phase in enumerate(self.phases):
+            if len(alike := scattering[self.phase[scattering] == number]):
+                total += weights[:, alike] @ self.scattering[alike] * phase_value(phase, cosine)[:, None]
         return total
 
 
@@ -208,4 +213,4 @@ def _medium_key(scene: Scene, index: int) -> tuple[object, ...]:
     if medium is None or body.density is not None:
         return (int(index),)
     values = (medium.extinction, medium.scattering, medium.emission)
-    return (*(tuple(np.asarray(v).tolist()) for v in values), medium.anisotropy if medium.scatters else 0.0)
+    return (*(tuple(np.asarray(v).tolist()) for v in values), medium.phase_function if medium.scatters else ISOTROPIC)

@@ -75,7 +75,7 @@ class Shot:
     def diffuse_color(self) -> Array:
         """(3,): of diffuse light that enters a half-space of the medium, the share that it gives back; exact."""
         albedo = np.asarray(self.medium.scattering) / self.medium.extinction
-        return np.array([half_space_reflectance(float(w), self.medium.ior, self.medium.anisotropy) for w in albedo])
+        return np.array([half_space_reflectance(float(w), self.medium.ior, self.medium.phase_function) for w in albedo])
 
     @property
     def entering(self) -> float:
