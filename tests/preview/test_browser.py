@@ -12,7 +12,7 @@ import pytest
 
 from tests.preview.waiting import wait
 from translucent.assets import shader_path
-from translucent.preview import session
+from translucent.preview import session, thumbnails
 from translucent.preview.dialogs import Browser, with_recent
 from translucent.preview.document import FINISH, TIPS, Display, Look, Material, Orbit, camera_of
 from translucent.preview.library import EnvironmentFolder, title
@@ -232,10 +232,10 @@ def test_of_a_folder_of_500_environments_few_are_read_in_a_frame(
     assert len(state.environments.files()) == 500
     monkeypatch.setattr(os, "listdir", lambda _: pytest.fail("the folder has not changed"))
     assert state.environments.files()[-1] == str(tmp_path / "499.hdr")
-    thumbnails, read = state.work.thumbnails, list[Path]()
+    cache, read = state.work.thumbnails, list[Path]()
     monkeypatch.setattr(thumbnails, "_read", lambda path: read.append(path))
     for _ in range(2):
-        thumbnails.begin_frame(idle=False)
+        cache.begin_frame(idle=False)
         for path in state.environments.files():
-            assert thumbnails.picture(panorama_key(path), draw_panorama, path) is None
+            assert cache.picture(panorama_key(path), draw_panorama, path) is None
     assert 0 < len(read) <= 2 * thumbnails.READ_AT_ONCE
