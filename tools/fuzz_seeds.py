@@ -15,11 +15,17 @@ from PIL import Image
 
 import translucent as tl
 from translucent.bench.codec import Packed
-from translucent.bench.files import read_report, write_csv
-from translucent.bench.page.pictures import heat_map
-from translucent.bench.picture import Picture
-from translucent.bench.record import CaseRecord, Provenance, Report
-from translucent.bench.row import Errors, Row, Timing
+from translucent.bench.output import read_report, write_csv
+from translucent.bench.page import heat_map
+from translucent.bench.record import (
+    CaseRecord,
+    ErrorStatistics,
+    MethodRow,
+    Provenance,
+    Report,
+    ReportPicture,
+    TimeStatistics,
+)
 from translucent.files.unpacking import PICTURES
 from translucent.frames.photographs import read_photographs, read_picture
 from translucent.geometry.solids import Box
@@ -175,8 +181,10 @@ def report_text() -> bytes:
     error = Packed.of(np.array([[0.0, 1e-9, 0.1], [np.nan, -3e-3, 1e-5]]))
     shown = base64.b64encode(picture("PNG")).decode()
     marks = Packed.of(np.array([[True, False, False], [False, False, True]]))
-    row = Row("A", "A", "A()", "method", "exact", True, Timing(1, 2, 0.1, 9), thickness=Errors(*([1e-3] * 6)))
-    case = CaseRecord("knot", "Knot", "", "thickness", rows=(row,), pictures=(Picture("A", shown, error, marks),))
+    row = MethodRow(
+        "A", "A", "A()", "method", "exact", True, TimeStatistics(1, 2, 0.1, 9), thickness=ErrorStatistics(*([1e-3] * 6))
+    )
+    case = CaseRecord("knot", "Knot", "", "thickness", rows=(row,), pictures=(ReportPicture("A", shown, error, marks),))
     where = Provenance("c", "2026-01-01", "p", "p", 2, "egl", "r", "d", True, {"numpy": "2"}, None, None, 0, True)
     return Report(where, (case,)).to_json().encode()
 

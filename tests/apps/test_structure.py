@@ -49,7 +49,6 @@ MODULES = {module.removesuffix(".__init__"): path for module, path in MODULES.it
 SHARED = {
     "BentLight",
     "DiffusedLight",
-    "Errors",
     "Fields",
     "Interfaces",
     "Layer",
@@ -58,7 +57,6 @@ SHARED = {
     "Picture",
     "Progress",
     "Rays",
-    "Row",
     "SceneView",
     "Shader",
     "Steps",

@@ -14,7 +14,7 @@ from translucent.bench import truth as truths
 from translucent.bench.cases import CASES
 from translucent.bench.contenders import contenders
 from translucent.bench.drawing import Studio
-from translucent.bench.page.advice import advise
+from translucent.bench.judgement import advise
 from translucent.bench.truth import Truth
 from translucent.geometry.solids import Sphere
 from translucent.gpu.passes import traced_interfaces

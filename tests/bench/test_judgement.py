@@ -9,13 +9,24 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from translucent.bench.claims import check_claims
-from translucent.bench.comparison import Agreement, agreement, compare_reports, machines_differ
-from translucent.bench.frontier import beats, mark_frontier
 from translucent.bench.hard.measure import CASES
-from translucent.bench.record import CaseRecord, HardCase, Report, ScalePoint, Series
-from translucent.bench.row import Errors, Ratio, Row, Timing
-from translucent.bench.shadows.record import ShadowCase, ShadowRow, Shadows
+from translucent.bench.judgement import Agreement, agreement, beats, compare_reports, machines_differ, mark_frontier
+from translucent.bench.record import (
+    CaseRecord,
+    Claim,
+    ErrorStatistics,
+    HardCase,
+    MethodRow,
+    Ratio,
+    Report,
+    ScalePoint,
+    Series,
+    ShadowCase,
+    ShadowRow,
+    Shadows,
+    TimeStatistics,
+)
+from translucent.bench.run import judged
 from translucent.bench.timing import (
     FEWEST,
     FEWEST_LONG,
@@ -34,16 +45,18 @@ from .test_record import PROVENANCE
 ALL_HARD = tuple(HardCase(case.id, "", "", "", True) for case in CASES)
 
 
-def row(method: str, time: float, error: float, noise: float = 0.0, invalid: float = 0.0, kind: str = "method") -> Row:
-    errors = Errors(error, error, error, error, error, 0.0)
-    return Row(
+def row(
+    method: str, time: float, error: float, noise: float = 0.0, invalid: float = 0.0, kind: str = "method"
+) -> MethodRow:
+    errors = ErrorStatistics(error, error, error, error, error, 0.0)
+    return MethodRow(
         method,
         method,
         "",
         kind,  # type: ignore[arg-type]
         "exact",
         True,
-        wall=Timing(time, time, 0.0, 9),
+        wall=TimeStatistics(time, time, 0.0, 9),
         ratio=Ratio(time, 0.0, noise),
         thickness=errors,
         invalid=invalid,
@@ -83,7 +96,7 @@ def test_a_method_that_marks_pixels_beats_none_that_does_not() -> None:
     assert beats(row("b", 1.0, 1e-5), row("a", 2.0, 1e-4, invalid=0.2), "thickness")
 
 
-def case(*rows: Row, name: str = "knot", **more: object) -> CaseRecord:
+def case(*rows: MethodRow, name: str = "knot", **more: object) -> CaseRecord:
     fields = {"closed": True, "absorption_only": True, "size": (64, 64), "compared_size": (32, 32), "layers": 4}
     return CaseRecord(name, name, "", "thickness", rows=mark_frontier(rows, "thickness"), **(fields | more))  # type: ignore[arg-type]
 
@@ -168,7 +181,11 @@ def test_another_machine_is_told() -> None:
 
 
 def claims(*cases: CaseRecord, hard: tuple[HardCase, ...] = ()) -> list[bool | None]:
-    return [claim.held for claim in check_claims(cases, hard)]
+    return [claim.held for claim in checked(*cases, hard=hard)]
+
+
+def checked(*cases: CaseRecord, hard: tuple[HardCase, ...] = ()) -> tuple[Claim, ...]:
+    return judged(report(*cases, hard=hard)).claims
 
 
 def test_claims_hold_where_the_numbers_do() -> None:
@@ -185,13 +202,13 @@ def test_claims_hold_where_the_numbers_do() -> None:
 
 def test_hard_cases_hold_where_each_that_there_is_has_been_measured_and_holds() -> None:
     first, last = ALL_HARD[0].id, ALL_HARD[-1].id
-    found = check_claims((), ALL_HARD)[-1]
+    found = checked(hard=ALL_HARD)[-1]
     assert (found.text, found.held) == (f"All hard cases {first} to {last} hold", True)
     assert found.measured == f"{len(ALL_HARD)} measured"
-    short = check_claims((), ALL_HARD[:-2])[-1]
+    short = checked(hard=ALL_HARD[:-2])[-1]
     assert (short.held, short.measured) == (False, f"2 not measured: {ALL_HARD[-2].id}, {last}")
     broken = dataclasses.replace(ALL_HARD[3], title="far", result="off", passed=False)
-    wrong = check_claims((), (*ALL_HARD[:3], broken, *ALL_HARD[4:]))[-1]
+    wrong = checked(hard=(*ALL_HARD[:3], broken, *ALL_HARD[4:]))[-1]
     assert (wrong.held, wrong.measured) == (False, f"{broken.id} far: off")
 
 
@@ -206,17 +223,17 @@ def test_hard_cases_hold_where_each_that_there_is_has_been_measured_and_holds() 
         (5, row("SignedDepth from the camera", 1.1, 2e-7)),
     ],
 )
-def test_a_claim_falls_on_one_case(number: int, change: Row) -> None:
+def test_a_claim_falls_on_one_case(number: int, change: MethodRow) -> None:
     names = ("constant thickness", "BackFaceDepth, unmarked", "SignedDepth from the camera", "SignedDepth in float16")
     good = [row("SignedDepth", 1.1, 1e-7), *(row(name, 1.3, 1e-2) for name in names)]
     bad = [change if one.method == change.method else one for one in good]
-    found = check_claims([case(*good), case(*bad, name="far slab")], ())[number]
+    found = checked(case(*good), case(*bad, name="far slab"))[number]
     assert found.held is False
     assert found.measured.startswith("not on 'far slab'")
 
 
 def test_a_claim_within_the_noise_is_undecided() -> None:
-    found = check_claims([case(row("SignedDepth", 1.3, 1e-7, noise=0.05))], ())[1]
+    found = checked(case(row("SignedDepth", 1.3, 1e-7, noise=0.05)))[1]
     assert found.held is None
     assert "undecided on 'knot': 1.30 ± 0.05" in found.measured
 
@@ -224,13 +241,13 @@ def test_a_claim_within_the_noise_is_undecided() -> None:
 @pytest.mark.parametrize("time", [1.15, 1.31])
 def test_a_figure_that_noise_leaves_open_does_not_hold_on_either_side_of_the_bar(time: float) -> None:
     vague, clear = case(row("SignedDepth", time, 1e-7, noise=0.16)), case(row("SignedDepth", 1.1, 1e-7), name="torus")
-    frontier, floor = check_claims([clear, vague], ())[:2]
+    frontier, floor = checked(clear, vague)[:2]
     assert (frontier.held, floor.held) == (None, None), "that it holds on the other case does not decide it here"
     assert floor.undecided
     assert floor.measured.startswith(f"undecided on 'knot': {time:.2f} ± 0.16")
     assert frontier.measured.startswith(f"undecided on 'knot': {time:.2f} ± 0.16 times the floor")
     slow = case(row("SignedDepth", 1.9, 1e-7, noise=0.01), name="slow")
-    assert check_claims([vague, slow], ())[1].held is False, "it fails elsewhere"
+    assert checked(vague, slow)[1].held is False, "it fails elsewhere"
 
 
 def test_the_median_of_quotients_ignores_a_slow_spell() -> None:

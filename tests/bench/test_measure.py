@@ -19,14 +19,12 @@ from translucent.bench import scaling
 from translucent.bench.cases import CASES, Case
 from translucent.bench.contenders import CONTENDERS, Effect, check_names, contenders
 from translucent.bench.drawing import Floor, Studio
-from translucent.bench.files import read_report, write_report
 from translucent.bench.measure import CaseRun
-from translucent.bench.record import HardCase, Report
+from translucent.bench.output import read_report, table, write_report
+from translucent.bench.record import HardCase, Report, ShadowCase
 from translucent.bench.run import Effort, measure_all
 from translucent.bench.scaling import ScalingRun
-from translucent.bench.shadows.record import ShadowCase
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
-from translucent.bench.table import table
 from translucent.bench.truth import Truth
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes.depth_only import DepthOnlyPass

@@ -22,15 +22,28 @@ import pytest
 from PIL import Image
 
 from tests.bench.provenance import PROVENANCE
+from translucent.bench import figures as numbers
 from translucent.bench.codec import Packed
-from translucent.bench.frontier import mark_frontier
-from translucent.bench.page import numbers
-from translucent.bench.page.build import build_page, write_page
-from translucent.bench.page.overview import overview_svg
-from translucent.bench.picture import Picture
-from translucent.bench.record import CaseRecord, Claim, HardCase, Report, ScalePoint, Series, Slab
-from translucent.bench.row import Errors, LightErrors, Ratio, Row, Timing
-from translucent.errors import InputError, RenderError
+from translucent.bench.judgement import mark_frontier
+from translucent.bench.output import checked_folder
+from translucent.bench.page import build_page
+from translucent.bench.plots import overview_svg
+from translucent.bench.record import (
+    CaseRecord,
+    Claim,
+    ErrorStatistics,
+    HardCase,
+    LightErrors,
+    MethodRow,
+    Ratio,
+    Report,
+    ReportPicture,
+    ScalePoint,
+    Series,
+    Slab,
+    TimeStatistics,
+)
+from translucent.errors import RenderError
 
 FAMILIES = ("SignedDepth", "BackFaceDepth", "constant thickness", "KBuffer", "FragmentLists", "something new")
 
@@ -40,14 +53,14 @@ def unlike() -> Iterator[float]:
     return itertools.cycle((1.0 + k / 10) * 10.0**e for e in (-7, -6, -5, -4, -3, -2) for k in range(90))
 
 
-def measured(method: str, family: str, ratio: float, rms: float, values: Iterator[float], **more: Any) -> Row:
-    def timing() -> Timing:
-        return Timing(1e3 * next(values), 1e3 * next(values), 1e3 * next(values), 11)
+def measured(method: str, family: str, ratio: float, rms: float, values: Iterator[float], **more: Any) -> MethodRow:
+    def timing() -> TimeStatistics:
+        return TimeStatistics(1e3 * next(values), 1e3 * next(values), 1e3 * next(values), 11)
 
-    def errors(rms: float) -> Errors:
-        return Errors(rms, next(values), next(values), next(values), next(values), -next(values))
+    def errors(rms: float) -> ErrorStatistics:
+        return ErrorStatistics(rms, next(values), next(values), next(values), next(values), -next(values))
 
-    row = Row(
+    row = MethodRow(
         method=method,
         family=family,
         parameters=f"{family}()",
@@ -81,20 +94,20 @@ def png() -> str:
 def case(name: str = "knot", title: str = "A knot", **more: Any) -> CaseRecord:
     values = unlike()
     rows = [
-        Row("depth only", "depth only", "", "floor", "", True, wall=Timing(9.87, 10.1, 0.21, 11)),
+        MethodRow("depth only", "depth only", "", "floor", "", True, wall=TimeStatistics(9.87, 10.1, 0.21, 11)),
         *(
             measured(f"{family}, 4 of them", family, 1.1 + i, 10.0 ** (i - 8), values)
             for i, family in enumerate(FAMILIES)
         ),
         measured("marking", "KBuffer", 1.02, 1e-7, values, invalid=0.25),
         measured("on the processor", "cpu backend", 400.0, 0.0, values, kind="cpu"),
-        Row("refusing", "ThinLayer", "", "method", "", False, refusal="no sheets here"),
-        Row("breaking", "RayMarched", "", "method", "", False, failure="a shader that does not compile"),
+        MethodRow("refusing", "ThinLayer", "", "method", "", False, refusal="no sheets here"),
+        MethodRow("breaking", "RayMarched", "", "method", "", False, failure="a shader that does not compile"),
     ]
     error = np.linspace(-1e-3, 1e-3, 48).reshape(6, 8)
     pictures = (
-        Picture("reference", png()),
-        Picture("marking", png(), Packed.of(error), Packed.of(error > 5e-4)),
+        ReportPicture("reference", png()),
+        ReportPicture("marking", png(), Packed.of(error), Packed.of(error > 5e-4)),
     )
     record = CaseRecord(
         name=name,
@@ -118,7 +131,9 @@ def case(name: str = "knot", title: str = "A knot", **more: Any) -> CaseRecord:
 
 
 def report(**more: Any) -> Report:
-    points = tuple(ScalePoint(x, Timing(x / 100, x / 90, 0.1, 5), Ratio(1.25, 0.1, 0.01)) for x in (1000, 10000))
+    points = tuple(
+        ScalePoint(x, TimeStatistics(x / 100, x / 90, 0.1, 5), Ratio(1.25, 0.1, 0.01)) for x in (1000, 10000)
+    )
     lost = ScalePoint(100000, failure="out of memory")
     made = Report(
         provenance=PROVENANCE,
@@ -155,6 +170,12 @@ class Elements(HTMLParser):
 @pytest.fixture(scope="module")
 def page() -> str:
     return build_page(report())
+
+
+def figure(of: Report) -> str:
+    svg = overview_svg(of)
+    assert svg is not None
+    return svg
 
 
 def cells(page: str) -> Counter[str]:
@@ -259,7 +280,7 @@ def test_slabs_and_scattered_light_have_tables() -> None:
 
 def test_errors_of_many_samples_stand_beside_those_of_one() -> None:
     known = case()
-    sampled = dataclasses.replace(known.rows[1], sampled=Errors(0.0123, 0.0045, 0.067, 0.0912, 0.34, -0.056))
+    sampled = dataclasses.replace(known.rows[1], sampled=ErrorStatistics(0.0123, 0.0045, 0.067, 0.0912, 0.34, -0.056))
     record = dataclasses.replace(
         known, rows=(known.rows[0], sampled, *known.rows[2:]), truth_rays=8, truth_spread=0.0712
     )
@@ -299,7 +320,7 @@ def test_banners() -> None:
 
 def test_the_same_record_gives_the_same_bytes(page: str) -> None:
     assert build_page(Report.from_json(report().to_json())) == page
-    assert overview_svg(report()) == overview_svg(report())
+    assert figure(report()) == figure(report())
 
 
 EVIL = """<script>alert('1')</script>"><img src=x onerror="alert(1)"> {{ 7 * 7 }} & ]]> $x^2$"""
@@ -329,12 +350,12 @@ def test_text_stays_text() -> None:
     assert not [tag for tag, attributes in elements.found if tag == "script" or "onerror" in attributes]
     assert sum("<script>alert('1')</script>" in part for part in elements.text) > 50
     assert " 49 " not in page
-    for svg in (overview_svg(evil), *re.findall(r"<svg .*?</svg>", page, re.DOTALL)):
+    for svg in (figure(evil), *re.findall(r"<svg .*?</svg>", page, re.DOTALL)):
         assert not ElementTree.fromstring(svg).findall(".//{*}script")
 
 
 def test_a_picture_is_nothing_but_a_picture() -> None:
-    evil = case(pictures=(Picture("reference", '"><script>'),))
+    evil = case(pictures=(ReportPicture("reference", '"><script>'),))
     assert not [tag for tag, _ in Elements(build_page(report(cases=(evil,)))).found if tag == "script"]
 
 
@@ -373,21 +394,20 @@ def test_drawings_say_what_they_show_and_follow_the_theme(page: str) -> None:
 
 
 def test_the_figure_names_its_methods_and_is_a_file_of_its_own() -> None:
-    svg = overview_svg(report(cases=(case(convex=True, title="A sphere"), case())))
+    svg = figure(report(cases=(case(convex=True, title="A sphere"), case())))
     root = ElementTree.fromstring(svg)
     text = "".join(root.itertext())
     assert "A knot, 640 × 480, software rasterizer" in text
     assert "SignedDepth, 4 of them" in text
     assert "on the processor" not in text
     assert "prefers-color-scheme: dark" in text
-    with pytest.raises(InputError, match="no scene in it has numbers; measure at least one"):
-        overview_svg(report(cases=()))
+    assert overview_svg(report(cases=())) is None
 
 
 def test_names_are_no_formulas_and_long_ones_are_cut() -> None:
     values = unlike()
     rows = (measured("$k^2$ layers", "KBuffer", 2.0, 1e-3, values), measured("x" * 200, "KBuffer", 3.0, 1e-4, values))
-    text = "".join(ElementTree.fromstring(overview_svg(report(cases=(case(rows=rows),)))).itertext())
+    text = "".join(ElementTree.fromstring(figure(report(cases=(case(rows=rows),)))).itertext())
     assert "$k^2$ layers" in text
     assert "x" * 39 + "…" in text
 
@@ -395,7 +415,7 @@ def test_names_are_no_formulas_and_long_ones_are_cut() -> None:
 def test_no_opengl_is_needed() -> None:
     code = (
         "import sys; from pathlib import Path; from translucent.bench.record import Report; "
-        "from translucent.bench.page.build import build_page; "
+        "from translucent.bench.page import build_page; "
         "build_page(Report.from_json(sys.stdin.read())); "
         "assert not {'moderngl', 'OpenGL', 'glcontext', 'embreex'} & sys.modules.keys()"
     )
@@ -407,6 +427,7 @@ def test_a_missing_package_is_named_with_its_extra(
     package: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(RenderError, match=rf"the package {package} is not installed; pip install .*\[report\]"):
-        write_page(report(), tmp_path / "report.html")
+    missing = rf"the package {package} is not installed; pip install .*\[report\]"
+    with pytest.raises(RenderError, match=missing), checked_folder(tmp_path / "out"):
+        raise AssertionError("it is needed")
     assert not list(tmp_path.iterdir())

@@ -13,24 +13,20 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
+from translucent.bench import figures as numbers
 from translucent.bench.codec import Packed
-from translucent.bench.page import numbers
-from translucent.bench.page.advice import advise, summarize
-from translucent.bench.page.labels import place_labels, spread
-from translucent.bench.page.pictures import STEPS, heat_map, scale_colors
-from translucent.bench.page.scaling import short_count
-from translucent.bench.page.theme import COLORS, FAMILIES, style_of
-from translucent.bench.picture import Picture
-from translucent.bench.record import CaseRecord
-from translucent.bench.row import Errors, Kind, Ratio, Row
+from translucent.bench.figures import COLORS, FAMILIES, place_labels, short_count, spread, style_of
+from translucent.bench.judgement import advise, summarize
+from translucent.bench.page import STEPS, heat_map, scale_colors
+from translucent.bench.record import CaseRecord, ErrorStatistics, MethodRow, Ratio, ReportPicture, RowKind
 
 
-def row(method: str, ratio: float, rms: float, kind: Kind = "method", invalid: float = 0.0) -> Row:
-    errors = Errors(rms, rms, rms, rms, rms, 0.0)
-    return Row(method, method, "", kind, "", True, ratio=Ratio(ratio, 0, 0), thickness=errors, invalid=invalid)
+def row(method: str, ratio: float, rms: float, kind: RowKind = "method", invalid: float = 0.0) -> MethodRow:
+    errors = ErrorStatistics(rms, rms, rms, rms, rms, 0.0)
+    return MethodRow(method, method, "", kind, "", True, ratio=Ratio(ratio, 0, 0), thickness=errors, invalid=invalid)
 
 
-def scene(*rows: Row) -> CaseRecord:
+def scene(*rows: MethodRow) -> CaseRecord:
     return CaseRecord("a", "A", "", "thickness", rows=rows)
 
 
@@ -50,7 +46,7 @@ def test_the_cheapest_that_is_good_enough_is_advised() -> None:
 
 def test_few_pixels_that_are_plainly_wrong_are_not_good_enough() -> None:
     """Limits of thickness: an RMS of 1e-4 of the diagonal, and ten times that in all but one pixel of a thousand."""
-    errors = Errors(2e-5, 1e-8, 1e-7, 2e-3, 0.1, 0.0)
+    errors = ErrorStatistics(2e-5, 1e-8, 1e-7, 2e-3, 0.1, 0.0)
     flawed = dataclasses.replace(row("flawed", 1.0, 0.0), thickness=errors)
     advice = advise(scene(flawed, SIGNED))
     assert advice is not None
@@ -103,9 +99,9 @@ def test_a_method_that_is_hardly_cheaper_is_no_alternative() -> None:
 def test_scenes_with_one_answer_share_a_line() -> None:
     one, two, three = scene(SIGNED), scene(row("SignedDepth", 1.2, 1e-8)), scene(LISTS)
     found = summarize([(case, advise(case)) for case in (three, one, two, scene())])
-    assert [(s.row.method, s.titles, s.ratios) for s in found] == [
-        ("SignedDepth", ("A", "A"), (1.1, 1.2)),
-        ("FragmentLists", ("A",), (5.0, 5.0)),
+    assert [(row.method, *rest) for row, *rest in found] == [
+        ("SignedDepth", ["A", "A"], 1.1, 1.2),
+        ("FragmentLists", ["A"], 5.0, 5.0),
     ]
 
 
@@ -143,7 +139,7 @@ def test_places_on_a_line_keep_order_gap_and_bounds() -> None:
 
 def pixels(error: npt.NDArray[Any], invalid: npt.NDArray[Any] | None = None) -> npt.NDArray[Any]:
     """(h, w, 4) of the picture of an error."""
-    address = heat_map(Picture("a", "", Packed.of(error), None if invalid is None else Packed.of(invalid)))
+    address = heat_map(ReportPicture("a", "", Packed.of(error), None if invalid is None else Packed.of(invalid)))
     assert address is not None
     kind, data = address.split(",")
     assert kind == "data:image/png;base64"
@@ -179,7 +175,7 @@ def test_uncovered_pixels_are_transparent_and_invalid_ones_striped() -> None:
     assert (shown[:, :3, 3] == 255).all()
     assert len(np.unique(shown[:, :3].reshape(-1, 4), axis=0)) == 2
     assert len(np.unique(shown[:, 6:].reshape(-1, 4), axis=0)) == 1
-    assert heat_map(Picture("reference", "")) is None
+    assert heat_map(ReportPicture("reference", "")) is None
 
 
 def test_numbers_as_text() -> None:

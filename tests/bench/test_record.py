@@ -13,26 +13,38 @@ import pytest
 
 from tests.bench.provenance import PROVENANCE
 from translucent.bench.codec import Packed
-from translucent.bench.files import read_report, write_csv, write_report
-from translucent.bench.picture import Picture
-from translucent.bench.record import CaseRecord, Claim, HardCase, Report, ScalePoint, Series, Slab
-from translucent.bench.row import Errors, LightErrors, Ratio, Row, Timing
+from translucent.bench.output import read_report, write_csv, write_report
+from translucent.bench.record import (
+    CaseRecord,
+    Claim,
+    ErrorStatistics,
+    HardCase,
+    LightErrors,
+    MethodRow,
+    Ratio,
+    Report,
+    ReportPicture,
+    ScalePoint,
+    Series,
+    Slab,
+    TimeStatistics,
+)
 from translucent.errors import InputError
 
 
 def full_report() -> Report:
     """Every kind of value that a report has."""
-    errors = Errors(1e-3, 2e-4, 3e-3, 4e-3, 5e-3, -1e-4)
-    row = Row(
+    errors = ErrorStatistics(1e-3, 2e-4, 3e-3, 4e-3, 5e-3, -1e-4)
+    row = MethodRow(
         "SignedDepth",
         "SignedDepth",
         "SignedDepth()",
         "method",
         "exact",
         True,
-        wall=Timing(1.0, 1.5, 0.1, 9),
-        gpu=Timing(0.9, 1.4, 0.1, 9),
-        frame=Timing(1.6, 2.0, 0.2, 9),
+        wall=TimeStatistics(1.0, 1.5, 0.1, 9),
+        gpu=TimeStatistics(0.9, 1.4, 0.1, 9),
+        frame=TimeStatistics(1.6, 2.0, 0.2, 9),
         ratio=Ratio(1.1, 0.1, 0.02),
         passes=1,
         bytes_per_pixel=61,
@@ -43,12 +55,16 @@ def full_report() -> Report:
         coverage_mismatch=0.0,
         pareto=True,
     )
-    refused = Row("BackFaceDepth", "BackFaceDepth", "", "method", "", False, refusal="two media")
+    refused = MethodRow("BackFaceDepth", "BackFaceDepth", "", "method", "", False, refusal="two media")
     error = Packed.of(np.array([[0.0, 1e-9], [np.nan, -3e-3]]))
-    picture = Picture("SignedDepth", "aGk=", error, Packed.of(np.array([[True, False], [False, False]])))
+    picture = ReportPicture("SignedDepth", "aGk=", error, Packed.of(np.array([[True, False], [False, False]])))
     case = CaseRecord("knot", "Knot", "concave", "thickness", size=(64, 48), rows=(row, refused), pictures=(picture,))
     series = Series(
-        "triangles", "SignedDepth", "SignedDepth", "512 x 512", (ScalePoint(1000, Timing(1, 2, 0.5, 3)), ScalePoint(2))
+        "triangles",
+        "SignedDepth",
+        "SignedDepth",
+        "512 x 512",
+        (ScalePoint(1000, TimeStatistics(1, 2, 0.5, 3)), ScalePoint(2)),
     )
     hard = HardCase("H07", "far away", "exact", "1e-7", True, 1e-7, 6e-6, "of the diagonal")
     unversioned = dataclasses.replace(PROVENANCE, commit=None, dirty=None)

@@ -14,8 +14,7 @@ from tests.bench.provenance import PROVENANCE
 from tests.command_line import Run
 from translucent.assets import mesh_path
 from translucent.bench.models import effect_of, model_cases
-from translucent.bench.record import CaseRecord, Report
-from translucent.bench.row import Errors, Ratio, Row, Timing
+from translucent.bench.record import CaseRecord, ErrorStatistics, MethodRow, Ratio, Report, TimeStatistics
 from translucent.media.medium import Medium
 from translucent.mesh_files import load_mesh
 from translucent.scene.lights import DirectionalLight
@@ -28,8 +27,10 @@ def run(run: Run) -> Run:
 
 
 def record(ratio: float = 1.1, rms: float = 3e-8, **more: Any) -> Report:
-    timing, errors = Timing(10.0 * ratio, 11.0, 0.1, 9), Errors(rms, rms, rms, rms, rms, 0.0)
-    row = Row("SignedDepth", "SignedDepth", "SignedDepth()", "method", "exact", True, timing, ratio=Ratio(ratio, 0, 0))
+    timing, errors = TimeStatistics(10.0 * ratio, 11.0, 0.1, 9), ErrorStatistics(rms, rms, rms, rms, rms, 0.0)
+    row = MethodRow(
+        "SignedDepth", "SignedDepth", "SignedDepth()", "method", "exact", True, timing, ratio=Ratio(ratio, 0, 0)
+    )
     case = CaseRecord("knot", "Knot", "concave", "thickness", rows=(dataclasses.replace(row, thickness=errors),))
     made = Report(PROVENANCE, cases=(case,), seconds=3.0, complete=True)
     return dataclasses.replace(made, **more)

@@ -10,9 +10,10 @@ import pytest
 
 import translucent as tl
 from tests.bench.measuring import measured, named
-from translucent.bench.claims import check_claims
+from tests.bench.provenance import PROVENANCE
+from translucent.bench.claims import SLAB_CLAIMS
 from translucent.bench.drawing import Studio
-from translucent.bench.record import Slab
+from translucent.bench.record import Report, Slab
 from translucent.bench.scattering import slabs as slab_bench
 from translucent.bench.scattering.engines import Frostbite, NormalizedDiffusion, PaintLayer
 from translucent.bench.scattering.scenes import SCENES, ScatteringScene
@@ -198,7 +199,7 @@ def slab(depth: float, transmittance: float, **more: float) -> Slab:
 
 def test_claims_on_slabs_fall_where_one_is_off() -> None:
     def held(*slabs: Slab) -> list[bool | None]:
-        return [claim.held for claim in check_claims((), (), slabs)[9:11]]
+        return [judge(Report(PROVENANCE, slabs=slabs)).held for judge in SLAB_CLAIMS]
 
     assert held(slab(8.0, 0.32)) == [True, True]
     assert held(slab(8.0, 0.32), slab(8.0, 0.34)) == [False, True]

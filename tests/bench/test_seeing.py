@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from translucent.bench.row import ColorDifference, Row
-from translucent.bench.seeing import JUST_NOTICEABLE, color_difference, lab, seen_words
+from translucent.bench.judgement import JUST_NOTICEABLE, color_difference, lab, seen_words
+from translucent.bench.record import ColorDifference, MethodRow
 from translucent.media.colors import parse_color
 
 
@@ -55,6 +55,6 @@ def test_a_step_of_8_bits_is_not_seen_and_eight_are() -> None:
     ],
 )
 def test_the_words(found: tuple[float, float, float], words: str) -> None:
-    row = Row("a", "a", "", "method", "", True, color_difference=ColorDifference(*found))
+    row = MethodRow("a", "a", "", "method", "", True, color_difference=ColorDifference(*found))
     assert seen_words(row).startswith(words)
     assert seen_words(dataclasses.replace(row, color_difference=None)) == ""

@@ -10,31 +10,33 @@ import pytest
 
 import translucent as tl
 from tests.bench.provenance import PROVENANCE
-from translucent.bench.comparison import compare_reports
+from translucent.bench.claims import SHADOW_CLAIMS
 from translucent.bench.drawing import Studio
-from translucent.bench.page.build import build_page
-from translucent.bench.record import Report
-from translucent.bench.row import Errors, Ratio, Timing
-from translucent.bench.shadows import caustic_media, caustics, sky
-from translucent.bench.shadows import measure as measuring
-from translucent.bench.shadows.claims import shadow_claims
-from translucent.bench.shadows.maps import map_camera
-from translucent.bench.shadows.measure import ShadowEffort, measure_shadow
-from translucent.bench.shadows.part import ShadowsRun
-from translucent.bench.shadows.record import (
+from translucent.bench.judgement import compare_reports
+from translucent.bench.output import table
+from translucent.bench.page import build_page
+from translucent.bench.record import (
     CONSTANT,
     HALF,
     OPAQUE,
     CausticCase,
     CausticMediumCase,
     CausticRow,
+    ErrorStatistics,
+    Ratio,
+    Report,
     ShadowCase,
     ShadowRow,
     Shadows,
     SkyRow,
+    TimeStatistics,
 )
+from translucent.bench.shadows import caustic_media, caustics, sky
+from translucent.bench.shadows import measure as measuring
+from translucent.bench.shadows.maps import map_camera
+from translucent.bench.shadows.measure import ShadowEffort, measure_shadow
+from translucent.bench.shadows.part import ShadowsRun
 from translucent.bench.shadows.scenes import SCENES, WINE, ShadowScene, over_ground
-from translucent.bench.table import table
 from translucent.geometry.solids import Box, Sphere
 
 HASTE = ShadowEffort((128, 256), 64, 56, 0.0)
@@ -148,12 +150,12 @@ def test_steps_of_a_quick_run_are_few(studio: Studio) -> None:
     assert set(quick) < set(full)
 
 
-def errors(median: float, p999: float) -> Errors:
-    return Errors(p999, median, p999, p999, p999, 0.0)
+def errors(median: float, p999: float) -> ErrorStatistics:
+    return ErrorStatistics(p999, median, p999, p999, p999, 0.0)
 
 
 def case(texels: float = 1e-6, order: float = 1.4, cost: float = 1.2, half: float = 1e-3, **more: Any) -> ShadowCase:
-    timing = Timing(9.0, 9.5, 0.1, 5)
+    timing = TimeStatistics(9.0, 9.5, 0.1, 5)
     rows = (
         ShadowRow("map of 1024", "method", 1024, "", errors(3e-6, 1e-3), 2e-4, timing, Ratio(cost, 0.01, 0.01)),
         ShadowRow(OPAQUE, "counter-example", 1024, "", errors(0.7, 0.9), 0.5),
@@ -177,7 +179,7 @@ GOOD = Shadows(
 
 
 def held(**changes: Any) -> list[bool | None]:
-    return [claim.held for claim in shadow_claims(dataclasses.replace(GOOD, **changes))]
+    return [judge(Report(PROVENANCE, shadows=dataclasses.replace(GOOD, **changes))).held for judge in SHADOW_CLAIMS]
 
 
 def test_claims_fall_where_a_number_does() -> None:
@@ -202,7 +204,7 @@ def test_claims_fall_where_a_number_does() -> None:
     for error, most, found in ((0.25, 0.3, False), (0.1, 0.3, None)):
         row = CausticRow(400_000, 0.0, error, most, 1.0)
         assert held(media=(dataclasses.replace(GOOD.media[0], rows=(row,)),))[-1] is found
-    assert {claim.held for claim in shadow_claims(Shadows())} == {None}
+    assert {judge(Report(PROVENANCE)).held for judge in SHADOW_CLAIMS} == {None}
 
 
 def test_the_page_the_table_and_the_record_have_them() -> None:

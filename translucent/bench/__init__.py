@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from translucent.bench.comparison import Change, compare_reports
-from translucent.bench.files import read_report, write_csv, write_report
+from translucent.bench.judgement import Change, compare_reports
+from translucent.bench.output import read_report, write_csv, write_report
 from translucent.bench.record import Report
 
 if TYPE_CHECKING:

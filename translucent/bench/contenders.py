@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from translucent.bench.row import Kind
+from translucent.bench.record import RowKind
 from translucent.bench.scattering.engines import Engine, Frostbite, NormalizedDiffusion, PaintLayer
 from translucent.errors import InputError
 from translucent.planning.interfaces import FrontInterface, Interfaces, ScreenInterfaces, TracedInterfaces
@@ -87,7 +87,7 @@ class Contender:
     family: str
     method: Method
     technique: Technique = "plan"
-    kind: Kind = "method"
+    kind: RowKind = "method"
     effects: tuple[Effect, ...] = _ALL
     brief: bool = True
     quick: bool = True

@@ -12,10 +12,9 @@ from translucent.bench.cases import Case
 from translucent.bench.contenders import Contender
 from translucent.bench.drawing import Drawing, Floor, Size, Studio
 from translucent.bench.fitting import fitted
-from translucent.bench.frontier import mark_frontier
+from translucent.bench.judgement import mark_frontier
 from translucent.bench.promise import promise_of
-from translucent.bench.record import CaseRecord
-from translucent.bench.row import Errors, Quantity, Row
+from translucent.bench.record import CaseRecord, ErrorStatistics, MethodRow, Quantity
 from translucent.bench.staging import drawing, plan_of, seen_by
 from translucent.bench.timing import STEADY, Pace, Samples, interleaved, ratio, timing
 from translucent.bench.truth import Truth
@@ -47,7 +46,7 @@ class _Entry:
     """Contender under measurement."""
 
     contender: Contender
-    row: Row
+    row: MethodRow
     scene: Scene
     assumed: float = 0.0
     drawn: Drawing | None = None
@@ -119,7 +118,7 @@ class CaseRun:
     def _compared(self, contender: Contender, scene: Scene, truth: Truth, size: Size, case: CaseRecord) -> _Entry:
         """Draw the contender once, small, and compare it with the reference."""
         seen = seen_by(contender, scene)
-        row = Row(contender.name, contender.family, _parameters(contender), contender.kind, "", False)
+        row = MethodRow(contender.name, contender.family, _parameters(contender), contender.kind, "", False)
         entry = _Entry(contender, row, seen)
         if (refusal := contender.refusal(scene)) is not None:
             entry.row = dataclasses.replace(row, refusal=refusal)
@@ -149,7 +148,7 @@ class CaseRun:
             targets.release()
         return entry
 
-    def _sampled(self, contender: Contender, scene: Scene, truth: Truth, size: Size) -> Errors | None:
+    def _sampled(self, contender: Contender, scene: Scene, truth: Truth, size: Size) -> ErrorStatistics | None:
         """Errors in radiance with `SAMPLES` samples of each pixel."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TranslucentWarning)
@@ -162,7 +161,7 @@ class CaseRun:
         found = truth.errors(frame, "radiance")
         return None if found is None else found[0]
 
-    def _timed(self, scene: Scene) -> list[Row]:
+    def _timed(self, scene: Scene) -> list[MethodRow]:
         """The rows with their times, the floor first."""
         studio = self.studio
         targets = Targets(studio.gl, self.size)
@@ -276,7 +275,9 @@ def _parameters(contender: Contender, plan: RenderPlan | None = None, assumed: f
     return found if interfaces is None else f"{found}, {interfaces}"
 
 
-def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRecord, plan: RenderPlan) -> Row:
+def _against(
+    row: MethodRow, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRecord, plan: RenderPlan
+) -> MethodRow:
     """The row with what the planner promises and what the frame shows."""
     assert entry.frame is not None
     contender, frame = entry.contender, entry.frame
@@ -307,7 +308,7 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
     )
 
 
-def _peeled(entry: _Entry) -> Row:
+def _peeled(entry: _Entry) -> MethodRow:
     """The row with the layers and passes of the timed frame: few pixels may need most of them."""
     assert entry.drawn is not None
     entry.drawn.draw()
@@ -318,7 +319,7 @@ def _peeled(entry: _Entry) -> Row:
     return dataclasses.replace(entry.row, layers=layers, passes=-(-layers // 2) + bool(frame.truncated.any()))
 
 
-def _with_times(row: Row, samples: Samples | None, failures: dict[str, Exception], *, peeled: bool) -> Row:
+def _with_times(row: MethodRow, samples: Samples | None, failures: dict[str, Exception], *, peeled: bool) -> MethodRow:
     if samples is None:
         if (error := failures.get(row.method)) is None:
             return row
@@ -338,10 +339,10 @@ def _with_times(row: Row, samples: Samples | None, failures: dict[str, Exception
     )
 
 
-def _floor_row(found: Sequence[Samples]) -> Row:
+def _floor_row(found: Sequence[Samples]) -> MethodRow:
     """The floor; its time is over all draws of it beside the others."""
     floor = [seconds for samples in found for seconds in samples.floor_wall]
-    row = Row(
+    row = MethodRow(
         "depth only", "depth only", "", "floor", "the cost of drawing the geometry: no thickness", False, passes=1
     )
     if not floor:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from translucent.bench.contenders import Contender
-from translucent.bench.row import Quantity
+from translucent.bench.record import Quantity
 from translucent.planning.notes import NoteKind
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan

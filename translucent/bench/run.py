@@ -6,10 +6,10 @@ import dataclasses
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from typing import Any, get_args
+from typing import get_args
 
 from translucent.bench.cases import CASES, Case, Size
-from translucent.bench.claims import check_claims
+from translucent.bench.claims import METHOD_CLAIMS, SCATTERING_CLAIMS, SHADOW_CLAIMS, SLAB_CLAIMS, hard_claim
 from translucent.bench.contenders import check_names, contenders
 from translucent.bench.drawing import Studio
 from translucent.bench.hard.measure import CASES as HARD_CASES
@@ -20,7 +20,6 @@ from translucent.bench.record import Part, Renewal, Report
 from translucent.bench.scaling import ScalingRun
 from translucent.bench.scattering.slabs import measure_slabs
 from translucent.bench.shadows.part import ShadowsRun
-from translucent.bench.shadows.record import Shadows
 from translucent.bench.timing import STEADY, Pace
 from translucent.errors import RenderError
 from translucent.renderer import Renderer
@@ -53,6 +52,12 @@ class Effort:
 
 FULL = Effort(12.0, 2.5, 1.0, Pace(patience=3.0))
 QUICK = Effort(0.6, 0.15, 0.4, Pace(long=0.1))
+
+#: Everything that a report claims, judged by its numbers.
+CLAIMS = (
+    *(*METHOD_CLAIMS, *SCATTERING_CLAIMS, *SLAB_CLAIMS, *SHADOW_CLAIMS),
+    hard_claim([case.id for case in HARD_CASES]),
+)
 
 #: Callback with what is being measured, the number of steps done, and their total.
 Progress = Callable[[str, int, int], None]
@@ -124,14 +129,14 @@ def measure_all(
         stack.callback(studio.release)
         made = provenance(renderer, command, quick=quick)
         parts = tuple(part for part in get_args(Part) if part in only or not only)
-        report = Report(made) if base is None else dataclasses.replace(_without(base, parts), complete=False)
+        report = Report(made) if base is None else dataclasses.replace(base.without(parts), complete=False)
         begin = time.perf_counter()
 
         def stamped(report: Report, *, complete: bool) -> Report:
             seconds = time.perf_counter() - begin
             if base is None:
                 return dataclasses.replace(report, seconds=seconds, complete=complete)
-            renewals = (*_without(base, parts).renewals, Renewal(parts, made, seconds))
+            renewals = (*base.without(parts).renewals, Renewal(parts, made, seconds))
             return dataclasses.replace(report, renewals=renewals, complete=complete and base.complete)
 
         try:
@@ -144,25 +149,6 @@ def measure_all(
         report = stamped(report, complete=True)
     keep(report)
     return report
-
-
-def _without(report: Report, parts: Sequence[Part]) -> Report:
-    """The report without these parts, and without stamps that nothing is left of."""
-    empty: dict[Part, dict[str, Any]] = {
-        "scenes": {"cases": ()},
-        "scaling": {"scaling": ()},
-        "slabs": {"slabs": ()},
-        "shadows": {"shadows": Shadows()},
-        "hard-cases": {"hard_cases": ()},
-    }
-    blank = report
-    for part in parts:
-        blank = dataclasses.replace(blank, **empty[part])
-    kept = [
-        dataclasses.replace(one, parts=tuple(part for part in one.parts if part not in parts))
-        for one in report.renewals
-    ]
-    return dataclasses.replace(blank, renewals=tuple(one for one in kept if one.parts))
 
 
 def _measured(
@@ -196,7 +182,7 @@ def _measured(
         told(f"case {case.name}")
         chosen = contenders(case.effect, quick=quick, brief=case.brief, only=methods)
         run = CaseRun(studio, cpu, case, size, effort.case_seconds, effort.compared, effort.pace)
-        report = _judged(dataclasses.replace(report, cases=(*report.cases, run.measure(chosen))))
+        report = judged(dataclasses.replace(report, cases=(*report.cases, run.measure(chosen))))
         studio.renderer.gpu.context.drain()
         yield report
     if "scaling" in wanted:
@@ -212,20 +198,19 @@ def _measured(
     if "shadows" in wanted:
         for what, measure in shadows.steps().items():
             told(what)
-            report = _judged(dataclasses.replace(report, shadows=measure(report.shadows)))
+            report = judged(dataclasses.replace(report, shadows=measure(report.shadows)))
             studio.renderer.gpu.context.drain()
             yield report
     if "hard-cases" in wanted:
         for found in measure_hard_cases(studio.renderer):
             told(f"hard case {found.id}")
             report = dataclasses.replace(report, hard_cases=(*report.hard_cases, found))
-    yield _judged(report)
+    yield judged(report)
 
 
-def _judged(report: Report) -> Report:
+def judged(report: Report) -> Report:
     """The report with what its numbers say of the claims."""
-    claims = check_claims(report.cases, report.hard_cases, report.slabs, report.shadows)
-    return dataclasses.replace(report, claims=claims)
+    return dataclasses.replace(report, claims=tuple(judge(report) for judge in CLAIMS))
 
 
 def _cpu_renderer(stack: ExitStack) -> Renderer | None:

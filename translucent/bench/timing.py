@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from translucent.bench.row import Ratio, Timing
+from translucent.bench.record import Ratio, TimeStatistics
 
 #: Rounds that even the slowest takes part in, and that the fastest needs no more than.
 FEWEST, MOST = 3, 60
@@ -227,12 +227,12 @@ def _unsure(samples: Samples) -> bool:
     return found is not None and found.noise > UNSURE * found.median
 
 
-def timing(seconds: list[float]) -> Timing | None:
+def timing(seconds: list[float]) -> TimeStatistics | None:
     """Statistics in milliseconds; None without samples."""
     if not seconds:
         return None
     low, median, high, p95 = np.quantile(np.array(seconds) * 1e3, (0.25, 0.5, 0.75, 0.95))
-    return Timing(float(median), float(p95), float(high - low), len(seconds))
+    return TimeStatistics(float(median), float(p95), float(high - low), len(seconds))
 
 
 def ratio(seconds: list[float], floor: list[float]) -> Ratio | None:

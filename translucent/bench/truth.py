@@ -17,10 +17,9 @@ from translucent import reference
 from translucent.arrays import Array
 from translucent.bench.codec import Packed
 from translucent.bench.drawing import Size
-from translucent.bench.picture import Picture
-from translucent.bench.row import ColorDifference, Errors, LightErrors, Quantity
+from translucent.bench.judgement import color_difference
+from translucent.bench.record import ColorDifference, ErrorStatistics, LightErrors, Quantity, ReportPicture
 from translucent.bench.scattering.stored import stored_truth
-from translucent.bench.seeing import color_difference
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
 from translucent.frames.metrics import compare, interior
@@ -159,17 +158,19 @@ class Truth:
             return rms if rms > DARK else 1.0
         return self.diagonal if quantity == "thickness" else 1.0
 
-    def errors(self, frame: Frame, quantity: Quantity) -> tuple[Errors, float, float] | None:
+    def errors(self, frame: Frame, quantity: Quantity) -> tuple[ErrorStatistics, float, float] | None:
         """Errors of a frame; and the shares of the invalid and of the wrongly covered pixels. None: none to compare."""
         try:
             found = compare(frame, self.frame, quantity, mask=self.inside)
         except InputError:
             return None
         scale = self.scale(quantity)
-        values = {field.name: float(getattr(found, field.name)) / scale for field in dataclasses.fields(Errors)}
+        values = {
+            field.name: float(getattr(found, field.name)) / scale for field in dataclasses.fields(ErrorStatistics)
+        }
         if self.halves is not None and quantity == "radiance":
             values["rms"] = self._rms_without_noise(frame, *self.halves) / scale
-        return Errors(**values), found.invalid, found.coverage_mismatch
+        return ErrorStatistics(**values), found.invalid, found.coverage_mismatch
 
     def _rms_without_noise(self, frame: Frame, one: Array, other: Array) -> float:
         """Root mean square error in radiance: noise of the two halves is not correlated, so their product has none."""
@@ -206,13 +207,13 @@ class Truth:
         shown = "transmittance" if quantity == "thickness" else quantity
         return color_difference(getattr(frame, shown)[used], getattr(self.frame, shown)[used])
 
-    def picture(self, method: str, frame: Frame, quantity: Quantity) -> Picture:
+    def picture(self, method: str, frame: Frame, quantity: Quantity) -> ReportPicture:
         """Picture of a frame with its errors; the reference has none."""
         stream = io.BytesIO()
         Image.fromarray(frame.to_srgb8()).save(stream, format="PNG", optimize=True)
         png = base64.b64encode(stream.getvalue()).decode("ascii")
         if frame is self.frame:
-            return Picture(method, png)
+            return ReportPicture(method, png)
         result, right = (np.asarray(getattr(f, quantity), np.float64) for f in (frame, self.frame))
         error = result - right
         if error.ndim == 3:
@@ -222,7 +223,7 @@ class Truth:
         error = np.where(np.abs(error) < INVISIBLE, 0.0, error)
         covered = frame.coverage | self.frame.coverage
         error = np.where(covered & frame.valid & self.frame.valid, error, np.nan)
-        return Picture(method, png, Packed.of(error), Packed.of(covered & ~frame.valid))
+        return ReportPicture(method, png, Packed.of(error), Packed.of(covered & ~frame.valid))
 
 
 def _blocks(picture: Array) -> Array:

@@ -27,9 +27,8 @@ from translucent.commands.model import read_scene, require_translucent
 from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
-    from translucent.bench.comparison import Agreement
-    from translucent.bench.record import CaseRecord, Part, Report
-    from translucent.bench.shadows.record import ShadowCase
+    from translucent.bench.judgement import Agreement
+    from translucent.bench.record import CaseRecord, Part, Report, ShadowCase
     from translucent.media.medium import Medium
 
 #: Prefix of the names of cases from users' models.
@@ -92,10 +91,8 @@ def report(
     whether anybody would see there what a method gets wrong. Opaque parts are staging. Interrupted with Ctrl-C, the
     finished scenes are written. Without -o and --compare, all numbers are printed, and nothing is kept.
     """
-    from translucent.bench.comparison import agreement, compare_reports, machines_differ
-    from translucent.bench.files import read_report
-    from translucent.bench.output import checked_folder, write_outputs
-    from translucent.bench.table import table
+    from translucent.bench.judgement import agreement, compare_reports, machines_differ
+    from translucent.bench.output import checked_folder, read_report, table, write_outputs
 
     parts = _parts(only)
     if (
@@ -154,8 +151,8 @@ def _measured(
     allow_outside: bool,
 ) -> Report:
     """Measure, with a bar that tells how far it is; each finished scene is in ``report.json`` at once."""
-    from translucent.bench.files import write_report
     from translucent.bench.models import model_cases
+    from translucent.bench.output import write_report
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
 
     pixels = read_size(size) if size is not None else QUICK_SIZE if quick else FULL_SIZE
@@ -240,9 +237,7 @@ def _shadow(case: ShadowCase) -> dict[str, Any]:
 
 
 def _answer(case: CaseRecord) -> dict[str, Any]:
-    from translucent.bench.frontier import error_of
-    from translucent.bench.page.advice import advise
-    from translucent.bench.seeing import seen_words
+    from translucent.bench.judgement import advise, error_of, seen_words
 
     advice = advise(case)
     if advice is None or advice.row.ratio is None:

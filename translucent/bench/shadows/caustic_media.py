@@ -18,9 +18,8 @@ from PIL import Image
 from translucent import reference
 from translucent.arrays import Array
 from translucent.bench.measure import one_line
-from translucent.bench.picture import Picture
+from translucent.bench.record import CausticMediumCase, CausticRow, ReportPicture
 from translucent.bench.shadows.pictures import png_of
-from translucent.bench.shadows.record import CausticMediumCase, CausticRow
 from translucent.errors import TranslucentWarning
 from translucent.formulas.color import linear_to_srgb
 from translucent.geometry.solids import Box, Sphere
@@ -142,9 +141,9 @@ def _measured(
         rows.append(CausticRow(photons, float(found.mean()) / mean - 1.0, float(error), float(most), seconds))
     white = float(np.quantile(0.5 * (halves[0] + halves[1]), 0.98))
     pictures = (
-        Picture("reference", _png(0.5 * (halves[0] + halves[1]) / white)),
-        Picture("without photons", _png(shown[0] / white)),
-        Picture(f"{effort.photons:,} photons", _png(shown[1] / white)),
+        ReportPicture("reference", _png(0.5 * (halves[0] + halves[1]) / white)),
+        ReportPicture("without photons", _png(shown[0] / white)),
+        ReportPicture(f"{effort.photons:,} photons", _png(shown[1] / white)),
     )
     return dataclasses.replace(blank, reference_seconds=taken, noise=noise, rows=tuple(rows), pictures=pictures)
 

@@ -13,9 +13,8 @@ from translucent import reference
 from translucent.arrays import Array
 from translucent.assets import mesh_path
 from translucent.bench.measure import one_line
-from translucent.bench.picture import Picture
+from translucent.bench.record import CausticCase, CausticRow, ReportPicture
 from translucent.bench.shadows.pictures import png_of
-from translucent.bench.shadows.record import CausticCase, CausticRow
 from translucent.formulas.color import linear_to_srgb
 from translucent.frames.frame import Frame
 from translucent.geometry.mesh import Mesh
@@ -123,9 +122,9 @@ def _measured(renderer: Renderer, scene: Scene, effort: CausticEffort, blank: Ca
         rows.append(CausticRow(count, off, *_nrmse(shown, low, high), seconds))
     white = float(np.quantile(truth, 0.995))
     pictures = (
-        Picture("the picture", png_of(frame.to_srgb8())),
-        Picture("reference", _png(truth / white)),
-        Picture(f"{effort.photons[-1]:,} photons", _png(shown / white)),
+        ReportPicture("the picture", png_of(frame.to_srgb8())),
+        ReportPicture("reference", _png(truth / white)),
+        ReportPicture(f"{effort.photons[-1]:,} photons", _png(shown / white)),
     )
     noise = 0.5 * abs(one - other) / power
     return dataclasses.replace(blank, reference_seconds=taken, power_noise=noise, rows=tuple(rows), pictures=pictures)

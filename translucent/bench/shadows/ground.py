@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from translucent import reference
 from translucent.arrays import Array, Mask
-from translucent.bench.row import Errors
+from translucent.bench.record import ErrorStatistics
 from translucent.frames.frame import Frame
 from translucent.frames.metrics import interior
 from translucent.media.medium import Medium
@@ -135,13 +135,15 @@ class Ground:
         return np.where(lit, radiance / np.where(lit, self.bare, 1.0), 1.0)
 
 
-def errors_of(differences: Array) -> Errors:
+def errors_of(differences: Array) -> ErrorStatistics:
     """Statistics of differences (n, 3), each by its worst channel."""
     worst = np.abs(differences).max(axis=-1)
     if not worst.size:
         raise ValueError("no point is away from outlines")
     p50, p99, p999 = (float(np.quantile(worst, share)) for share in (0.5, 0.99, 0.999))
-    return Errors(float(np.sqrt((worst**2).mean())), p50, p99, p999, float(worst.max()), float(np.mean(differences)))
+    return ErrorStatistics(
+        float(np.sqrt((worst**2).mean())), p50, p99, p999, float(worst.max()), float(np.mean(differences))
+    )
 
 
 def _crossings(scene: Scene, points: Array) -> list[npt.NDArray[np.int64]]:

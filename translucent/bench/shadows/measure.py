@@ -13,11 +13,10 @@ from translucent.arrays import Array
 from translucent.bench.codec import Packed
 from translucent.bench.drawing import Studio
 from translucent.bench.measure import one_line
-from translucent.bench.picture import Picture
+from translucent.bench.record import CONSTANT, HALF, OPAQUE, ReportPicture, ShadowCase, ShadowRow
 from translucent.bench.shadows.ground import USUAL, Ground, errors_of
 from translucent.bench.shadows.maps import halve, map_times, texel_errors
 from translucent.bench.shadows.pictures import png_of, signed
-from translucent.bench.shadows.record import CONSTANT, HALF, OPAQUE, ShadowCase, ShadowRow
 from translucent.bench.shadows.scenes import ShadowScene
 from translucent.bench.timing import ratio, timing
 from translucent.errors import TranslucentWarning
@@ -113,13 +112,13 @@ def _found(studio: Studio, ground: Ground, row: ShadowRow) -> Array:
     return found
 
 
-def _picture(ground: Ground, method: str, found: Array) -> Picture:
+def _picture(ground: Ground, method: str, found: Array) -> ReportPicture:
     """The scene with this light on its ground, and the error of transmittance there."""
     shown = np.where(ground.seen[..., None], found * ground.bare, ground.frame.radiance) / ground.bright
     picture = png_of(dataclasses.replace(ground.frame, radiance=shown.astype(np.float32)).to_srgb8())
     if method == "reference":
-        return Picture(method, picture)
-    return Picture(method, picture, Packed.of(signed(found - ground.truth, ground.seen)))
+        return ReportPicture(method, picture)
+    return ReportPicture(method, picture, Packed.of(signed(found - ground.truth, ground.seen)))
 
 
 def _order(rows: Sequence[ShadowRow]) -> float | None:

@@ -10,8 +10,8 @@ from typing import TypeVar
 
 from translucent.bench.drawing import Studio
 from translucent.bench.measure import one_line
+from translucent.bench.record import Shadows
 from translucent.bench.shadows import caustic_media, caustics, measure, scenes, sky
-from translucent.bench.shadows.record import Shadows
 from translucent.errors import TranslucentWarning
 
 Scene = TypeVar("Scene", scenes.ShadowScene, caustics.CausticScene)

@@ -10,7 +10,7 @@ import numpy as np
 
 from translucent import reference
 from translucent.arrays import Array
-from translucent.bench.shadows.record import SkyRow
+from translucent.bench.record import SkyRow
 from translucent.bench.shadows.scenes import WINE
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere
