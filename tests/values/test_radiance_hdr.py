@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 import warnings
 from pathlib import Path
 
@@ -84,6 +85,18 @@ def test_repeated_pixels(tmp_path: Path) -> None:
     found = read(tmp_path, HEAD + size(1, 267) + data)
     pixels = np.frombuffer(first * 6 + second * 261, dtype=np.uint8).reshape(1, 267, 4)
     np.testing.assert_array_equal(found, exact(pixels))
+
+
+def test_a_run_that_is_too_long_fills_the_picture_and_no_memory(tmp_path: Path) -> None:
+    pixel = bytes((5, 5, 5, 128))
+    data = HEAD + size(20, 10) + pixel + bytes((1, 1, 1, 0)) * 2 + bytes((1, 1, 1, 2))  # 1 + 2 * 65536 pixels
+    tracemalloc.start()
+    try:
+        found = read(tmp_path, data)
+        assert tracemalloc.get_traced_memory()[1] < 100_000
+    finally:
+        tracemalloc.stop()
+    np.testing.assert_array_equal(found, exact(np.full((20, 10, 4), np.frombuffer(pixel, dtype=np.uint8))))
 
 
 def test_zero_exponents_are_black_and_exposures_are_divided_out(tmp_path: Path) -> None:

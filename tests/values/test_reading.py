@@ -274,6 +274,9 @@ def test_json_and_toml_that_readers_can_use() -> None:
     assert json_value(nested) == json.loads(nested)
     assert (json_value("3"), json_value('"x"')) == (3, "x")
     assert toml_value("a = [[1, 2.5], {b = 'c'}]") == {"a": [[1, 2.5], {"b": "c"}]}
+    dots = "." * 200
+    text = f"""a = "\\"{dots}"  # {dots}\nb = [1.5{", 1.5" * 200}]\nc = '''{dots}\n'{dots}'''"""
+    assert toml_value(text) == {"a": f'"{dots}', "b": [1.5] * 201, "c": f"{dots}\n'{dots}"}
 
 
 @pytest.mark.parametrize(
@@ -283,12 +286,22 @@ def test_json_and_toml_that_readers_can_use() -> None:
         (f"a = {'9' * 400}", "a whole number is too long"),
         (f"a = {'[' * 150}{']' * 150}", "more than 100 levels"),
         (f"a = {'[' * 99999}", "more than 100 levels"),
+        (f"a{'.a' * 4000} = 1", "more than 100 levels"),
+        (f"[a{'.a' * 4000}]", "more than 100 levels"),
+        (f"a = {{a{' . a' * 4000} = 1}}", "more than 100 levels"),
+        ("a = ['''x'''', 3] # '''\n" + "'b'.\"c\"." * 2000 + "d = 1", "more than 100 levels"),
+        ("a = 1\n" * 200_000, "more than 1048576 characters"),
         ("a = ", "Invalid value"),
     ],
 )
 def test_toml_that_no_reader_could_use(text: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        toml_value(text)
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match=message):
+            toml_value(text)
+        assert tracemalloc.get_traced_memory()[1] < 2_000_000  # each beginning of a long key would take 64
+    finally:
+        tracemalloc.stop()
     with pytest.raises(tl.InputError, match=f"mine.toml; no TOML: {message}"):
         read_presets(text, "mine.toml")
 

@@ -30,10 +30,19 @@ MAX_TEXT = 8 << 20
 FREE, RATIO = 1 << 29, 128
 #: Largest depth of nested lists and objects.
 MAX_DEPTH = 100
+#: Characters of the longest TOML text: its parser takes up to 750 bytes for each.
+MAX_TOML = 1 << 20
 #: Largest number of digits of an integer within the range of float64.
 MAX_DIGITS = 300
 
 _SCHEME = re.compile(r"file:|[A-Za-z][A-Za-z0-9+.-]+://")
+
+#: Strings and comments of TOML; what does not end reaches to the end of its line or of the text.
+_TOML_TEXT = re.compile(
+    r'''"""(?:\\.|[^\\])*?(?:"{3,5}|\Z)|"(?:\\.|[^"\\\n])*+"?|'''
+    r"""'''.*?(?:'{3,5}|\Z)|'[^'\n]*+'?|#[^\n]*""",
+    re.DOTALL,
+)
 
 
 def open_file(path: str | Path, asked: str, limit: int = MAX_FILE) -> BinaryIO:
@@ -169,7 +178,13 @@ def json_value(text: str) -> Any:
 
 
 def toml_value(text: str) -> dict[str, Any]:
-    """Parse a TOML text; raises `ValueError` like `json_value`."""
+    """Parse a TOML text; raises `ValueError` like `json_value`, or if it is too long."""
+    if len(text) > MAX_TOML:
+        raise ValueError(f"more than {MAX_TOML} characters")
+    # The parser keeps each beginning of a dotted key, which takes the square of its length.
+    keys = re.split(r"[=,{}\[\]\n]", _TOML_TEXT.sub("", text))
+    if max(key.count(".") for key in keys) >= MAX_DEPTH:
+        raise ValueError(f"more than {MAX_DEPTH} levels")
     try:
         value = tomllib.loads(text)
     except RecursionError:

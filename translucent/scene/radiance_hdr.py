@@ -141,12 +141,14 @@ def _by_pixel(path: str | Path, data: Bytes, count: int) -> Bytes:
         if i == 0 or digit > 3:
             raise _refused(path, "it repeats a pixel that it does not have", "copy the file again")
         times[i] = int(words[i, 3]) << (8 * digit)
-    enough = int(np.searchsorted(np.cumsum(times), count)) + 1
+    ends = np.cumsum(times)
+    enough = int(np.searchsorted(ends, count)) + 1
     if enough > len(words):
         raise _refused(path, f"it ends after {int(times.sum())} of {count} pixels", "copy the file again")
+    times[enough - 1] -= ends[enough - 1] - count  # a damaged run may be of billions
     # A repetition stands for the last pixel that is none.
     last = np.maximum.accumulate(np.where(repeats, 0, np.arange(len(words))))
-    return np.asarray(np.repeat(words[last[:enough]], times[:enough], axis=0)[:count])
+    return np.asarray(np.repeat(words[last[:enough]], times[:enough], axis=0))
 
 
 def _upright(pixels: npt.NDArray[np.float32], header: _Header) -> npt.NDArray[np.float32]:
