@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import tracemalloc
 import warnings
 from pathlib import Path
 
@@ -28,9 +29,10 @@ from tests.values.handmade import (
     joined,
     moebius,
 )
-from translucent.geometry.mesh import Mesh
+from translucent.geometry import winding
+from translucent.geometry.mesh import Mesh, mended
 from translucent.geometry.repair import WELD_TOLERANCE, weld
-from translucent.geometry.solids import Sphere, Torus
+from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.mesh_files import load_mesh
 
 # Welding
@@ -40,6 +42,20 @@ def test_welding_joins_what_is_within_the_tolerance_and_nothing_else() -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0], [1 + 0.9e-6, 0, 0], [1 + 1.7e-6, 0, 0], [1.1, 0, 0]])
     # The third to the fifth are a chain: neighbors of neighbors are joined.
     assert weld(points, 1e-6).tolist() == [0, 1, 0, 1, 1, 5]
+
+
+def test_a_crowd_is_joined_without_all_of_its_pairs() -> None:
+    """Of two crowds of 2,000 points each, half a tolerance wide, pairs would take 64 MB."""
+    chance = np.random.default_rng(1)
+    crowds = [at + 5e-7 * chance.random((2000, 3)) for at in (0.0, 1.0)]
+    alone = np.array([[2.0, 0, 0], [2 + 0.9e-6, 0, 0], [2 + 2e-6, 0, 0]])
+    tracemalloc.start()
+    try:
+        found = weld(np.concatenate([*crowds, alone]), 1e-6)
+        assert tracemalloc.get_traced_memory()[1] < 20_000_000
+    finally:
+        tracemalloc.stop()
+    assert found.tolist() == [0] * 2000 + [2000] * 2000 + [4000, 4000, 4002]
 
 
 @pytest.mark.parametrize(("gap", "solid"), [(0.0, True), (0.5, True), (3.0, False)])
@@ -221,6 +237,25 @@ def test_many_parts_are_oriented_in_one_go(tmp_path: Path) -> None:
     parts = [Mesh(ball.vertices + (i % 40, i // 40, 0.0), ball.faces[:, ::-1]) for i in range(1500)]
     with pytest.warns(tl.TranslucentWarning, match="turned 1500 closed parts outwards"):
         assert load_mesh(save(tmp_path / "parts.ply", joined(*parts))).diagnosis.solid
+
+
+def test_parts_are_compared_with_those_around_them_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Balls that look inwards: 400 apart from one another, each with another in it, and 400 bubbles in a box."""
+    ball, inner = Sphere(radius=0.3).tessellate(4), Sphere(radius=0.1).tessellate(4)
+    places = [(i % 20 + 0.01 * i, i // 20, 0.1 * (i % 7)) for i in range(400)]
+    apart = [Mesh(one.vertices + at, one.faces[:, ::-1]) for at in places for one in (ball, inner)]
+    monkeypatch.setattr(winding, "MOST", 20 * sum(len(part.faces) for part in apart))  # of 2,400,000 per part
+    with pytest.warns(tl.TranslucentWarning, match="turned 400 closed parts outwards"):
+        assert mended(joined(*apart)).volume == pytest.approx(400 * (ball.volume - inner.volume))
+    bubbles = [Box((-1, -1, -1), (30, 30, 2)).tessellate(1), *apart[::2]]
+    assert mended(joined(*bubbles)).repairs == ()
+
+
+def test_parts_that_all_lie_one_in_another_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(winding, "MOST", 1000)
+    nested = [Sphere(radius=i).tessellate(4) for i in range(1, 40)]
+    with pytest.raises(tl.InputError, match="39 of them that look inwards lie one in another"):
+        mended(joined(*(inverted(one) for one in nested)))
 
 
 def test_text_in_latin_1_is_read(tmp_path: Path) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 import translucent as tl
 from translucent.bench.shapes import backward_window, bow_tie, inside_out_slab_beside_an_open_box, nested_shells
+from translucent.geometry import sample_lines
 from translucent.geometry.sample_lines import winds_negatively
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.planning.plan import plan
@@ -81,3 +84,23 @@ def test_where_a_lobe_is_inside_out_the_order_of_surfaces_has_to_be_found() -> N
         "'bow tie': inside out in places: SignedDepth cannot tell which pixels show one, so all that it covers are "
         "marked invalid; FragmentLists can",
     )
+
+
+def test_faces_that_all_reach_across_the_mesh_meet_fewer_lines() -> None:
+    """A fan of 3,000 faces on one edge would meet 96 x 96 lines in three directions, and keep 400 MB of crossings."""
+    angle = np.linspace(0.0, 6.0, 3000)
+    rim = np.stack([np.cos(angle), np.sin(angle), np.full(3000, 0.5)], axis=1)
+    vertices = np.concatenate([[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], rim])
+    faces = np.stack([np.zeros(3000), np.ones(3000), np.arange(2, 3002)], axis=1).astype(np.int32)
+    tracemalloc.start()
+    try:
+        winds_negatively(vertices, faces)
+        assert tracemalloc.get_traced_memory()[1] < 150_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_what_is_large_and_inside_out_is_found_by_few_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sample_lines, "MOST", 1000)
+    for mesh, found in ((bow_tie(), True), (SOUND["torus"], False)):
+        assert winds_negatively(mesh.vertices, mesh.faces) is found

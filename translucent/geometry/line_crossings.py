@@ -9,8 +9,14 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 
-#: Pairs of a triangle and a line that are tested at a time: the working arrays stay below 100 MB.
-CHUNK = 1 << 20
+#: Pairs of a triangle and a line that are tested at a time: the working arrays take about 100 MB.
+CHUNK = 1 << 18
+
+
+def line_tests(scaled: Array, faces: npt.NDArray[np.integer], lines: tuple[int, int]) -> int:
+    """Number of pairs of a face and a line that `line_crossings` would test."""
+    (_, columns), (_, rows) = _spans(scaled, faces, lines)
+    return int((columns * rows).sum())
 
 
 def line_crossings(
@@ -43,7 +49,7 @@ def line_crossings(
     sign : (k,) int64
         +1 where a line that goes up enters the body, -1 where it leaves.
     """
-    first, count = zip(*(_span(column[faces], most) for column, most in zip(scaled.T, lines, strict=True)), strict=True)
+    first, count = zip(*_spans(scaled, faces, lines), strict=True)
     pairs = count[0] * count[1]
     near = np.flatnonzero(pairs)
     ends = np.cumsum(pairs[near])
@@ -58,20 +64,23 @@ def line_crossings(
         before = 0 if group is None else group[face] * lines[0]
         line = (before + cell[:, 0]) * lines[1] + cell[:, 1]
         corners = faces[face]
-        yield _crossings(scaled[corners], heights[corners], cell, line)
+        yield crossings(scaled[corners], heights[corners], cell, line)
 
 
-def _span(coordinate: Array, lines: int) -> tuple[Integers, Integers]:
-    """(m,), (m,): the first line that triangles (m, 3) may meet along one axis, and how many."""
-    a, b, c = coordinate.T
-    first = np.maximum(np.ceil(np.minimum(np.minimum(a, b), c)), 0).astype(np.int64)
-    last = np.minimum(np.floor(np.maximum(np.maximum(a, b), c)), lines - 1).astype(np.int64)
-    return first, np.maximum(last - first + 1, 0)
+def _spans(scaled: Array, faces: npt.NDArray[np.integer], lines: tuple[int, int]) -> list[tuple[Integers, Integers]]:
+    """Two times (m,), (m,): the first line that faces may meet along one axis, and how many."""
+    found = []
+    for column, most in zip(scaled.T, lines, strict=True):
+        a, b, c = column[faces].T
+        first = np.maximum(np.ceil(np.minimum(np.minimum(a, b), c)), 0).astype(np.int64)
+        last = np.minimum(np.floor(np.maximum(np.maximum(a, b), c)), most - 1).astype(np.int64)
+        found.append((first, np.maximum(last - first + 1, 0)))
+    return found
 
 
-def _crossings(triangles: Array, heights: Array, cell: Integers, line: Integers) -> tuple[Integers, Array, Integers]:
-    """Line, height and sign (+1 upwards into the body) of the triangles (k, 3, 2) that the lines at the cells meet."""
-    relative = triangles - cell[:, None, :]
+def crossings(triangles: Array, heights: Array, place: Array, line: Integers) -> tuple[Integers, Array, Integers]:
+    """Line, height and sign (+1 upwards into the body) of the triangles (k, 3, 2) that the lines at places (k, 2) meet."""
+    relative = triangles - place[:, None, :]
     x, y = relative[..., 0], relative[..., 1]
     area = x[:, [1, 2, 0]] * y[:, [2, 0, 1]] - y[:, [1, 2, 0]] * x[:, [2, 0, 1]]
     total = area.sum(axis=1)

@@ -26,6 +26,13 @@ WELD_TOLERANCE = 1e-6
 WELD_EDGE_SHARE = 1e-2
 
 
+#: Smallest welding distance in metres: cells of it are still numbers.
+_LEAST = 1e-250
+
+#: Vertices within the welding distance of one another, on average, above which not all pairs of them are looked for;
+#: and how many nearest ones are.
+_CROWD = 16
+
 #: Vertices at the beginning of a mesh that tell whether it is a soup of triangles, each with corners of its own.
 _SAMPLE = 3000
 
@@ -61,8 +68,19 @@ def weld(vertices: Vertices, tolerance: float, limit: Callable[[], float] | None
 
     if limit is not None:
         tolerance = min(tolerance, limit())
-    pairs = near[cKDTree(vertices[positions.first[near]]).query_pairs(tolerance, output_type="ndarray")]
-    label = connected(len(positions.first), *pairs.T)
+    points = vertices[positions.first[near]]
+    tree = cKDTree(points)
+    tolerance = max(tolerance, _LEAST)
+    # All points in a cell are within the tolerance of its first one.
+    cells = equal_rows(np.floor((points - points[0]) * (2.0 / tolerance)))
+    if np.square(cells.sizes).sum() <= _CROWD * len(points):
+        pairs = tree.query_pairs(tolerance, output_type="ndarray")
+    else:  # as many pairs as the square of a crowd: across cells, the nearest neighbors of each point join them
+        other = tree.query(points, _CROWD, distance_upper_bound=tolerance)[1]
+        one, column = np.nonzero(other < len(points))
+        in_cells = np.stack([np.arange(len(points)), cells.first[cells.of]], axis=1)
+        pairs = np.concatenate([in_cells, np.stack([one, other[one, column]], axis=1)])
+    label = connected(len(positions.first), *near[pairs].T)
     representative = np.full(len(label), len(vertices), dtype=np.int64)
     np.minimum.at(representative, label, positions.first)
     return representative[label][positions.of]

@@ -7,11 +7,15 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 from translucent.geometry.grouping import extent, use_mask
-from translucent.geometry.line_crossings import line_crossings
+from translucent.geometry.line_crossings import line_crossings, line_tests
 
 #: Lines along each side of the grid of one direction: twice the root of the number of faces, within these bounds.
 #: What is smaller than a cell can slip through.
 LINES = (12, 96)
+
+#: Pairs of a face and a line that are tested at most; scans need fewer than 100,000 as a rule. Faces that reach across
+#: the mesh, such as thousands on one edge, meet most lines, and get fewer of them.
+MOST = 1 << 21
 
 #: Share of the diagonal on which rounding and welding may wind a surface negatively.
 NEGATIVE = 1e-5
@@ -22,7 +26,7 @@ _FEW = 1 << 14
 #: Axes (columns) off those along which meshes tend to be built; and the same with each of them as the last, along which
 #: the lines run.
 _AXES = np.linalg.qr(np.array([[0.9, 0.31, 0.17], [-0.23, 0.87, 0.41], [0.11, -0.37, 0.93]]))[0]
-_TURNS = np.stack([_AXES, _AXES[:, [1, 2, 0]], _AXES[:, [2, 0, 1]]])
+TURNS = np.stack([_AXES, _AXES[:, [1, 2, 0]], _AXES[:, [2, 0, 1]]])
 
 
 def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
@@ -46,17 +50,27 @@ def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
         return False
     unit = (vertices - (low / 2 + high / 2)) / diagonal
     lines = int(np.clip(2 * np.sqrt(len(faces)), *LINES))
-    # One copy for each direction, the lines of all along the last axis: arrays of small meshes cost more than numbers.
-    points = (unit @ _TURNS).reshape(-1, 3)
-    scaled = (points[:, :2] + 0.5) * lines - 0.5
-    near = [_near_lines(scaled[i * len(unit) : (i + 1) * len(unit)], faces, lines) for i in range(3)]
-    copies = np.concatenate([faces[one] + len(unit) * i for i, one in enumerate(near)])
-    direction = np.repeat(np.arange(3), [len(one) for one in near])
+    points = (unit @ TURNS).reshape(-1, 3)
+    scaled, copies, direction = _copies(points[:, :2], faces, lines)
+    if (tests := line_tests(scaled, copies, (lines, lines))) > MOST:
+        lines = max(int(lines * np.sqrt(MOST / tests)), 1)
+        scaled, copies, direction = _copies(points[:, :2], faces, lines)
     found = list(line_crossings(scaled, points[:, 2], copies, (lines, lines), direction))
     if not found:
         return False  # no face is as large as a cell
     line, height, sign = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return _winds_below_zero(line, height, sign)
+
+
+def _copies(points: Array, faces: npt.NDArray[np.integer], lines: int) -> tuple[Array, Integers, Integers]:
+    """Points (3 n, 2) in distances between lines; the faces that may meet one, and the direction of each.
+
+    One copy for each direction, the lines of all along the last axis: arrays of small meshes cost more than numbers.
+    """
+    scaled, count = (points + 0.5) * lines - 0.5, len(points) // 3
+    near = [_near_lines(scaled[i * count : (i + 1) * count], faces, lines) for i in range(3)]
+    copies = np.concatenate([faces[one] + count * i for i, one in enumerate(near)])
+    return scaled, copies, np.repeat(np.arange(3), [len(one) for one in near])
 
 
 def _near_lines(scaled: Array, faces: npt.NDArray[np.integer], lines: int) -> Integers:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Integers, Mask
+from translucent.errors import InputError
 from translucent.geometry.grouping import CHUNK, sorted_sides
+from translucent.geometry.line_crossings import crossings
+from translucent.geometry.sample_lines import TURNS
 
 #: Smallest negative volume of an inside-out part, as a share of its cubed size: less is rounding.
 _FLAT = 1e-12
+
+#: Pairs of a face and a point that are tested at a time, and at most: parts that all lie one in another have as many as
+#: the square of their number.
+BLOCK, MOST = 1 << 18, 1 << 25
 
 
 def winding_number(corners: Array, point: npt.ArrayLike) -> float:
@@ -71,7 +80,8 @@ def inside_out_parts(
     if not negative.any():
         return np.empty(0, dtype=np.int64)
     suspects = np.flatnonzero(negative & _balanced_parts(faces, part, count))
-    return np.array([p for p in suspects if not _is_cavity(corners, part, low, high, int(p))], dtype=np.int64)
+    points = corners[order[starts[suspects]]].mean(axis=1)
+    return suspects[~_are_cavities(corners, part, np.stack([low, high], axis=1), suspects, points)]
 
 
 def part_volumes(
@@ -111,13 +121,73 @@ def triple_products(x: Array, y: Array, z: Array) -> Array:
     return triple
 
 
-def _is_cavity(corners: Array, part: npt.NDArray[np.signedinteger[Any]], low: Array, high: Array, p: int) -> bool:
-    around = (low <= low[p]).all(axis=1) & (high >= high[p]).all(axis=1)
-    around[p] = False
-    if not around.any():
-        return False
-    inside = corners[np.flatnonzero(part == p)[0]].mean(axis=0)
-    return round(winding_number(corners[around[part]], inside)) != 0
+def _are_cavities(
+    corners: Array, part: npt.NDArray[np.signedinteger[Any]], boxes: Array, suspects: Integers, points: Array
+) -> Mask:
+    """(k,): whether other parts, with boxes (n, 2, 3) around that of a suspect (k,), wind around a point (k, 3) of it.
+
+    Lines through each point in three directions count the faces before and behind it. The winding number is the mean of
+    all counts, so that a line through an edge does not decide.
+    """
+
+    def around(one: Integers, other: Integers) -> Mask:
+        (low, high), (inner_low, inner_high) = (boxes[of].transpose(1, 0, 2) for of in (one, suspects[other]))
+        return np.asarray(((low <= inner_low) & (high >= inner_high)).all(axis=1) & (one != suspects[other]))
+
+    outer, inner = np.zeros(len(boxes), dtype=bool), np.zeros(len(suspects), dtype=bool)
+    for one, other in _pairs(boxes[..., :2], points[:, :2]):
+        held = around(one, other)
+        outer[one[held]] = inner[other[held]] = True
+    face, suspect = np.flatnonzero(outer[part]), np.flatnonzero(inner)
+    low, high = boxes.min(axis=(0, 1)), boxes.max(axis=(0, 1))
+    middle, size = low / 2 + high / 2, float((high - low).max())
+    winding = np.zeros(len(suspects))
+    for turn in TURNS:
+        triangles, places = ((of - middle) / size @ turn for of in (corners[face], points[suspect]))
+        for one, other in _pairs(triangles[..., :2], places[:, :2]):
+            held = around(part[face[one]], suspect[other])
+            one, other = one[held], other[held]
+            met, height, sign = crossings(triangles[one, :, :2], triangles[one, :, 2], places[other, :2], other)
+            behind = np.where(height < places[met, 2], sign, -sign)
+            winding += np.bincount(suspect[met], behind, minlength=len(winding))
+    return np.round(winding / (2 * len(TURNS))) != 0
+
+
+def _pairs(triangles: Array, points: Array) -> Iterator[tuple[Integers, Integers]]:
+    """Numbers of triangles (m, 3, 2), and of points (k, 2) in the boxes around them, in chunks.
+
+    Points are sorted into strips across the first axis, with about as many in each as there are strips, and within
+    those along the second axis: a box meets a run of points in each of a few strips.
+    """
+    count, tests = len(points), 0
+    if not count:
+        return
+    strips = math.isqrt(count)
+    walls = np.sort(points[:, 0])[np.arange(1, strips) * count // strips]
+    heights = np.sort(points[:, 1])
+    key = np.searchsorted(walls, points[:, 0], side="right") * (count + 1) + np.searchsorted(heights, points[:, 1])
+    order = np.argsort(key)
+    key = key[order]
+    for begin in range(0, len(triangles), CHUNK):
+        low, high = triangles[begin : begin + CHUNK].min(axis=1), triangles[begin : begin + CHUNK].max(axis=1)
+        first = np.searchsorted(walls, low[:, 0], side="right")
+        triangle, strip = _expanded(first, np.searchsorted(walls, high[:, 0], side="right") - first + 1)
+        bottom, top = np.searchsorted(heights, low[:, 1]), np.searchsorted(heights, high[:, 1], side="right")
+        first = np.searchsorted(key, strip * (count + 1) + bottom[triangle])
+        runs = np.searchsorted(key, strip * (count + 1) + top[triangle]) - first
+        ends = np.cumsum(runs)
+        if (tests := tests + int(ends[-1])) > MOST:
+            found = f"{count} of them that look inwards lie one in another"
+            raise InputError("parts of a mesh", found, "remove what is there twice, or split the mesh")
+        for part in np.split(np.arange(len(runs)), np.searchsorted(ends, np.arange(BLOCK, ends[-1], BLOCK))):
+            run, place = _expanded(first[part], runs[part])
+            yield begin + triangle[part[run]], order[place]
+
+
+def _expanded(first: Integers, count: Integers) -> tuple[Integers, Integers]:
+    """Number of each run of whole numbers, and the numbers in it, from their first ones and lengths."""
+    run = np.repeat(np.arange(len(first)), count)
+    return run, np.arange(len(run)) + np.repeat(first - (np.cumsum(count) - count), count)
 
 
 def _balanced_parts(
