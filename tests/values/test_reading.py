@@ -23,6 +23,7 @@ from translucent.bake.reading import load_thickness_map
 from translucent.bench.codec import Packed
 from translucent.files import reading
 from translucent.files.reading import json_value, open_file, require_room, toml_value
+from translucent.gltf import file as file_module
 from translucent.gltf.write import write_medium
 from translucent.materials import load_medium
 from translucent.materials.usd import read_usda
@@ -128,6 +129,34 @@ def test_a_large_text_is_refused_unread(tmp_path: Path) -> None:
         file.truncate(1 << 40)  # takes no place on the disk
     with pytest.raises(tl.InputError, match=r"it has 1e\+03 GiB|it has 1024 GiB, more than 8 MiB"):
         fit_wedge(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("read", [tl.load_scene, tl.load_mesh])
+def test_json_with_too_much_data_in_its_links_is_refused_unread(
+    tmp_path: Path, read: Callable[[Path], object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with (tmp_path / "a.gltf").open("wb") as file:
+        file.truncate(file_module.MAX_JSON + 1)
+    with pytest.raises(tl.InputError, match="its JSON has 256 MiB, more than 256 MiB"):
+        read(tmp_path / "a.gltf")
+    monkeypatch.setattr(file_module, "MAX_JSON", 1 << 10)
+    json_chunk = struct.pack("<II", 2000, file_module.JSON_CHUNK) + b" " * 2000
+    (tmp_path / "a.glb").write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(json_chunk)) + json_chunk)
+    with pytest.raises(tl.InputError, match=r"its JSON has 1\.96 kiB, more than 1 kiB"):
+        read(tmp_path / "a.glb")
+
+
+def test_data_of_a_link_are_decoded_in_little_memory(tmp_path: Path) -> None:
+    tree = linked_box("data:;base64," + "A" * 8_000_000)
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    del tree
+    tracemalloc.start()
+    try:
+        with pytest.raises(tl.InputError, match="all its vertices are at one point"):
+            tl.load_scene(tmp_path / "a.gltf")
+        assert tracemalloc.get_traced_memory()[1] < 3.1 * 8_000_000
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_small_file_unpacks_into_no_more_than_this() -> None:

@@ -79,7 +79,7 @@ def _spans(scaled: Array, faces: npt.NDArray[np.integer], lines: tuple[int, int]
 
 
 def crossings(triangles: Array, heights: Array, place: Array, line: Integers) -> tuple[Integers, Array, Integers]:
-    """Line, height and sign (+1 upwards into the body) of the triangles (k, 3, 2) that the lines at places (k, 2) meet."""
+    """Line, height and sign (+1 upwards into the body) of the triangles (k, 3, 2) that lines at places (k, 2) meet."""
     relative = triangles - place[:, None, :]
     x, y = relative[..., 0], relative[..., 1]
     area = x[:, [1, 2, 0]] * y[:, [2, 0, 1]] - y[:, [1, 2, 0]] * x[:, [2, 0, 1]]

@@ -5,15 +5,16 @@ Only the JSON is looked into; the chunks behind it are kept byte for byte. Sourc
 
 from __future__ import annotations
 
-import base64
 import binascii
+import os
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from translucent.errors import InputError, UnreadableError
-from translucent.files.reading import json_value, linked_file, read_bytes
+from translucent.files.memory import require_memory
+from translucent.files.reading import json_value, linked_file, open_file, read_bytes, size_text
 
 Json = dict[str, Any]
 
@@ -21,6 +22,9 @@ Json = dict[str, Any]
 MAGIC, GLB_VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
+
+#: Bytes of the longest JSON, with all data in its links, which takes three times as much memory until it is decoded.
+MAX_JSON = 1 << 28
 
 
 @dataclass(frozen=True)
@@ -93,8 +97,8 @@ class GltfFile:
         asked = f"glTF {str(self.path)!r}"
         if uri.startswith("data:"):
             try:
-                return base64.b64decode(uri.partition(",")[2], validate=True)
-            except (ValueError, binascii.Error) as error:
+                return binascii.a2b_base64(uri.partition(",")[2], strict_mode=True)
+            except ValueError as error:
                 found = f"{uri[:57]!r}... cannot be read ({error})"
                 raise UnreadableError(asked, found, "export the file again") from error
         path = linked_file(self.path.parent, uri, asked, self.allow_outside)
@@ -120,14 +124,19 @@ def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
     """
     path = Path(path)
     asked = f"glTF {str(path)!r}"
-    data = read_bytes(path, asked)
-    if path.suffix.lower() not in (".glb", ".gltf") and data[:4] != MAGIC:
+    with open_file(path, asked) as stream:
+        binary, size = stream.read(len(MAGIC)) == MAGIC, os.fstat(stream.fileno()).st_size
+    if path.suffix.lower() not in (".glb", ".gltf") and not binary:
         raise InputError(asked, f"suffix {path.suffix!r}", "give a .glb or .gltf file")
-    if not data:
+    if not size:
         raise InputError(asked, "it is empty", "copy or export the file again")
-    text, chunks = _split(asked, data) if data[:4] == MAGIC else (data, b"")
+    if not binary:
+        _require_short(asked, size)
+    data, chunks = _split(asked, read_bytes(path, asked)) if binary else (read_bytes(path, asked), b"")
     try:
-        tree = json_value(text.decode("utf-8-sig"))
+        text = data.decode("utf-8-sig")
+        del data  # half of the memory
+        tree = json_value(text)
     except ValueError as error:
         raise InputError(asked, f"its JSON is broken ({error})", "copy or export the file again") from error
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
@@ -156,4 +165,13 @@ def _split(asked: str, data: bytes) -> tuple[bytes, bytes]:
         start = parts[-1][2]
     if not parts or parts[0][0] != JSON_CHUNK:
         raise InputError(asked, "its first chunk is not JSON", "copy or export the file again")
+    _require_short(asked, parts[0][2] - parts[0][1])
     return data[parts[0][1] + CHUNK.size : parts[0][2]], data[parts[0][2] : length]
+
+
+def _require_short(asked: str, size: int) -> None:
+    """Raise `InputError` where a JSON of so many bytes takes too much memory, most of it for data in its links."""
+    do = "save it as .glb, or keep its data in files beside it"
+    if size > MAX_JSON:
+        raise InputError(asked, f"its JSON has {size_text(size)}, more than {size_text(MAX_JSON)}", do)
+    require_memory(asked, f"its {size_text(size)} of JSON", 3 * size, do)
