@@ -150,7 +150,7 @@ def _are_cavities(
             met, height, sign = crossings(triangles[one, :, :2], triangles[one, :, 2], places[other, :2], other)
             behind = np.where(height < places[met, 2], sign, -sign)
             winding += np.bincount(suspect[met], behind, minlength=len(winding))
-    return np.round(winding / (2 * len(TURNS))) != 0
+    return np.asarray(np.round(winding / (2 * len(TURNS))) != 0)
 
 
 def _pairs(triangles: Array, points: Array) -> Iterator[tuple[Integers, Integers]]:
