@@ -216,6 +216,18 @@ def test_a_table_to_csv_with_clamping(run: Run, here: Path) -> None:
     assert row["warnings"].startswith("color clamped to 0.0001 where it was below | red is 1")
 
 
+def test_no_name_is_a_formula_to_a_spreadsheet(run: Run, here: Path) -> None:
+    names = ["=cmd|' /c calc'!A1", "+1+1", "-x", "@SUM(1)", "\tx", "\r=x", "a\r=x", "-1.5", "a=b"]
+    rows = [{"name": name, "color": [0.5, 0.5, 0.5], "distance": 1} for name in names]
+    (here / "in.json").write_text(json.dumps(rows))
+    assert run("--batch", "in.json", "-o", "out.csv")[0] == 0
+    with (here / "out.csv").open(newline="") as stream:
+        told = list(csv.DictReader(stream))
+    kept = [name.replace("\r", "\n") for name in names]
+    assert [row["name"] for row in told] == [*(f"'{name}" for name in kept[:6]), *kept[6:]]
+    assert {row["extinction_r"] for row in told} == {str(-math.log(0.5))}
+
+
 def test_a_table_shows_swatches_and_errors(here: Path) -> None:
     (here / "in.csv").write_text("name,color,distance\n<wine>,#7b1e3a,1cm\nmist,gray,<far>\n")
     html = convert_table("in.csv")._repr_html_()

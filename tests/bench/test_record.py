@@ -50,7 +50,7 @@ def full_report() -> Report:
         bytes_per_pixel=61,
         thickness=errors,
         sampled=dataclasses.replace(errors, rms=7e-4),
-        light=LightErrors(0.02, 0.01, (0.1, -0.2, 0.3), 0.4),
+        light=LightErrors(0.02, 0.01, (-0.1, -0.2, 0.3), 0.4),
         invalid=0.0,
         coverage_mismatch=0.0,
         pareto=True,
@@ -176,7 +176,7 @@ def test_the_table_has_a_line_for_each_row(tmp_path: Path) -> None:
     assert [line["method"] for line in lines] == ["SignedDepth", "BackFaceDepth"]
     assert float(lines[0]["thickness.rms"]) == 1e-3
     assert lines[0]["radiance.rms"] == ""
-    assert lines[0]["light.bias"] == "0.1 -0.2 0.3"
+    assert lines[0]["light.bias"] == "-0.1 -0.2 0.3"
     assert lines[1]["refusal"] == "two media"
     assert lines[0]["size"] == "64x48"
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +15,7 @@ from translucent.errors import RenderError
 from translucent.files.folders import made_folder
 from translucent.files.paths import require_folder, write_text_atomically
 from translucent.files.reading import read_text
+from translucent.files.tables import csv_text
 
 #: Largest size of a report in bytes: it holds pictures.
 _LARGEST = 1 << 28
@@ -52,11 +51,7 @@ def write_csv(report: Report, path: Path) -> None:
     for name, hint in hints.items():
         group = [kind for kind in get_args(hint) if dataclasses.is_dataclass(kind)]
         columns += [f"{name}.{part.name}" for kind in group for part in dataclasses.fields(kind)] or [name]
-    stream = io.StringIO()
-    writer = csv.DictWriter(stream, columns, restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(_flat(case, row) for case in report.cases for row in case.rows)
-    write_text_atomically(path, stream.getvalue())
+    write_text_atomically(path, csv_text(columns, (_flat(case, row) for case in report.cases for row in case.rows)))
 
 
 def _flat(case: CaseRecord, row: MethodRow) -> dict[str, Any]:

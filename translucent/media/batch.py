@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from dataclasses import dataclass
 from html import escape
@@ -12,6 +10,7 @@ from typing import Any
 
 from translucent.errors import InputError
 from translucent.files.paths import require_output, write_atomically
+from translucent.files.tables import csv_text
 from translucent.media.conversion import CLAMP, clamp_colors, html_strip, summary
 from translucent.media.medium import Medium
 from translucent.media.preset import Row, check_cells, read_table
@@ -68,17 +67,15 @@ class Batch:
     def to_csv(self) -> str:
         """The records as CSV: triples in columns ``_r``, ``_g``, ``_b``, warnings joined by `` | ``."""
         columns = ["name", "distance", "unit", *(f"{name}_{c}" for name in _TRIPLES for c in "rgb"), "warnings"]
-        stream = io.StringIO(newline="")
-        writer = csv.DictWriter(stream, columns, extrasaction="ignore", lineterminator="\n")
-        writer.writeheader()
+        rows = []
         for record in self.records:
             triples = {
                 f"{name}_{c}": "inf" if value is None else repr(value)
                 for name in _TRIPLES
                 for c, value in zip("rgb", record[name], strict=True)
             }
-            writer.writerow({**record, **triples, "warnings": " | ".join(record["warnings"])})
-        return stream.getvalue()
+            rows.append({**record, **triples, "warnings": " | ".join(record["warnings"])})
+        return csv_text(columns, rows)
 
 
 def convert_table(path: str | Path, unit: str = "m", unit_out: str = "m", clamp: bool = False) -> Batch:
