@@ -7,9 +7,11 @@ from scipy import sparse
 
 import translucent as tl
 from translucent.diffusion.cells import TOLERANCE
+from translucent.diffusion.field import DiffusingBody, lit_body
 from translucent.diffusion.grid import body_grid
 from translucent.diffusion.known_solutions import MOST, KnownSolutions
 from translucent.diffusion.solution import BodySystem
+from translucent.diffusion.volume import DiffusingVolume, VolumeGrid
 from translucent.geometry.solids import Sphere
 from translucent.planning.scattering import Diffusion
 
@@ -21,7 +23,7 @@ def test_mixed_lights_take_no_steps() -> None:
     body = tl.Object(Sphere().tessellate(24), MILK)
     grid = body_grid(body, Diffusion(12).cell_size(body))
     count, itself = len(grid.points), sparse.csr_array((len(grid.points),) * 2)
-    system = BodySystem(grid, MILK, 0.0)
+    system = BodySystem(grid, MILK, 0.0, warm_starts=True)
     dark = np.zeros((grid.count, 3))
     above = np.maximum(grid.normals[:, :1], 0.0) * np.ones(3)
     even, steps = np.ones((count, 3)), []
@@ -32,6 +34,21 @@ def test_mixed_lights_take_no_steps() -> None:
         steps.append(found.steps)
     assert min(steps[:2]) > 10
     assert max(steps[2:]) <= 3
+
+
+def test_solutions_depend_on_earlier_ones_only_with_warm_starts() -> None:
+    body = tl.Object(Sphere().tessellate(24), MILK)
+    lit, grid = lit_body(body, None, 0.25), VolumeGrid(body, 0.25)
+    camera, sky = tl.Camera.look_at((0, 0, 5), (0, 0, 0)), tl.Environment.constant((0.3, 0.2, 0.1))
+    one, other = (tl.Scene([body], camera, lights, sky) for lights in ((), [tl.PointLight((3, 0, 1), 1.0)]))
+    for warm in (False, True):
+        surface = DiffusingBody(lit, MILK, 0.0, warm_starts=warm)
+        volume = DiffusingVolume(grid, MILK, warm_starts=warm)
+        first, _, last = ((surface.field(scene, 0), volume.field(scene)) for scene in (one, other, one))
+        for before, after in zip(first, last, strict=True):
+            same = [np.array_equal(a, b) for a, b in zip(before.volumes, after.volumes, strict=True)]
+            assert all(same) is not warm
+            assert (after.steps < 0.5 * before.steps) is warm
 
 
 def test_many_lights_are_no_worse_than_none_before() -> None:

@@ -56,9 +56,17 @@ NO_FIELDS = Fields({}, {})
 
 
 class FieldCache:
-    """Light of scenes whose media are marked (`DiffusedMedium`, `DiffusedVolume`). Threads may share it."""
+    """Light of scenes whose media are marked (`DiffusedMedium`, `DiffusedVolume`). Threads may share it.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    warm_starts : bool
+        Solutions start from those of earlier scenes: quicker, and no longer the same whatever these were, within the
+        tolerance of the solver.
+    """
+
+    def __init__(self, *, warm_starts: bool = False) -> None:
+        self._warm_starts = warm_starts
         self._lock = Lock()
         self._opaque: OrderedDict[Hashable, EmbreeMesh | None] = OrderedDict()
         self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
@@ -126,13 +134,17 @@ class FieldCache:
         key = (place, medium, roughness)
 
         def make() -> DiffusingBody:
-            return DiffusingBody(lit, medium, roughness, corrected=diffusion.corrected)
+            return DiffusingBody(lit, medium, roughness, corrected=diffusion.corrected, warm_starts=self._warm_starts)
 
         return _kept(self._diffusing, key, make, KEPT_BODIES)
 
     def _volume(self, body: Object, medium: Medium, diffusion: Diffusion) -> DiffusingVolume:
         grid, key = self._grid(body, diffusion), (_density_place(body, diffusion), coefficients_of(medium))
-        return _kept(self._volumes, key, lambda: DiffusingVolume(grid, medium), KEPT_BODIES)
+
+        def make() -> DiffusingVolume:
+            return DiffusingVolume(grid, medium, warm_starts=self._warm_starts)
+
+        return _kept(self._volumes, key, make, KEPT_BODIES)
 
     def _grid(self, body: Object, diffusion: Diffusion) -> VolumeGrid:
         place = _density_place(body, diffusion)

@@ -55,6 +55,10 @@ class CellSystem:
             self._known.add(found)
         return np.asarray(found * self._scale), steps
 
+    def forget(self) -> None:
+        """Start the next solution from nothing."""
+        self._known = KnownSolutions(self._matrix)
+
     def rough(self, source: Array) -> Array:
         """Fluence (cells,) for powers (cells,) up to a residual of `ROUGH`; no other solution starts from it."""
         return np.asarray(self._found(source * self._scale, None, ROUGH)[0] * self._scale)

@@ -220,16 +220,20 @@ class DiffusingBody:
     medium : Medium
     roughness : float
         Of its surface.
-    corrected : bool
-        By uniform light; see `BodySystem`.
+    corrected, warm_starts : bool
+        See `BodySystem`.
     """
 
     @np.errstate(under="ignore")
-    def __init__(self, lit: LitBody, medium: Medium, roughness: float, *, corrected: bool = True) -> None:
+    def __init__(
+        self, lit: LitBody, medium: Medium, roughness: float, *, corrected: bool = True, warm_starts: bool = False
+    ) -> None:
         self._lit, self._medium, self._roughness = lit, medium, roughness
         self._interface = diffuse_interface(medium.ior, roughness)
         self._entrance = lit.entrance(medium.ior, roughness)
-        self._system = BodySystem(lit.grid, medium, roughness, lit.densities, corrected=corrected)
+        self._system = BodySystem(
+            lit.grid, medium, roughness, lit.densities, corrected=corrected, warm_starts=warm_starts
+        )
 
     @np.errstate(under="ignore")
     def field(

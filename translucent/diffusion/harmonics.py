@@ -94,7 +94,8 @@ class LitAlone:
         roughness = 0.0 if body.surface is None else body.surface.roughness
         self._body = body
         self._camera = Camera.look_at((0, 0, 1), (0, 0, 0))  # which the light does not depend on
-        self._diffusing = DiffusingBody(lit_body(body, None, diffusion.cell_size(body)), body.medium, roughness)
+        geometry = lit_body(body, None, diffusion.cell_size(body))
+        self._diffusing = DiffusingBody(geometry, body.medium, roughness, warm_starts=True)
 
     def field(self, environment: Environment) -> DiffusionField:
         """Light that the body gives back."""

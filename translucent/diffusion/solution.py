@@ -65,7 +65,7 @@ class SurfaceLight:
 
 
 class BodySystem:
-    """The linear systems of a body with a medium, ready for any light; each solution starts from the last one.
+    """The linear systems of a body with a medium, ready for any light.
 
     Parameters
     ----------
@@ -79,6 +79,8 @@ class BodySystem:
     corrected : bool
         What diffusion gets wrong of uniform light around such a body without losses is taken out: it takes as long as
         all else.
+    warm_starts : bool
+        Solutions start from those for earlier light, in few steps. They then depend on it, within `TOLERANCE`.
     """
 
     @np.errstate(under="ignore")
@@ -90,7 +92,9 @@ class BodySystem:
         dense: Densities | None = None,
         *,
         corrected: bool = True,
+        warm_starts: bool = False,
     ) -> None:
+        self._warm_starts = warm_starts
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         self._grid, self._dense = grid, dense or even_densities(grid)
@@ -138,6 +142,8 @@ class BodySystem:
         for channel, system in self._channels.items():
             emission = float(self._emitted[channel])
             straight = system.beamed(channel, beams, ways)
+            if not self._warm_starts:
+                system.forget()
             found = system.solved(entering[:, channel], from_itself, inside[:, channel], emission, straight)
             fluence[:, channel], flux[:, channel], cells[:, channel], taken = found
             steps += taken
@@ -216,6 +222,10 @@ class _Channel:
         least = np.finfo(np.float64).tiny
         share = wanted / max(wanted.sum(), least) * found.sum() / np.maximum(found, least)
         return np.asarray(np.clip(share, LEAST_CORRECTION, MOST_CORRECTION))
+
+    def forget(self) -> None:
+        """Start the next solution from nothing; its bounces start from each other."""
+        self._cells.forget()
 
     def beamed(self, channel: int, beams: Sequence[Beam], ways: Sequence[Ways]) -> _Beamed:
         """First events of beams, of which each goes its ways."""

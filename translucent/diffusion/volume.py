@@ -128,11 +128,13 @@ class DiffusingVolume:
     ----------
     volume : VolumeGrid
     medium : Medium
+    warm_starts : bool
+        See `translucent.diffusion.solution.BodySystem`.
     """
 
     @np.errstate(under="ignore")
-    def __init__(self, volume: VolumeGrid, medium: Medium) -> None:
-        self._volume, self._medium = volume, medium
+    def __init__(self, volume: VolumeGrid, medium: Medium, *, warm_starts: bool = False) -> None:
+        self._volume, self._medium, self._warm_starts = volume, medium, warm_starts
         self._reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         reduced = np.asarray(medium.absorption) + self._reduced
         # What is denser looks the same, and its skin would be lost in a cell.
@@ -157,6 +159,10 @@ class DiffusingVolume:
         With `photons`, which carry what bodies bend of the light of lamps, none of it goes straight through these.
         """
         volume, medium = self._volume, self._medium
+        if not self._warm_starts:
+            for system in self._systems:
+                if system is not None:
+                    system.forget()
         sky = self._sky(scene)
         stops = None if photons is None else photons.stops
         unturned, ahead = _from_lights(volume, self._density, scene, medium, stops)

@@ -92,10 +92,17 @@ def slot_grids(light: DiffusedLight | None, slots: Sequence[Slot], center: Array
 
 
 class DiffusionCache:
-    """Textures of the diffused light of the last scene."""
+    """Textures of the diffused light of the last scene.
+
+    Attributes
+    ----------
+    warm_starts : bool
+        As of `FieldCache`: for a window, whose light changes from frame to frame. Set it before anything is solved for.
+    """
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
+        self.warm_starts = False
         #: One for each size of grids: what is solved on a small one waits for no large one.
         self._solvers: OrderedDict[Diffusion, FieldCache] = OrderedDict()
         self._lock = Lock()
@@ -134,7 +141,7 @@ class DiffusionCache:
 
         with self._lock:  # threads share it
             if diffusion not in self._solvers:
-                self._solvers[diffusion] = FieldCache()
+                self._solvers[diffusion] = FieldCache(warm_starts=self.warm_starts)
                 if len(self._solvers) > KEPT_GRIDS:
                     self._solvers.popitem(last=False)
             self._solvers.move_to_end(diffusion)

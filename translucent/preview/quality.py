@@ -320,7 +320,7 @@ def solved_light(report: Report, scene: Scene, diffusion: Diffusion, caustics: C
 def _solver() -> FieldCache:
     from translucent.diffusion.cache import FieldCache  # with SciPy, which the window does without as long as it can
 
-    return FieldCache()
+    return FieldCache(warm_starts=True)
 
 
 def _bodies(scene: Scene, back: GivenBack) -> Hashable:

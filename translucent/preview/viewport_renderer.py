@@ -189,7 +189,7 @@ class ViewportRenderer:
         self._compiler = compiler
         self._gl.extra = None if compiler is None else compiler.budget
         with self.current():
-            self.renderer = Renderer(context=self._gl)
+            self.renderer = self._new_renderer()
             self.viewport = Viewport(self.renderer.gpu)
         if compiler is not None:
             compiler.device = self.renderer.gpu.context.renderer
@@ -212,6 +212,11 @@ class ViewportRenderer:
     def current(self) -> AbstractContextManager[Any]:
         """Context manager that makes the context current: a window's always is."""
         return nullcontext(self._gl) if self._own is None else self._own.current()
+
+    def _new_renderer(self) -> Renderer:
+        renderer = Renderer(context=self._gl)
+        renderer.gpu.diffusion.warm_starts = True  # light changes from frame to frame
+        return renderer
 
     def draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
         """Draw a step, if there is one left; returns whether more are.
@@ -466,7 +471,7 @@ class ViewportRenderer:
     def _rebuild(self, workspace: Workspace) -> None:
         scene = workspace.scene()
         with self.current():
-            fresh = Renderer(context=self._gl)
+            fresh = self._new_renderer()
             anew, viewport = partial(fresh.plan, scattering=self.quality.scattering), None
             try:
                 viewport = Viewport(fresh.gpu)
