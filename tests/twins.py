@@ -198,7 +198,14 @@ def _cell_arguments() -> list[np.ndarray]:
 
 ANISOTROPIES = np.array([-0.99, -0.5, 0, 1e-7, 0.3, 0.9, 0.999])
 #: Parameters of phase functions.
-PHASES = np.array([[g, 0.0, 0.0, 0.0] for g in ANISOTROPIES], np.float32)
+PHASES = np.array(
+    [
+        *([g, 0.0, 0.0, 0.0] for g in ANISOTROPIES),
+        *([0.0, g, alpha, 1.0] for g in ANISOTROPIES[1:-1] for alpha in (0.0, 1.0, 30.0)),
+        [0.99, 0.6, 27.0, 0.5],
+    ],
+    np.float32,
+)
 
 
 def _phase_arguments(values: np.ndarray) -> list[np.ndarray]:
@@ -232,6 +239,8 @@ ARGUMENTS = {
     "thin_layer_thickness": _mixed(np.array([1e-6, 1e-3, 1.0]), COSINES, np.array([1.0, 1.33, 1.5])),
     "henyey_greenstein": _mixed(np.clip(COSINES, -1, 1), ANISOTROPIES),
     "henyey_greenstein_cosine": _mixed(UNIT, ANISOTROPIES),
+    "draine": _mixed(np.clip(COSINES, -1, 1), ANISOTROPIES, np.array([0.0, 1.0, 30.0, 1e4])),
+    "draine_cosine": _mixed(UNIT, ANISOTROPIES[1:-1], np.array([0.0, 1.0, 30.0])),
     "phase_value": _phase_arguments(np.clip(COSINES, -1, 1)),
     "phase_cosine": _phase_arguments(UNIT),
     "reflected_direction": _directions_and_normals()[:2],
@@ -287,6 +296,7 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
     "srgb_to_linear": 64.0,  # pow multiplies the error of the logarithm by 2.4 log(x)
     "linear_to_srgb": 64.0,
     "henyey_greenstein": 64.0,  # a power of 1.5 of a small difference
+    "draine": 64.0,
     "phase_value": 64.0,
     "equirectangular_uv": 4096.0,
     "tone_agx": 64.0,  # powers
@@ -316,6 +326,17 @@ FLOOR = {
 }
 
 
+def _density(name: str, cosine: np.ndarray, arguments: list[np.ndarray]) -> np.ndarray:
+    """Phase function in 1/sr by which a cosine is drawn: random numbers as far apart as 1 move it by 1 / (2 pi p)."""
+    if name == "henyey_greenstein_cosine":
+        return phase.henyey_greenstein(cosine, arguments[1])
+    if name == "draine_cosine":
+        return phase.draine(cosine, *arguments[1:])
+    g, draine_g, alpha, weight = arguments[0].T
+    first = (weight > 0) & (arguments[1] <= weight)
+    return np.where(first, phase.draine(cosine, draine_g, alpha), phase.henyey_greenstein(cosine, g))
+
+
 def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.ndarray:
     eps = float(np.finfo(np.float32).eps) / 2
     allowed = ROUNDINGS[name] * eps * np.abs(exact) + FLOOR.get(name, 0.0)
@@ -337,12 +358,8 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
     if name == "scattered_radiance":
         # Of both signs, too.
         allowed = allowed + 8 * eps * np.abs(arguments[0] * arguments[1]).sum(axis=1)
-    if name in ("henyey_greenstein_cosine", "phase_cosine"):
-        # (1 + g^2 - (1 - g^2)^2 / q^2) / (2 g) of q = 1 + g (2 u - 1), a sum that is good to a rounding of 1.
-        share, g = (arguments[0], arguments[1]) if name[0] == "h" else (arguments[1], arguments[0][:, 0])
-        share, g = share.astype(np.float64), g.astype(np.float64)
-        slope = ((1.0 - g) * (1.0 + g)) ** 2 / (1.0 + g * (2.0 * share - 1.0)) ** 3
-        allowed = allowed + 4 * eps * (1.0 + slope / np.maximum(np.abs(g), 0.5))
+    if name.endswith("_cosine"):
+        allowed = allowed + 8 * eps / (2 * np.pi * _density(name, exact, arguments)) + 4 * eps
     if name == "cone_attenuation":
         # Each component of the chord is a difference of numbers as large as the length of the cone's vector; the offset
         # is as large as the squared chord at the edge.

@@ -37,8 +37,10 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.errors import RenderError as RenderError
     from translucent.errors import TranslucentError as TranslucentError
     from translucent.errors import TranslucentWarning as TranslucentWarning
+    from translucent.formulas.phase import Draine as Draine
     from translucent.formulas.phase import HenyeyGreenstein as HenyeyGreenstein
     from translucent.formulas.phase import PhaseFunction as PhaseFunction
+    from translucent.formulas.phase import WaterDroplets as WaterDroplets
     from translucent.frames.appearance import Appearance as Appearance
     from translucent.frames.appearance import appearance_of as appearance_of
     from translucent.frames.appearance import average_color as average_color
@@ -127,7 +129,7 @@ _NAMES = {
     "bake.thickness_map": "ThicknessMap VertexThickness",
     "bake.vertices": "bake_vertex_thickness",
     "errors": "InputError RenderError TranslucentError TranslucentWarning",
-    "formulas.phase": "HenyeyGreenstein PhaseFunction",
+    "formulas.phase": "Draine HenyeyGreenstein PhaseFunction WaterDroplets",
     "frames.appearance": "Appearance appearance_of average_color medium_for_average_color",
     "frames.frame": "Frame",
     "frames.metrics": "Errors compare interior",

@@ -1,9 +1,12 @@
 // Phase functions: how a medium spreads the light that it scatters. Pure. Inputs: cos_scatter, the cosine between the directions
-// of travel before and after an event, 1 straight on; phase: the four parameters of a phase function, x: g of Henyey and Greenstein,
-// the mean cosine, -1 < g < 1. Each function is the float32 twin of the same name in translucent/formulas/phase.py, where the
-// sources are cited: Henyey & Greenstein 1941; Witt 1977.
+// of travel before and after an event, 1 straight on; phase: the four parameters of a phase function, which is a mixture: x: g of
+// Henyey and Greenstein, the mean cosine, -1 < g < 1; y, z: g and alpha of Draine; w: the share of the light that the latter scatters.
+// Each function is the float32 twin of the same name in translucent/formulas/phase.py, where the sources are cited: Henyey &
+// Greenstein 1941; Witt 1977; Draine 2003; Jendersie & d'Eon 2023.
 
 #include <constants>
+
+const int DRAINE_STEPS = 24;  // of Newton's method, or halvings of its bracket
 
 // In 1/sr. Turned around for g < 0, the base does not cancel.
 float henyey_greenstein(float cos_scatter, float anisotropy) {
@@ -21,12 +24,40 @@ float henyey_greenstein_cosine(float share, float anisotropy) {
     return clamp(0.5 * ((a + g) * (1.0 + root) / (1.0 + g * a) + g), -1.0, 1.0);
 }
 
+// In 1/sr: Henyey and Greenstein's times 1 + alpha cos^2, normalised.
+float draine(float cos_scatter, float anisotropy, float alpha) {
+    float squares = (1.0 + 2.0 * anisotropy * anisotropy) / 3.0;  // mean of cos^2 by Henyey and Greenstein
+    return henyey_greenstein(cos_scatter, anisotropy) * (1.0 + alpha * cos_scatter * cos_scatter) / (1.0 + alpha * squares);
+}
+
+// Cosine of the angle that light turns by, at random. As many events turn further by Draine's as the integral of 1 + alpha cos^2 over
+// the shares t of Henyey and Greenstein says, a polynomial over powers of q = 1 - g + 2 g t; it is solved by Newton's method in a bracket.
+float draine_cosine(float share, float anisotropy, float alpha) {
+    float g = anisotropy;
+    float wanted = share * (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0);
+    float low = 0.0, high = 1.0, t = share;
+    for (int i = 0; i < DRAINE_STEPS; ++i) {
+        float q = 1.0 - g + 2.0 * g * t;
+        float middle = (t * (1.0 + g * g) - (1.0 - g)) / q;
+        float squares = middle * middle + t * t * (1.0 - g) * (1.0 + g) * (1.0 + g) * (1.0 + g) * (1.0 + g) / (3.0 * q * q * q);
+        float beyond = t * (1.0 + alpha * squares) - wanted;
+        low = beyond > 0.0 ? low : t;
+        high = beyond > 0.0 ? t : high;
+        float cosine = henyey_greenstein_cosine(t, g);
+        float next = t - beyond / (1.0 + alpha * cosine * cosine);
+        t = next >= low && next <= high ? next : 0.5 * (low + high);
+    }
+    return henyey_greenstein_cosine(t, g);
+}
+
 // Evaluate a phase function, in 1/sr.
 float phase_value(vec4 phase, float cos_scatter) {
-    return henyey_greenstein(cos_scatter, phase.x);
+    float value = (1.0 - phase.w) * henyey_greenstein(cos_scatter, phase.x);
+    return phase.w == 0.0 ? value : value + phase.w * draine(cos_scatter, phase.y, phase.z);
 }
 
 // Sample it: a cosine distributed by it, for a random number.
 float phase_cosine(vec4 phase, float share) {
-    return henyey_greenstein_cosine(share, phase.x);
+    if (phase.w > 0.0 && share <= phase.w) { return draine_cosine(share / phase.w, phase.y, phase.z); }
+    return henyey_greenstein_cosine((share - phase.w) / (1.0 - phase.w), phase.x);
 }

@@ -20,7 +20,7 @@ HOST_ONLY = {
     "lights": {"light_cone"},
     "camera": {"check_size"},
     "tone": {"tone_curve"},
-    "environment": {"parse_radiance"},
+    "environment": {"filtered", "ggx_lobe", "parse_radiance", "radiance_harmonics"},
 }
 
 

@@ -61,9 +61,10 @@ SCENES = {
         ),
         60,
     ),
+    "a cloud": (tl.Scene([ball(tl.Medium(0.0, 3.0, phase=tl.WaterDroplets(2e-5)))], CAMERA, [SUN], SKY), 80),
     "two smokes, of two shapes": (
         tl.Scene(
-            [ball(SPECTRAL), ball(tl.Medium(0.1, (4.0, 2.0, 0.2), anisotropy=-0.8), mesh=CORE)],
+            [ball(SPECTRAL), ball(tl.Medium(0.1, (4.0, 2.0, 0.2), phase=tl.Draine(-0.5, 10.0)), mesh=CORE)],
             CAMERA,
             [SUN, tl.PointLight((2.0, 2.0, 3.0), 8.0)],
             BLACK,

@@ -11,9 +11,10 @@ import pytest
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.formulas.phase import henyey_greenstein
+from translucent.formulas.phase import ISOTROPIC
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes.light_views import LightViewsPass
+from translucent.reference.phase import phase_value
 
 BLACK = tl.Environment.constant((0.0, 0.0, 0.0))
 LIGHTS = {
@@ -36,13 +37,15 @@ def opengl_follows_lights(request: pytest.FixtureRequest, renderer: tl.Renderer)
         pytest.skip("this OpenGL has no shader storage buffers, without which no light is followed")
 
 
-def ball_scene(light: Any, extinction: float, anisotropy: float = 0.0) -> tl.Scene:
-    medium = tl.Medium(absorption=0.5 * extinction, scattering=0.5 * extinction, anisotropy=anisotropy)
+def ball_scene(light: Any, extinction: float, phase: tl.PhaseFunction | None = None) -> tl.Scene:
+    medium = tl.Medium(absorption=0.5 * extinction, scattering=0.5 * extinction, phase=phase)
     camera = tl.Camera.orthographic((0, 0, -5), (0, 0, 0), height=2.2)
     return tl.Scene([tl.Object(BALL, medium)], camera, lights=[light], environment=BLACK)
 
 
-def exact_radiance(scene: tl.Scene, extinction: float, anisotropy: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def exact_radiance(
+    scene: tl.Scene, extinction: float, phase: tl.PhaseFunction = ISOTROPIC
+) -> tuple[np.ndarray, np.ndarray]:
     """(pixels,) scattered once in the unit sphere, by Gauss-Legendre on 32 graded panels, and (pixels,) half chords."""
     light = scene.lights[0]
     origins, directions = (a.reshape(-1, 3) for a in scene.camera.rays(SIZE))
@@ -68,8 +71,8 @@ def exact_radiance(scene: tl.Scene, extinction: float, anisotropy: float = 0.0) 
             way = np.minimum(way, r)
         with np.errstate(under="ignore"):
             seen = np.exp(-extinction * (s + way)) * power
-        phase = henyey_greenstein((towards * directions[:, None]).sum(axis=-1), anisotropy)
-        total += (high - low) * half * (weights * seen * phase).sum(axis=1)
+        turned = phase_value(phase, (towards * directions[:, None]).sum(axis=-1))
+        total += (high - low) * half * (weights * seen * turned).sum(axis=1)
     return 0.5 * extinction * total, half
 
 
@@ -89,10 +92,14 @@ def test_a_sphere_in_closed_form(renderer: tl.Renderer, light: str, depth: float
         assert rms <= bar
 
 
-@pytest.mark.parametrize("anisotropy", [-0.6, 0.3, 0.9])
-def test_the_phase_function_is_that_of_the_medium(renderer: tl.Renderer, anisotropy: float) -> None:
-    scene = ball_scene(LIGHTS["behind"], 2.0, anisotropy)
-    truth, half = exact_radiance(scene, 2.0, anisotropy)
+@pytest.mark.parametrize(
+    "phase",
+    [*map(tl.HenyeyGreenstein, (-0.6, 0.3, 0.9)), tl.Draine(0.0, 1.0), tl.Draine(-0.5, 10.0), tl.WaterDroplets(1e-5)],
+    ids=str,
+)
+def test_the_phase_function_is_that_of_the_medium(renderer: tl.Renderer, phase: tl.PhaseFunction) -> None:
+    scene = ball_scene(LIGHTS["behind"], 2.0, phase)
+    truth, half = exact_radiance(scene, 2.0, phase)
     frame = renderer.render(scene, SIZE, tl.FragmentLists(light_points=8))
     relative = frame.radiance[..., 0].ravel()[half > 0.2] / truth[half > 0.2] - 1
     assert np.sqrt((relative**2).mean()) <= 0.004

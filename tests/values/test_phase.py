@@ -12,8 +12,10 @@ import pytest
 
 import translucent as tl
 from translucent.formulas.phase import (
+    Draine,
     HenyeyGreenstein,
     PhaseFunction,
+    WaterDroplets,
     henyey_greenstein,
     parse_phase,
     phase_cosine,
@@ -22,7 +24,11 @@ from translucent.reference import phase as reference
 
 EPS = float(np.finfo(np.float64).eps)
 
-PHASES: list[PhaseFunction] = [HenyeyGreenstein(g) for g in (-0.9, -0.3, 0.0, 1e-9, 0.5, 0.9)]
+PHASES: list[PhaseFunction] = [
+    *(HenyeyGreenstein(g) for g in (-0.9, -0.3, 0.0, 1e-9, 0.5, 0.9)),
+    *(Draine(g, alpha) for g in (-0.9, 0.0, 0.5, 0.9) for alpha in (0.0, 1.0, 30.0)),
+    *(WaterDroplets(diameter) for diameter in (5e-6, 2e-5, 5e-5)),
+]
 
 
 def _sphere_rule() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
@@ -74,23 +80,23 @@ def test_moments_are_integrals_over_the_sphere(phase: PhaseFunction) -> None:
     cosine, weight = _sphere_rule()
     found = np.polynomial.legendre.legvander(cosine, 5).T @ (weight * phase.value(cosine))
     # Rounding of the cosine against the width of the peak, as above, times the slope 15 of the fifth polynomial at 1.
-    tolerance = 100 * EPS / (1 - abs(phase.parameters[0])) ** 2 + 1e-13
+    tolerance = 100 * EPS / (1 - max(map(abs, phase.parameters[:2]))) ** 2 + 1e-13
     np.testing.assert_allclose(found, phase.moments(6), atol=tolerance)
     assert phase.mean_cosine == pytest.approx(found[1], abs=tolerance)
 
 
 @pytest.mark.parametrize("phase", PHASES, ids=str)
-def test_shares_of_light_turn_further_than_the_sampled_cosine(phase: PhaseFunction) -> None:
-    """Between neighboring sampled cosines lies the share of light that their random numbers are apart by."""
-    share = np.linspace(0, 1, 65)
-    cosine = phase_cosine(phase.parameters, share)
-    assert cosine[0] == pytest.approx(-1, abs=1e-7)
-    assert cosine[-1] == pytest.approx(1, abs=1e-12)
+def test_sampled_cosines_follow_the_phase_function(phase: PhaseFunction) -> None:
+    """Below any cosine are as many samples, for random numbers at even steps, as the phase function has light there."""
+    number = 40000
+    found = np.sort(phase_cosine(phase.parameters, (np.arange(number) + 0.5) / number))
     nodes, weights = np.polynomial.legendre.leggauss(40)
-    low, high = cosine[:-1, None], cosine[1:, None]
+    edges = np.concatenate([[-1.0], found[::500], [1.0]])
+    low, high = edges[:-1, None], edges[1:, None]
     between = 2 * np.pi * (phase.value(low + (high - low) * (nodes + 1) / 2) * weights * (high - low) / 2).sum(axis=1)
-    # 1e-10: the inversion; where the phase function is as steep as its width, rounding of the cosine adds to it.
-    np.testing.assert_allclose(between, 1 / 64, atol=1e-10)
+    expected = np.searchsorted(found, edges[1:-1]) / number
+    # A sample stands for 1 / 40000 of the light; both parts of a mixture leave half of one.
+    np.testing.assert_allclose(np.cumsum(between)[:-1], expected, atol=1.5 / number)
 
 
 @pytest.mark.parametrize("phase", PHASES, ids=str)
@@ -119,6 +125,9 @@ def test_phase_functions_as_text(phase: PhaseFunction) -> None:
         ("henyey_greenstein", "not 1 numbers"),
         ("henyey_greenstein a", "not 1 numbers"),
         ("henyey_greenstein 1", "not between -1 and 1"),
+        ("draine 1 2", "not between -1 and 1"),
+        ("draine 0.5 -1", "not in 0 to"),
+        ("water_droplets 20", "not of 5e-6 to 5e-5 m"),
     ],
 )
 def test_text_that_is_no_phase_function(text: str, message: str) -> None:
@@ -134,3 +143,19 @@ def test_a_medium_with_a_phase_function_has_its_mean_cosine() -> None:
     assert dataclasses.replace(medium, ior=1.3).phase_function == phase
     with pytest.raises(tl.InputError, match="give one of the two"):
         tl.Medium(scattering=1.0, anisotropy=0.3, phase=phase)
+
+
+def test_special_cases_of_draine() -> None:
+    """Rayleigh's, and that of Cornette and Shanks."""
+    cosine = np.linspace(-1, 1, 41)
+    np.testing.assert_allclose(Draine(0, 1).value(cosine), 3 / (16 * math.pi) * (1 + cosine**2), rtol=1e-14)
+    g = 0.7
+    shanks = 3 / (8 * math.pi) * (1 - g * g) * (1 + cosine**2) / ((2 + g * g) * (1 + g * g - 2 * g * cosine) ** 1.5)
+    np.testing.assert_allclose(Draine(g, 1).value(cosine), shanks, rtol=1e-13)
+
+
+def test_droplets_scatter_as_mie_has_it() -> None:
+    """The mean cosine of droplets of water is 0.84 to 0.88 by Mie's theory, and rises with size."""
+    means = [WaterDroplets(d).mean_cosine for d in (5e-6, 1e-5, 2e-5, 5e-5)]
+    assert all(0.82 < mean < 0.90 for mean in means)
+    assert means == sorted(means)

@@ -19,6 +19,7 @@ from translucent.media.preset import PAPERS, Preset
 NAMES = sorted(tl.presets())
 MEASURED = [name for name in NAMES if tl.preset(name).kind == "measured"]
 ESTIMATED = [name for name in NAMES if tl.preset(name).kind == "estimated"]
+DROPLETS = {"cloud": (0.4, 2e-5), "fog": (0.05, 1e-5)}  # g/m^3 of water, and metres
 
 #: Names that were there from the start: other people's files use them.
 FIRST = [
@@ -125,7 +126,7 @@ def test_a_centimetre_of_chardonnay() -> None:
 
 
 def test_estimated_presets_have_their_colors_at_their_distances() -> None:
-    assert sorted(COLORS) == ESTIMATED
+    assert sorted([*COLORS, *DROPLETS]) == sorted(ESTIMATED)
     for name, (color, distance) in COLORS.items():
         found = tl.preset(name)
         assert np.exp(-found.absorption * distance) == pytest.approx(color, rel=4e-15), name
@@ -133,6 +134,16 @@ def test_estimated_presets_have_their_colors_at_their_distances() -> None:
         assert found.scattering == pytest.approx(1e3 * np.array(scattering), rel=1e-15), name
         assert (found.roughness, found.medium.anisotropy) == (roughness, 0), name
         assert found.reduced == found.medium.scatters == (name in SCATTERING), name
+
+
+@pytest.mark.parametrize("name", DROPLETS)
+def test_clouds_and_fog_are_droplets_of_water(name: str) -> None:
+    """They take twice the light that falls on them: twice their projected area in each cubic metre."""
+    (grams, diameter), found = DROPLETS[name], tl.preset(name)
+    number = 1e-6 * grams / (math.pi / 6 * diameter**3)
+    assert found.scattering == pytest.approx(2 * number * math.pi / 4 * diameter**2, rel=1e-12)
+    assert found.medium.phase == tl.WaterDroplets(diameter)
+    assert found.channel_anisotropy == (found.medium.anisotropy,) * 3
 
 
 def test_a_solid_that_scatters_is_translucent_over_millimetres() -> None:
@@ -189,10 +200,10 @@ def test_a_preset_is_complete(name: str) -> None:
     found = tl.preset(name)
     assert found.name == name
     assert re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name)
-    assert found.source in PAPERS if found.kind == "measured" else found.source.startswith("by eye")
+    assert found.source in PAPERS if found.kind == "measured" else found.source.startswith(("by eye", "by theory"))
     assert (found.medium.extinction > 0).all()
     assert found.medium.extinction.shape == found.reduced_scattering.shape == (3,)
-    assert 1 < found.medium.ior < 2
+    assert 1 < found.medium.ior < 2 or name in DROPLETS
     assert 0 <= found.medium.anisotropy < 1
 
 
@@ -245,7 +256,7 @@ def test_the_list_is_the_callers_own() -> None:
 
 @pytest.mark.parametrize("name", ["unobtainium", "", "&"])
 def test_an_unknown_name_without_a_like_gives_some(name: str) -> None:
-    message = f"preset {name!r}; not a known preset; use one of marble, skim_milk, merlot, honey, jade and 52 more"
+    message = f"preset {name!r}; not a known preset; use one of marble, skim_milk, merlot, honey, jade and 54 more"
     with pytest.raises(tl.InputError, match=re.escape(message)):
         tl.preset(name)
 

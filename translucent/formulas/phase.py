@@ -6,7 +6,9 @@ Functions have twins of the same name in ``shaders/lib/phase.glsl``; a phase fun
 References
 ----------
 Henyey & Greenstein 1941, "Diffuse radiation in the galaxy"; Witt 1977, "Multiple scattering in reflection nebulae", for
-directions by chance.
+directions by chance; Draine 2003, "Scattering by interstellar dust grains"; Jendersie & d'Eon 2023, "An approximate Mie
+scattering function for fog and cloud rendering"; Cornette & Shanks 1992 is Draine's with alpha = 1, and Rayleigh 1871
+with g = 0 besides.
 """
 
 from __future__ import annotations
@@ -21,7 +23,17 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.errors import InputError
 
-#: Parameters of a phase function as tables and shaders have them.
+#: Steps of Newton's method, or halvings of its bracket, that `draine_cosine` takes.
+DRAINE_STEPS = 24
+
+#: Largest alpha of Draine's phase function: its lobes are then those of cos^2.
+MAX_ALPHA = 1e4
+
+#: Range of the droplets that `WaterDroplets` fits, in metres.
+DROPLETS = 5e-6, 50e-6
+
+#: Parameters of a phase function as tables and shaders have them: g of Henyey and Greenstein; g and alpha of Draine,
+#: and the share of the light that the latter scatters.
 Parameters = tuple[float, float, float, float]
 
 
@@ -54,14 +66,53 @@ def henyey_greenstein_cosine(share: npt.ArrayLike, anisotropy: npt.ArrayLike) ->
         return np.clip(0.5 * ((a + g) * (1.0 + root) / (1.0 + g * a) + g), -1.0, 1.0)
 
 
+def draine(cos_scatter: npt.ArrayLike, anisotropy: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
+    """Phase function of Draine 2003 in 1/sr: Henyey and Greenstein's times 1 + alpha cos^2, normalised."""
+    g, a = np.asarray(anisotropy, dtype=np.float64), np.asarray(alpha, dtype=np.float64)
+    cosine = np.asarray(cos_scatter, dtype=np.float64)
+    with np.errstate(under="ignore"):
+        squares = (1.0 + 2.0 * g * g) / 3.0  # mean of cos^2 by Henyey and Greenstein
+        return np.asarray(henyey_greenstein(cosine, g) * (1.0 + a * cosine * cosine) / (1.0 + a * squares))
+
+
+@np.errstate(under="ignore")
+def draine_cosine(share: npt.ArrayLike, anisotropy: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
+    """Cosine of which a share, 0 to 1, of the light that Draine's phase function scatters turns further.
+
+    With t, that share by Henyey and Greenstein, it is the integral of 1 + alpha cos^2 over t: in q = 1 - g + 2 g t, the
+    integral of cos^2 is t (m^2 + t^2 (1 - g) (1 + g)^4 / (3 q^3)) with m = (t (1 + g^2) - (1 - g)) / q, in which
+    nothing cancels. It rises with t, and is solved for by Newton's method in a bracket.
+    """
+    share, g, a = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (share, anisotropy, alpha)))
+    wanted = share * (1.0 + a * (1.0 + 2.0 * g * g) / 3.0)
+    low, high, t = np.zeros(share.shape), np.ones(share.shape), share
+    for _ in range(DRAINE_STEPS):
+        q = 1.0 - g + 2.0 * g * t
+        middle = (t * (1.0 + g * g) - (1.0 - g)) / q
+        squares = middle**2 + t * t * (1.0 - g) * (1.0 + g) ** 4 / (3.0 * q**3)
+        beyond = t * (1.0 + a * squares) - wanted
+        low, high = np.where(beyond > 0, low, t), np.where(beyond > 0, t, high)
+        following = t - beyond / (1.0 + a * henyey_greenstein_cosine(t, g) ** 2)
+        t = np.where((following >= low) & (following <= high), following, 0.5 * (low + high))
+    return henyey_greenstein_cosine(t, g)
+
+
 def phase_value(phase: npt.ArrayLike, cos_scatter: npt.ArrayLike) -> Array:
     """Phase function in 1/sr at the cosine (...,) of the angle that light turns by, of `parameters` (..., 4)."""
-    return henyey_greenstein(cos_scatter, np.asarray(phase, np.float64)[..., 0])
+    g, draine_g, alpha, weight = np.moveaxis(np.asarray(phase, np.float64), -1, 0)
+    parts = henyey_greenstein(cos_scatter, g), draine(cos_scatter, draine_g, alpha)
+    return np.asarray((1.0 - weight) * parts[0] + weight * parts[1])
 
 
 def phase_cosine(phase: npt.ArrayLike, share: npt.ArrayLike) -> Array:
     """Cosine (...,) of the angle that light turns by, at random: `share` (...,) is a random number, 0 to 1."""
-    return henyey_greenstein_cosine(share, np.asarray(phase, np.float64)[..., 0])
+    g, draine_g, alpha, weight = np.moveaxis(np.asarray(phase, np.float64), -1, 0)
+    share = np.asarray(share, np.float64)
+    # Of the two of the mixture, one scatters the first shares and the other the rest.
+    first = np.minimum(share / np.where(weight > 0, weight, 1.0), 1.0)
+    second = np.clip((share - weight) / np.where(weight < 1, 1.0 - weight, 1.0), 0.0, 1.0)
+    draines = (weight > 0) & (share <= weight)
+    return np.where(draines, draine_cosine(first, draine_g, alpha), henyey_greenstein_cosine(second, g))
 
 
 class PhaseFunction(ABC):
@@ -120,11 +171,88 @@ class HenyeyGreenstein(PhaseFunction):
             return np.asarray(self.anisotropy ** np.arange(count), dtype=np.float64)
 
 
+@dataclass(frozen=True)
+class Draine(PhaseFunction):
+    """Phase function of Draine 2003, for dust and small grains: it sends more light back.
+
+    Parameters
+    ----------
+    g : float
+        Of Henyey and Greenstein's part, -1 < g < 1; the mean cosine is larger.
+    alpha : float
+        0 and above: Henyey and Greenstein's, 1: Cornette and Shanks', and with g = 0 Rayleigh's.
+    """
+
+    name: ClassVar[str] = "draine"
+
+    g: float
+    alpha: float
+
+    def __post_init__(self) -> None:
+        if not -1 < self.g < 1:
+            raise InputError(f"Draine's g {self.g}", "not between -1 and 1", "give for example 0.6")
+        if not 0 <= self.alpha <= MAX_ALPHA:
+            raise InputError(f"Draine's alpha {self.alpha}", f"not in 0 to {MAX_ALPHA:g}", "give for example 1")
+
+    @property
+    def parameters(self) -> Parameters:
+        """(0, g, alpha, 1)."""
+        return 0.0, self.g, self.alpha, 1.0
+
+    def moments(self, count: int) -> Array:
+        """Those of Henyey and Greenstein's g^n, with cos^2 P_n as a sum of P_(n-2), P_n and P_(n+2)."""
+        # cos P_n = (1 - d_n) P_(n+1) + d_n P_(n-1)
+        n = np.arange(-1, count + 1)
+        down = n / (2 * n + 1)
+        before, own, after = down[:-2], down[1:-1], down[2:]
+        powers = HenyeyGreenstein(self.g).moments(count + 2)
+        squares = (1 - own) * (1 - after) * powers[2:] + ((1 - own) * after + own * (1 - before)) * powers[:-2]
+        squares[2:] += (own * before)[2:] * powers[:-4]
+        return np.asarray((powers[:-2] + self.alpha * squares) / (1.0 + self.alpha * squares[0]))
+
+
+@dataclass(frozen=True)
+class WaterDroplets(PhaseFunction):
+    """Phase function of the droplets of fog and clouds: the fit of Jendersie and d'Eon 2023 to Mie's theory.
+
+    Parameters
+    ----------
+    diameter : float
+        In metres, 5e-6 to 5e-5: 1e-5 in fog, 2e-5 in clouds.
+    """
+
+    name: ClassVar[str] = "water_droplets"
+
+    diameter: float
+
+    def __post_init__(self) -> None:
+        if not DROPLETS[0] <= self.diameter <= DROPLETS[1]:
+            raise InputError(
+                f"water droplets of {self.diameter:g} m", "not of 5e-6 to 5e-5 m", "give for example 2e-5 for a cloud"
+            )
+
+    @property
+    def parameters(self) -> Parameters:
+        """Equations 4 to 7 of the paper."""
+        d = 1e6 * self.diameter
+        g = np.exp(-0.0990567 / (d - 1.67154))
+        draine_g = np.exp(-2.20679 / (d + 3.91029) - 0.428934)
+        alpha = np.exp(3.62489 - 8.29288 / (d + 5.52825))
+        weight = np.exp(-0.599085 / (d - 0.641583) - 0.665888)
+        return float(g), float(draine_g), float(alpha), float(weight)
+
+    def moments(self, count: int) -> Array:
+        """Those of both parts, by their shares."""
+        g, draine_g, alpha, weight = self.parameters
+        parts = HenyeyGreenstein(g).moments(count), Draine(draine_g, alpha).moments(count)
+        return (1.0 - weight) * parts[0] + weight * parts[1]
+
+
 #: Phase function of light that turns everywhere alike.
 ISOTROPIC = HenyeyGreenstein()
 
 #: Phase functions by their names.
-PHASE_FUNCTIONS: dict[str, type[PhaseFunction]] = {one.name: one for one in (HenyeyGreenstein,)}
+PHASE_FUNCTIONS: dict[str, type[PhaseFunction]] = {one.name: one for one in (HenyeyGreenstein, Draine, WaterDroplets)}
 
 
 def parse_phase(text: str) -> PhaseFunction:

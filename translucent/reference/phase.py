@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
-from translucent.formulas.phase import HenyeyGreenstein, PhaseFunction
+from translucent.formulas.phase import Draine, HenyeyGreenstein, PhaseFunction, WaterDroplets
 
 
 def phase_value(phase: PhaseFunction, cosine: Array) -> Array:
@@ -16,6 +16,12 @@ def phase_value(phase: PhaseFunction, cosine: Array) -> Array:
     match phase:
         case HenyeyGreenstein(g):
             return _henyey_greenstein(cosine, g)
+        case Draine(g, alpha):
+            # Its norm: half the integral of cos^2 times Henyey and Greenstein's is (1 + 2 g^2) / 3.
+            return _henyey_greenstein(cosine, g) * (1 + alpha * cosine**2) / (1 + alpha * (1 + 2 * g**2) / 3)
+        case WaterDroplets(diameter):
+            parts, weight = _droplets(diameter)
+            return (1 - weight) * phase_value(parts[0], cosine) + weight * phase_value(parts[1], cosine)
     raise NotImplementedError(f"the reference has no {phase.name}")
 
 
@@ -38,7 +44,7 @@ def scattered_directions(
     angle = 2.0 * np.pi * rng.random(len(directions))
     for number, phase in enumerate(phases):
         own = chosen == number
-        cosine[own] = _cosines(phase, u[own])
+        cosine[own] = _cosines(phase, u[own], rng)
     sine = np.sqrt(np.maximum((1.0 - cosine) * (1.0 + cosine), 0.0))
     across, up = _frame(directions)
     with np.errstate(under="ignore"):
@@ -47,11 +53,22 @@ def scattered_directions(
     return np.asarray(scattered / np.linalg.norm(scattered, axis=1, keepdims=True))
 
 
-def _cosines(phase: PhaseFunction, u: Array) -> Array:
-    """Cosines distributed by a phase function, for numbers `u` (k,) evenly distributed over 0 to 1."""
+def _cosines(phase: PhaseFunction, u: Array, rng: np.random.Generator) -> Array:
+    """Cosines distributed by a phase function, for numbers `u` (k,) evenly distributed over 0 to 1, and others."""
     match phase:
         case HenyeyGreenstein(g):
             return henyey_greenstein_cosine(u, g)
+        case Draine(g, alpha):
+            # By rejection: Henyey and Greenstein's, each kept by the chance (1 + alpha cos^2) / (1 + alpha).
+            cosine = henyey_greenstein_cosine(u, g)
+            left = np.arange(len(u))
+            while len(left := left[rng.random(len(left)) * (1 + alpha) > 1 + alpha * cosine[left] ** 2]):
+                cosine[left] = henyey_greenstein_cosine(rng.random(len(left)), g)
+            return cosine
+        case WaterDroplets(diameter):
+            parts, weight = _droplets(diameter)
+            second = rng.random(len(u)) < weight
+            return np.where(second, _cosines(parts[1], u, rng), _cosines(parts[0], u, rng))
     raise NotImplementedError(f"the reference has no {phase.name}")
 
 
@@ -60,6 +77,14 @@ def _henyey_greenstein(cosine: Array, g: float) -> Array:
     ahead = 1.0 - cosine if g >= 0 else 1.0 + cosine
     base = (1.0 - abs(g)) ** 2 + 2.0 * abs(g) * ahead
     return np.asarray((1.0 - g) * (1.0 + g) / (4.0 * np.pi * base * np.sqrt(base)))
+
+
+def _droplets(diameter: float) -> tuple[tuple[HenyeyGreenstein, Draine], float]:
+    """The two parts of light that water droplets scatter, and the share of the second: Jendersie and d'Eon 2023."""
+    um = diameter / 1e-6
+    g_hg, g_d = np.exp(-0.0990567 / (um - 1.67154)), np.exp(-2.20679 / (um + 3.91029) - 0.428934)
+    alpha, w_d = np.exp(3.62489 - 8.29288 / (um + 5.52825)), np.exp(-0.599085 / (um - 0.641583) - 0.665888)
+    return (HenyeyGreenstein(float(g_hg)), Draine(float(g_d), float(alpha))), float(w_d)
 
 
 def henyey_greenstein_cosine(u: npt.ArrayLike, g: float) -> Array:
