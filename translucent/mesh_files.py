@@ -16,11 +16,9 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from translucent.errors import InputError
-from translucent.files.memory import require_memory
 from translucent.files.paths import require_file
-from translucent.files.reading import open_file, require_room, shown, size_text
-from translucent.geometry.mesh import PER_TRIANGLE, Mesh, adopted, mended
-from translucent.geometry.triangles import Triangles, joined
+from translucent.files.reading import open_file, require_memory, require_room, shown, size_text
+from translucent.geometry.mesh import PER_TRIANGLE, Mesh, Triangles, adopted, joined, mended
 from translucent.gltf.whole import read_whole
 from translucent.units import metres_per_unit
 

@@ -152,7 +152,7 @@ def test_render_refuses_a_bad_option_and_writes_nothing(
 def test_a_size_is_refused_that_nobody_waits_for_or_memory_holds(
     run: Run, cube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, options: list[str], message: str
 ) -> None:
-    monkeypatch.setattr("translucent.files.memory.free_memory", lambda: 10**9)
+    monkeypatch.setattr("translucent.files.reading.free_memory", lambda: 10**9)
     assert message in one_error_line(run("render", cube, "-o", tmp_path / name, *options))
     assert not (tmp_path / name).exists()
 

@@ -19,15 +19,13 @@ from scipy.sparse.csgraph import connected_components
 
 import translucent as tl
 from tests.values.handmade import CORNERS, CUBE, ball, changed, cube, inverted, joined, moebius
-from translucent.geometry import grouping, repair, sample_lines
+from translucent.geometry import grouping, repair, winding
 from translucent.geometry.diagnosis import FIRST, Finding, diagnose
 from translucent.geometry.grouping import connected, equal_rows, extent, side_blocks, sorted_pairs, sorted_sides
-from translucent.geometry.line_crossings import line_crossings
 from translucent.geometry.mesh import Mesh, mended
-from translucent.geometry.nearness import near_points
-from translucent.geometry.repair import spread_winding
+from translucent.geometry.repair import near_points, spread_winding
 from translucent.geometry.solids import Torus
-from translucent.geometry.winding import part_volumes
+from translucent.geometry.winding import line_crossings, part_volumes
 
 FACES = arrays.arrays(np.int32, st.tuples(st.integers(1, 25), st.just(3)), elements=st.integers(0, 8))
 
@@ -253,12 +251,12 @@ def test_the_volumes_of_parts_are_those_of_each_alone() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_faces_that_are_left_out_meet_no_line(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Corners on lines, between them, and beyond all of them."""
-    monkeypatch.setattr(sample_lines, "_FEW", 0)
+    monkeypatch.setattr(winding, "_FEW", 0)
     rng = np.random.default_rng(seed)
     scaled, faces = rng.integers(-6, 16, size=(300, 2)) / 2.0, rng.integers(300, size=(400, 3))
     scaled[150:] += rng.uniform(-0.4, 0.4, size=(150, 2))
     heights = rng.random(300)
-    near = sample_lines._near_lines(scaled, faces, 5)
+    near = winding._near_lines(scaled, faces, 5)
     found = [
         np.concatenate([np.stack(part) for part in line_crossings(scaled, heights, chosen, (5, 5))], axis=1)
         for chosen in (faces, faces[near])

@@ -10,8 +10,7 @@ import pytest
 from translucent.arrays import Array
 from translucent.formulas import diffuse_interface as diffuse
 from translucent.formulas import optics
-from translucent.formulas.diffuse_interface import half_space_reflectance
-from translucent.formulas.half_space import bare_half_space
+from translucent.formulas.diffuse_interface import bare_half_space, half_space_reflectance
 from translucent.formulas.phase import HenyeyGreenstein
 from translucent.reference import slabs
 

@@ -10,14 +10,14 @@ import trimesh
 
 import translucent as tl
 from tests.values.handmade import ball
-from translucent.files import memory
+from translucent.files import reading
 from translucent.geometry.mesh import PER_TRIANGLE
 from translucent.mesh_files import PER_SOUP_TRIANGLE
 
 
 @pytest.fixture
 def body(monkeypatch: pytest.MonkeyPatch) -> trimesh.Trimesh:
-    monkeypatch.setattr(memory, "SMALL", 0)
+    monkeypatch.setattr(reading, "SMALL", 0)
     mesh = ball(3)
     return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
@@ -34,9 +34,9 @@ def test_a_mesh_is_read_where_there_is_memory_and_refused_where_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: trimesh.Trimesh, suffix: str, needed: int, found: str
 ) -> None:
     body.export(path := tmp_path / f"ball.{suffix}")
-    monkeypatch.setattr(memory, "free_memory", lambda: needed)
+    monkeypatch.setattr(reading, "free_memory", lambda: needed)
     assert len(tl.load_mesh(path).faces) == 1280
-    monkeypatch.setattr(memory, "free_memory", lambda: needed - 1)
+    monkeypatch.setattr(reading, "free_memory", lambda: needed - 1)
     with pytest.raises(tl.InputError, match=re.escape(found)) as caught:
         tl.load_mesh(path)
     assert str(caught.value).endswith("are free; close other programs, or decimate the mesh")
@@ -46,7 +46,7 @@ def test_a_text_is_counted_by_its_length(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: trimesh.Trimesh
 ) -> None:
     body.export(path := tmp_path / "ball.obj")
-    monkeypatch.setattr(memory, "free_memory", lambda: 1000)
+    monkeypatch.setattr(reading, "free_memory", lambda: 1000)
     with pytest.raises(tl.InputError, match=r"its [\d.]+ kiB of text take about"):
         tl.load_mesh(path)
 
@@ -55,8 +55,8 @@ def test_where_nobody_says_what_is_free_nothing_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: trimesh.Trimesh
 ) -> None:
     body.export(path := tmp_path / "ball.stl")
-    monkeypatch.setattr(memory, "_MACHINE", tmp_path / "none")
-    assert memory.free_memory() is None
+    monkeypatch.setattr(reading, "_MACHINE", tmp_path / "none")
+    assert reading.free_memory() is None
     assert len(tl.load_mesh(path).faces) == 1280
 
 
@@ -67,7 +67,7 @@ def test_fifty_million_triangles_are_refused_from_the_header_alone(
     with path.open("wb") as stream:
         stream.write(bytes(80) + count.to_bytes(4, "little"))
         stream.truncate(84 + 50 * count)  # sparse: it takes no room on the disk
-    monkeypatch.setattr(memory, "free_memory", lambda: 8 << 30)
+    monkeypatch.setattr(reading, "free_memory", lambda: 8 << 30)
     with pytest.raises(
         tl.InputError, match=r"its 50000000 triangles take about 16.3 GiB of memory, and 8 GiB are free"
     ):
@@ -76,11 +76,11 @@ def test_fifty_million_triangles_are_refused_from_the_header_alone(
 
 def test_the_limit_of_a_container_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "meminfo").write_text("MemTotal: 9000 kB\nMemAvailable:    8000 kB\n")
-    monkeypatch.setattr(memory, "_MACHINE", tmp_path / "meminfo")
-    monkeypatch.setattr(memory, "_GROUP", tmp_path)
-    assert memory.free_memory() == 8000 * 1024
+    monkeypatch.setattr(reading, "_MACHINE", tmp_path / "meminfo")
+    monkeypatch.setattr(reading, "_GROUP", tmp_path)
+    assert reading.free_memory() == 8000 * 1024
     for name, content in (("max", "5000"), ("current", "3000"), ("stat", "anon 1500\ninactive_file 1000\n")):
         (tmp_path / f"memory.{name}").write_text(content)
-    assert memory.free_memory() == 3000
+    assert reading.free_memory() == 3000
     (tmp_path / "memory.max").write_text("max\n")
-    assert memory.free_memory() == 8000 * 1024
+    assert reading.free_memory() == 8000 * 1024

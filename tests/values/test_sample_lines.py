@@ -9,9 +9,9 @@ import pytest
 
 import translucent as tl
 from translucent.bench.shapes import backward_window, bow_tie, inside_out_slab_beside_an_open_box, nested_shells
-from translucent.geometry import sample_lines
-from translucent.geometry.sample_lines import winds_negatively
+from translucent.geometry import winding
 from translucent.geometry.solids import Box, Sphere, Torus
+from translucent.geometry.winding import winds_negatively
 from translucent.planning.plan import plan
 
 CAMERA = tl.Camera.look_at((0, 0, 4), (0, 0, 0))
@@ -101,6 +101,6 @@ def test_faces_that_all_reach_across_the_mesh_meet_fewer_lines() -> None:
 
 
 def test_what_is_large_and_inside_out_is_found_by_few_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sample_lines, "MOST", 1000)
+    monkeypatch.setattr(winding, "MOST", 1000)
     for mesh, found in ((bow_tie(), True), (SOUND["torus"], False)):
         assert winds_negatively(mesh.vertices, mesh.faces) is found

@@ -81,7 +81,7 @@ class Pictures(NamedTuple):
 
     def _check_size(self, size: tuple[int, int]) -> None:
         """Raise if nobody could wait for pictures of this size, or memory could not hold them."""
-        from translucent.files.memory import require_memory
+        from translucent.files.reading import require_memory
 
         asked, pixels = f"--size {size[0]}x{size[1]}", size[0] * size[1]
         if pixels > MOST_PIXELS:

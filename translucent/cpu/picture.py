@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from translucent.arrays import Array, Integers
-from translucent.files.memory import require_memory
+from translucent.files.reading import require_memory
 from translucent.reference.hits import PictureGrid
 from translucent.reference.rays import Rays
 from translucent.scene.camera import Camera, check_size

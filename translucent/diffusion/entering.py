@@ -20,8 +20,7 @@ from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
 from translucent.formulas.interface import refracted_direction
 from translucent.geometry.embree import EmbreeMesh
-from translucent.geometry.mesh import Mesh
-from translucent.geometry.triangles import Triangles, joined
+from translucent.geometry.mesh import Mesh, Triangles, joined
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import row_solid_angles, texel_directions
 from translucent.scene.lights import PositionalLight

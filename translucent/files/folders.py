@@ -1,7 +1,9 @@
-"""Folders for results."""
+"""Folders: for results, and where the system expects a user's settings and caches."""
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -49,3 +51,25 @@ def make_folder(folder: Path) -> None:
         raise RenderError(
             f"folder {str(folder)!r}", f"it cannot be made ({error.strerror})", "check the path"
         ) from error
+
+
+#: Name of the toolkit's folder in each.
+NAME = "translucent"
+
+
+def config_folder() -> Path:
+    """Folder of settings; it need not be there."""
+    if sys.platform == "win32":
+        return Path(os.environ.get("APPDATA", Path.home())) / NAME
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Application Support" / NAME
+    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / NAME
+
+
+def cache_folder() -> Path:
+    """Folder of what can be made again at any time; it need not be there."""
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / NAME / "Cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / NAME
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / NAME

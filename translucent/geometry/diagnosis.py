@@ -15,8 +15,7 @@ import numpy.typing as npt
 from translucent.arrays import Array, Mask
 from translucent.geometry.grouping import CHUNK, SortedSides, connected, equal_rows, extent, sorted_sides, use_mask
 from translucent.geometry.repair import spread_winding
-from translucent.geometry.sample_lines import winds_negatively
-from translucent.geometry.winding import inside_out_parts, one_volume
+from translucent.geometry.winding import inside_out_parts, one_volume, winds_negatively
 
 #: Deepest dent of a convex body, as a share of its size.
 CONVEX_TOLERANCE = 1e-6

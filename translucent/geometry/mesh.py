@@ -308,3 +308,23 @@ def _median_edge(mesh: Mesh) -> float:
         corners = mesh.vertices.take(mesh.faces[begin : begin + CHUNK], axis=0)
         lengths[begin : begin + CHUNK] = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     return float(np.median(lengths, overwrite_input=True))
+
+
+#: Raw triangles: vertices (n, 3), faces (m, 3), and texture coordinates (n, 2) if there are some.
+Triangles = tuple[Array, npt.NDArray[np.int32], Array | None]
+
+
+def joined(parts: list[Triangles], asked: str) -> Triangles:
+    """Concatenate the triangles of all parts; raises `InputError` if there are none."""
+    if not parts:
+        raise InputError(asked, "it has no faces", "give a triangle mesh, not points or lines")
+    if len(parts) == 1:
+        return parts[0]
+    starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts[:-1])])
+    faces = [part.astype(np.int64) + start for (_, part, _), start in zip(parts, starts.tolist(), strict=True)]
+    uv = [coordinates for _, _, coordinates in parts if coordinates is not None]
+    return (
+        np.concatenate([vertices for vertices, _, _ in parts]),
+        np.concatenate(faces).astype(np.int32),
+        np.concatenate(uv) if len(uv) == len(parts) else None,
+    )

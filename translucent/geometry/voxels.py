@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
-from translucent.geometry.line_crossings import line_crossings
+from translucent.geometry.winding import line_crossings
 
 #: Lines through each cell along each axis, on a square of this side.
 LINES = 4

@@ -1,4 +1,4 @@
-"""Winding numbers of points, and parts of a mesh that are inside out."""
+"""Winding numbers of points, crossings of triangles with lines, and parts of a mesh that are inside out."""
 
 from __future__ import annotations
 
@@ -11,16 +11,190 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.errors import InputError
-from translucent.geometry.grouping import CHUNK, sorted_sides
-from translucent.geometry.line_crossings import crossings
-from translucent.geometry.sample_lines import TURNS
+from translucent.geometry.grouping import CHUNK, extent, sorted_sides, use_mask
+
+#: Pairs of a triangle and a line that are tested at a time: the working arrays take about 100 MB.
+CROSSINGS_AT_A_TIME = 1 << 18
+
+
+def line_tests(scaled: Array, faces: npt.NDArray[np.integer], lines: tuple[int, int]) -> int:
+    """Number of pairs of a face and a line that `line_crossings` would test."""
+    (_, columns), (_, rows) = _spans(scaled, faces, lines)
+    return int((columns * rows).sum())
+
+
+def line_crossings(
+    scaled: Array,
+    heights: Array,
+    faces: npt.NDArray[np.integer],
+    lines: tuple[int, int],
+    group: Integers | None = None,
+) -> Iterator[tuple[Integers, Array, Integers]]:
+    """Crossings of faces with lines at whole numbers of two coordinates, in chunks; none for a line through an edge.
+
+    Parameters
+    ----------
+    scaled : (n, 2) float64
+        Vertices across the lines, in distances between these.
+    heights : (n,) float64
+        Vertices along the lines.
+    faces : (m, 3) int
+        Counter-clockwise seen from outside.
+    lines : (int, int)
+        Lines are at 0 to below these.
+    group : (m,) int, optional
+        Of each face, to tell apart grids that are searched together.
+
+    Yields
+    ------
+    line : (k,) int64
+        Number of the line, along the second coordinate first; of a group, from there on.
+    height : (k,) float64
+    sign : (k,) int64
+        +1 where a line that goes up enters the body, -1 where it leaves.
+    """
+    first, count = zip(*_spans(scaled, faces, lines), strict=True)
+    pairs = count[0] * count[1]
+    near = np.flatnonzero(pairs)
+    ends = np.cumsum(pairs[near])
+    total = int(ends[-1]) if len(ends) else 0
+    for begin in range(0, total, CROSSINGS_AT_A_TIME):
+        pair = np.arange(begin, min(begin + CROSSINGS_AT_A_TIME, total))
+        entry = np.searchsorted(ends, pair, side="right")
+        face = near[entry]
+        inside = pair - (ends[entry] - pairs[face])
+        rows = count[1][face]
+        cell = np.stack([first[0][face] + inside // rows, first[1][face] + inside % rows], axis=1)
+        before = 0 if group is None else group[face] * lines[0]
+        line = (before + cell[:, 0]) * lines[1] + cell[:, 1]
+        corners = faces[face]
+        yield crossings(scaled[corners], heights[corners], cell, line)
+
+
+def _spans(scaled: Array, faces: npt.NDArray[np.integer], lines: tuple[int, int]) -> list[tuple[Integers, Integers]]:
+    """Two times (m,), (m,): the first line that faces may meet along one axis, and how many."""
+    found = []
+    for column, most in zip(scaled.T, lines, strict=True):
+        a, b, c = column[faces].T
+        first = np.maximum(np.ceil(np.minimum(np.minimum(a, b), c)), 0).astype(np.int64)
+        last = np.minimum(np.floor(np.maximum(np.maximum(a, b), c)), most - 1).astype(np.int64)
+        found.append((first, np.maximum(last - first + 1, 0)))
+    return found
+
+
+def crossings(triangles: Array, heights: Array, place: Array, line: Integers) -> tuple[Integers, Array, Integers]:
+    """Line, height and sign (+1 upwards into the body) of the triangles (k, 3, 2) that lines at places (k, 2) meet."""
+    relative = triangles - place[:, None, :]
+    x, y = relative[..., 0], relative[..., 1]
+    area = x[:, [1, 2, 0]] * y[:, [2, 0, 1]] - y[:, [1, 2, 0]] * x[:, [2, 0, 1]]
+    total = area.sum(axis=1)
+    met = ((area > 0).all(axis=1) | (area < 0).all(axis=1)) & (total != 0)
+    weights = area[met] / total[met, None]
+    # Counter-clockwise seen from above: the outside is up there, and a line that goes up leaves.
+    return line[met], (weights * heights[met]).sum(axis=1), -np.sign(total[met]).astype(np.int64)
+
+
+#: Lines along each side of the grid of one direction: twice the root of the number of faces, within these bounds.
+#: What is smaller than a cell can slip through.
+LINES = (12, 96)
+
+#: Pairs of a face and a line that are tested at most; scans need fewer than 100,000 as a rule. Faces that reach across
+#: the mesh, such as thousands on one edge, meet most lines, and get fewer of them.
+MOST_TESTS = 1 << 21
+
+#: Share of the diagonal on which rounding and welding may wind a surface negatively.
+NEGATIVE = 1e-5
+
+#: Number of faces below which it takes no time to test all of them against all lines.
+_FEW = 1 << 14
+
+#: Axes (columns) off those along which meshes tend to be built; and the same with each of them as the last, along which
+#: the lines run.
+_AXES = np.linalg.qr(np.array([[0.9, 0.31, 0.17], [-0.23, 0.87, 0.41], [0.11, -0.37, 0.93]]))[0]
+TURNS = np.stack([_AXES, _AXES[:, [1, 2, 0]], _AXES[:, [2, 0, 1]]])
+
+
+def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
+    """True if a sample line crosses a place around which the surface winds a negative number of times.
+
+    A closed surface that does not cross itself never does, unless a part of it is inside out; nor does one that only
+    overlaps itself. Lines that enter and leave unequally often tell nothing, and are left out.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Finite.
+    faces : (m, 3) int
+        Counter-clockwise seen from outside.
+    """
+    if not (used := use_mask(faces, len(vertices))).all():
+        vertices, faces = vertices[used], (np.cumsum(used) - 1)[faces]
+    low, high = extent(vertices)
+    diagonal = float(np.linalg.norm(high - low))
+    if not 0 < diagonal < np.inf:
+        return False
+    unit = (vertices - (low / 2 + high / 2)) / diagonal
+    lines = int(np.clip(2 * np.sqrt(len(faces)), *LINES))
+    points = (unit @ TURNS).reshape(-1, 3)
+    scaled, copies, direction = _copies(points[:, :2], faces, lines)
+    if (tests := line_tests(scaled, copies, (lines, lines))) > MOST_TESTS:
+        lines = max(int(lines * np.sqrt(MOST_TESTS / tests)), 1)
+        scaled, copies, direction = _copies(points[:, :2], faces, lines)
+    found = list(line_crossings(scaled, points[:, 2], copies, (lines, lines), direction))
+    if not found:
+        return False  # no face is as large as a cell
+    line, height, sign = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return _winds_below_zero(line, height, sign)
+
+
+def _copies(points: Array, faces: npt.NDArray[np.integer], lines: int) -> tuple[Array, Integers, Integers]:
+    """Points (3 n, 2) in distances between lines; the faces that may meet one, and the direction of each.
+
+    One copy for each direction, the lines of all along the last axis: arrays of small meshes cost more than numbers.
+    """
+    scaled, count = (points + 0.5) * lines - 0.5, len(points) // 3
+    near = [_near_lines(scaled[i * count : (i + 1) * count], faces, lines) for i in range(3)]
+    copies = np.concatenate([faces[one] + count * i for i, one in enumerate(near)])
+    return scaled, copies, np.repeat(np.arange(3), [len(one) for one in near])
+
+
+def _near_lines(scaled: Array, faces: npt.NDArray[np.integer], lines: int) -> Integers:
+    """Numbers of the faces that may meet a line at whole numbers of both coordinates; most of a fine mesh do not."""
+    near = np.arange(len(faces))
+    if len(faces) < _FEW:
+        return near
+    for column in scaled.T:
+        held = column.clip(-0.5, lines - 0.5)
+        # Odd between two lines, and even on one; a face that lies on one has no area across the lines.
+        step = (np.ceil(held) + np.floor(held)).astype(np.int16)
+        a, b, c = (step.take(faces[near, i]) for i in range(3))
+        near = near[(a != b) | (b != c)]
+    return near
+
+
+def _winds_below_zero(line: Integers, height: Array, sign: Integers) -> bool:
+    """True if a balanced line winds negatively for longer than rounding explains."""
+    if len(line) == 0:
+        return False
+    order = np.lexsort((height, line))
+    line, height, sign = line[order], height[order], sign[order]
+    winding = np.cumsum(sign)
+    begins = np.flatnonzero(np.diff(line, prepend=-1) != 0)
+    of = np.cumsum(np.diff(line, prepend=-1) != 0) - 1
+    before = winding[begins] - sign[begins]
+    last = np.append(begins[1:], len(line)) - 1
+    balanced = winding[last] == before
+    inner = np.append(line[1:] == line[:-1], False) & balanced[of] & (winding < before[of])
+    lengths = np.diff(height, append=0.0)[inner]
+    return bool(np.bincount(of[inner], lengths).max(initial=0.0) > NEGATIVE)
+
 
 #: Smallest negative volume of an inside-out part, as a share of its cubed size: less is rounding.
 _FLAT = 1e-12
 
 #: Pairs of a face and a point that are tested at a time, and at most: parts that all lie one in another have as many as
 #: the square of their number.
-BLOCK, MOST = 1 << 18, 1 << 25
+BLOCK, MOST_PAIRS = 1 << 18, 1 << 25
 
 
 def winding_number(corners: Array, point: npt.ArrayLike) -> float:
@@ -176,7 +350,7 @@ def _pairs(triangles: Array, points: Array) -> Iterator[tuple[Integers, Integers
         first = np.searchsorted(key, strip * (count + 1) + bottom[triangle])
         runs = np.searchsorted(key, strip * (count + 1) + top[triangle]) - first
         ends = np.cumsum(runs)
-        if (tests := tests + int(ends[-1])) > MOST:
+        if (tests := tests + int(ends[-1])) > MOST_PAIRS:
             found = f"{count} of them that look inwards lie one in another"
             raise InputError("parts of a mesh", found, "remove what is there twice, or split the mesh")
         for part in np.split(np.arange(len(runs)), np.searchsorted(ends, np.arange(BLOCK, ends[-1], BLOCK))):

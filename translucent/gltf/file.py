@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from translucent.errors import InputError, UnreadableError
-from translucent.files.memory import require_memory
-from translucent.files.reading import json_value, linked_file, open_file, read_bytes, size_text
+from translucent.files.reading import json_value, linked_file, open_file, read_bytes, require_memory, size_text
 
 Json = dict[str, Any]
 

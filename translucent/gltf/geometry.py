@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
-from translucent.files.memory import require_memory
+from translucent.files.reading import require_memory
 from translucent.geometry.grouping import use_mask
 from translucent.geometry.mesh import PER_TRIANGLE, Mesh, adopted, mended
 from translucent.gltf.accessors import Accessors

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from translucent.files.reading import require_room
-from translucent.geometry.mesh import Mesh
-from translucent.geometry.triangles import Triangles, joined
+from translucent.geometry.mesh import Mesh, Triangles, joined
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.fields import refused
 from translucent.gltf.file import read_gltf

@@ -10,10 +10,9 @@ from importlib.resources import files
 from pathlib import Path
 
 from translucent.errors import LEAST_PART, InputError, close_names, did_you_mean
-from translucent.files.folders import make_folder
+from translucent.files.folders import config_folder, make_folder
 from translucent.files.paths import write_text_atomically
 from translucent.files.reading import read_text
-from translucent.files.user_folders import config_folder
 from translucent.media.preset import Preset, preset_text, read_good_presets, read_presets
 
 #: Group of own presets that name none.

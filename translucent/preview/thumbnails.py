@@ -17,10 +17,9 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.assets import newest_shader
 from translucent.errors import TranslucentError
-from translucent.files.folders import make_folder
+from translucent.files.folders import cache_folder, make_folder
 from translucent.files.images import write_png
 from translucent.files.paths import write_atomically
-from translucent.files.user_folders import cache_folder
 from translucent.formulas.color import linear_to_srgb
 from translucent.formulas.tone import tone_curve
 from translucent.geometry.mesh import Mesh

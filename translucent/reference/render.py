@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.files.memory import require_memory
+from translucent.files.reading import require_memory
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
 from translucent.planning.choices import RenderChoices
