@@ -244,7 +244,7 @@ def test_parts_are_compared_with_those_around_them_alone(monkeypatch: pytest.Mon
     ball, inner = Sphere(radius=0.3).tessellate(4), Sphere(radius=0.1).tessellate(4)
     places = [(i % 20 + 0.01 * i, i // 20, 0.1 * (i % 7)) for i in range(400)]
     apart = [Mesh(one.vertices + at, one.faces[:, ::-1]) for at in places for one in (ball, inner)]
-    monkeypatch.setattr(winding, "MOST", 20 * sum(len(part.faces) for part in apart))  # of 2,400,000 per part
+    monkeypatch.setattr(winding, "MOST_PAIRS", 20 * sum(len(part.faces) for part in apart))  # of 2,400,000 per part
     with pytest.warns(tl.TranslucentWarning, match="turned 400 closed parts outwards"):
         assert mended(joined(*apart)).volume == pytest.approx(400 * (ball.volume - inner.volume))
     bubbles = [Box((-1, -1, -1), (30, 30, 2)).tessellate(1), *apart[::2]]
@@ -252,7 +252,7 @@ def test_parts_are_compared_with_those_around_them_alone(monkeypatch: pytest.Mon
 
 
 def test_parts_that_all_lie_one_in_another_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(winding, "MOST", 1000)
+    monkeypatch.setattr(winding, "MOST_PAIRS", 1000)
     nested = [Sphere(radius=i).tessellate(4) for i in range(1, 40)]
     with pytest.raises(tl.InputError, match="39 of them that look inwards lie one in another"):
         mended(joined(*(inverted(one) for one in nested)))

@@ -101,6 +101,6 @@ def test_faces_that_all_reach_across_the_mesh_meet_fewer_lines() -> None:
 
 
 def test_what_is_large_and_inside_out_is_found_by_few_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(winding, "MOST", 1000)
+    monkeypatch.setattr(winding, "MOST_TESTS", 1000)
     for mesh, found in ((bow_tie(), True), (SOUND["torus"], False)):
         assert winds_negatively(mesh.vertices, mesh.faces) is found

@@ -223,5 +223,5 @@ def test_a_mesh_without_volume_is_empty() -> None:
 def test_a_body_of_many_chunks_is_that_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pairs of triangles and lines are tested some at a time."""
     plain = cut(BALL, 0.3)
-    monkeypatch.setattr("translucent.geometry.winding.CHUNK", 50)
+    monkeypatch.setattr("translucent.geometry.winding.CROSSINGS_AT_A_TIME", 50)
     np.testing.assert_array_equal(cut(BALL, 0.3).inside, plain.inside)
