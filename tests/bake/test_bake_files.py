@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import json
 import subprocess
@@ -236,7 +237,33 @@ def test_a_record_that_cannot_be_written_is_an_error(
     monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(tl.RenderError, match="No space left"):
         save_map(make_map(ramp), tmp_path / "t.npy")
-    assert [p.name for p in tmp_path.iterdir()] == ["t.npy"]  # whole, and nothing vouches for it
+    assert list(tmp_path.iterdir()) == []  # no map for which nothing vouches
+
+
+def test_a_map_its_uv_and_its_record_are_renamed_together(
+    make_map: MapMaker, ramp: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever a process is killed at before all three are on the disk, it leaves the old ones together."""
+    made = make_map(ramp)
+    made = dataclasses.replace(made, report=dataclasses.replace(made.report, uv_from="xatlas"))
+    paths = [tmp_path / name for name in ("t.npy", "t.npy.uv.glb", "t.npy.json")]
+    for path in paths:
+        path.write_bytes(b"precious")
+    real, renamed = Path.replace, list[str]()
+
+    def replace(one: Path, other: Path) -> Path:
+        if not renamed:
+            assert len(list(tmp_path.glob(".partial-*"))) == 3
+            assert all(path.read_bytes() == b"precious" for path in paths)
+        renamed.append(other.name)
+        return real(one, other)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    record = save_map(made, paths[0])
+    assert sorted(renamed) == sorted(path.name for path in paths)
+    assert renamed[-1] == "t.npy.json"  # which vouches for both
+    assert [record["sha256"], record["uv_file"]["sha256"]] == [file_hash(path) for path in paths[:2]]
+    assert sorted(tmp_path.iterdir()) == sorted(paths)
 
 
 # Reading

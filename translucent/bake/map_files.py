@@ -16,9 +16,9 @@ from translucent.bake.baked import BakedMap
 from translucent.bake.gltf.bodies import PrimitiveKey, primitive_name
 from translucent.bake.gltf.builder import GlbBuilder
 from translucent.bake.gltf.targets import Target
-from translucent.bake.record import Record, shared, write_common_record
-from translucent.bake.writing import save_map, write_uv_file
-from translucent.files.paths import remove_partial
+from translucent.bake.record import Record, add_record, shared
+from translucent.bake.writing import add_map, add_uv_file
+from translucent.files.paths import OutputFiles
 from translucent.gltf.file import GltfFile
 
 #: Largest length of the name of a map, and the characters besides letters and digits that are safe in file names.
@@ -60,18 +60,17 @@ def save_maps(
         As `save_map`.
     """
     file = builder.file()
-    made = {key: target.tex_coord for key, target in targets.items() if target.made_uv}
-    if made:
-        about = {**about, "uv_file": write_uv_file(file, output)}
     told: list[Record] = []
     paths = _paths(file, output, list(results)) if len(results) > 1 else dict.fromkeys(results, output)
-    for key, result in results.items():
-        remove_partial(paths[key])
-        one: Record = {**about, "place": list(key), "tex_coord": targets[key].tex_coord}
-        told.append(save_map(result, paths[key], normalize=normalize, invert=invert, about=one))
-    if len(told) == 1:
-        return told[0]
-    return write_common_record(output, {**about, **shared(told), "maps": told})
+    with OutputFiles() as files:
+        if any(target.made_uv for target in targets.values()):
+            about = {**about, "uv_file": add_uv_file(files, file, output)}
+        for key, result in results.items():
+            one: Record = {**about, "place": list(key), "tex_coord": targets[key].tex_coord}
+            told.append(add_map(files, result, paths[key], normalize=normalize, invert=invert, about=one))
+        if len(told) == 1:
+            return told[0]
+        return add_record(files, output, {**about, **shared(told), "maps": told})
 
 
 def _paths(file: GltfFile, output: Path, keys: list[PrimitiveKey]) -> dict[PrimitiveKey, Path]:

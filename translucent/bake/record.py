@@ -6,6 +6,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from translucent.bake.baked import BakedMap, BakedVertices
 from translucent.bake.encoding import Encoding
-from translucent.files.paths import write_text_atomically
+from translucent.files.paths import OutputFiles, fill_text
 from translucent.files.reading import json_value, read_text
 from translucent.version import VERSION
 
@@ -103,20 +104,21 @@ def write_record(path: Path, record: Record) -> Record:
 
     It is written after the file, so that a record whose hash is that of its file vouches for both.
     """
-    return write_common_record(path, {**fingerprint(path), **record})
+    with OutputFiles() as files:
+        return add_record(files, path, {**fingerprint(path), **record})
 
 
-def write_common_record(path: Path, record: Record) -> Record:
-    """Write the record of several files where that of the file at `path` would be; returns the record."""
+def add_record(files: OutputFiles, path: Path, record: Record) -> Record:
+    """Write a record where that of the file at `path` belongs, together with other files; returns the record."""
     full = {**record, "provenance": provenance()}
     text = json.dumps(full, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    write_text_atomically(sidecar_of(path), text)
+    files.write(sidecar_of(path), partial(fill_text, text=text))
     return full
 
 
-def fingerprint(path: Path) -> Record:
-    """Name and hash of a file, as records have them."""
-    return {"file": path.name, "sha256": file_hash(path)}
+def fingerprint(path: Path, filled: Path | None = None) -> Record:
+    """Name and hash of a file, as records have them, which may still be under another name."""
+    return {"file": path.name, "sha256": file_hash(filled or path)}
 
 
 def parts_of(record: Record) -> list[Record]:

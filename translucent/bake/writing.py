@@ -34,13 +34,13 @@ from translucent.bake.encoding import Encoding
 from translucent.bake.gltf.export import mesh_file
 from translucent.bake.gltf.maps import write_maps
 from translucent.bake.gltf.vertices import write_vertices
-from translucent.bake.record import DEFINITIONS, Record, describe, fingerprint, plain, unit_of, write_record
+from translucent.bake.record import DEFINITIONS, Record, add_record, describe, fingerprint, plain, unit_of, write_record
 from translucent.errors import InputError, RenderError
 from translucent.extras import require_package
 from translucent.files.images import write_exr, write_npy, write_npz, write_png
-from translucent.files.paths import remove_partial, require_output, write_atomically
+from translucent.files.paths import OutputFiles, require_output, write_atomically
 from translucent.gltf.file import GltfFile
-from translucent.gltf.write_file import write_gltf
+from translucent.gltf.write_file import fill_gltf
 
 MAP_SUFFIXES = (".exr", ".png", ".npy", ".npz", ".glb")
 VERTEX_SUFFIXES = (".ply", ".glb", ".npy")
@@ -95,25 +95,31 @@ def save_map(
         If a file cannot be written, or ``.exr`` is asked for without the OpenEXR package.
     """
     path = Path(path)
-    suffix = check_map_output(path, normalize=normalize, invert=invert)
-    unit = unit_of(result.settings.mode)
-    if suffix == ".glb":
+    if check_map_output(path, normalize=normalize, invert=invert) == ".glb":
         return write_maps(mesh_file(result.mesh), path, {(0, 0): result}, about=about)
-    levels = PNG_LEVELS if suffix == ".png" else 0
-    encoding = Encoding.of(result.values, levels, normalize=normalize, invert=invert, unit=unit)
     about = dict(about or {})
-    if result.report.uv_from == "xatlas":
-        about["uv_file"] = write_uv_file(mesh_file(result.mesh), path)
-    write_atomically(path, partial(_WRITERS[suffix], _Task(result, encoding)))
-    return write_record(path, {**about, **describe(result, encoding)})
+    with OutputFiles() as files:
+        if result.report.uv_from == "xatlas":
+            about["uv_file"] = add_uv_file(files, mesh_file(result.mesh), path)
+        return add_map(files, result, path, normalize=normalize, invert=invert, about=about)
 
 
-def write_uv_file(model: GltfFile, path: Path) -> Record:
-    """Write a model with new UVs beside their map at `path`; returns its name and hash."""
+def add_map(
+    files: OutputFiles, result: BakedMap, path: Path, *, normalize: bool, invert: bool, about: Record
+) -> Record:
+    """Write a map as an image, and its record, together with other files, as `save_map`; returns the record."""
+    suffix = check_map_output(path, normalize=normalize, invert=invert)
+    levels = PNG_LEVELS if suffix == ".png" else 0
+    unit = unit_of(result.settings.mode)
+    encoding = Encoding.of(result.values, levels, normalize=normalize, invert=invert, unit=unit)
+    filled = files.write(path, partial(_WRITERS[suffix], _Task(result, encoding)))
+    return add_record(files, path, {**fingerprint(path, filled), **about, **describe(result, encoding)})
+
+
+def add_uv_file(files: OutputFiles, model: GltfFile, path: Path) -> Record:
+    """Write a model with new UVs beside their map at `path`, together with other files; returns its name and hash."""
     uv_path = path.with_name(f"{path.name}{UV_SUFFIX}")
-    remove_partial(uv_path)
-    write_gltf(model, uv_path)
-    return fingerprint(uv_path)
+    return fingerprint(uv_path, files.write(uv_path, partial(fill_gltf, file=model, place=uv_path)))
 
 
 def check_map_output(

@@ -7,9 +7,10 @@ import secrets
 import sys
 import zlib
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Self
 
 from translucent.errors import InputError, RenderError
 
@@ -120,26 +121,55 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     RenderError
         If the file cannot be written.
     """
-    path = Path(os.path.realpath(path))  # a link stays a link, and what it points to is replaced
-    try:
-        remove_partial(path)
-        temporary, held = _temporary_file(path)
-    except OSError as error:
-        raise RenderError(
-            f"output {str(path)!r}", f"it cannot be written ({error.strerror})", "check the folder"
-        ) from error
-    try:
-        write(temporary)
-        if sys.platform == "win32":  # where nothing that is open can be renamed
-            held.close()
-        temporary.replace(path)
-    except OSError as error:
-        raise RenderError(
-            f"output {str(path)!r}", f"it cannot be written ({error.strerror or error})", "check the disk"
-        ) from error
-    finally:
-        held.close()
-        temporary.unlink(missing_ok=True)
+    with OutputFiles() as files:
+        files.write(path, write)
+
+
+class OutputFiles:
+    """Files that belong together: each is filled beside its place, and at the end of the context all are renamed.
+
+    On any failure they stay as they were. Between renames a process is hardly ever killed: what takes long is before.
+    """
+
+    def __init__(self) -> None:
+        self._filled: list[tuple[Path, Path, BinaryIO]] = []
+        self._cleanup = ExitStack()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def write(self, path: Path, write: Callable[[Path], None]) -> Path:
+        """Let `write` fill a temporary file beside `path`, as `write_atomically`; returns its path."""
+        path = Path(os.path.realpath(path))  # a link stays a link, and what it points to is replaced
+        try:
+            remove_partial(path)
+            temporary, held = _temporary_file(path)
+        except OSError as error:
+            raise _unwritable(path, error, "check the folder") from error
+        self._cleanup.callback(temporary.unlink, missing_ok=True)
+        self._cleanup.callback(held.close)
+        try:
+            write(temporary)
+        except OSError as error:
+            raise _unwritable(path, error, "check the disk") from error
+        self._filled.append((temporary, path, held))
+        return temporary
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        with self._cleanup:
+            if kind is not None:
+                return
+            for temporary, path, held in self._filled:
+                if sys.platform == "win32":  # where nothing that is open can be renamed
+                    held.close()
+                try:
+                    temporary.replace(path)
+                except OSError as error:
+                    raise _unwritable(path, error, "check the disk") from error
+
+
+def _unwritable(path: Path, error: OSError, do: str) -> RenderError:
+    return RenderError(f"output {str(path)!r}", f"it cannot be written ({error.strerror or error})", do)
 
 
 def remove_partial(path: Path) -> None:
@@ -154,11 +184,12 @@ def remove_partial(path: Path) -> None:
 
 def write_text_atomically(path: Path, text: str) -> None:
     """Write a text in UTF-8, as `write_atomically` does."""
+    write_atomically(path, partial(fill_text, text=text))
 
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, encoding="utf-8")
 
-    write_atomically(path, write)
+def fill_text(path: Path, text: str) -> None:
+    """Write a text in UTF-8 into a file."""
+    path.write_text(text, encoding="utf-8")
 
 
 def _temporary_file(path: Path) -> tuple[Path, BinaryIO]:

@@ -10,6 +10,7 @@ import copy
 import json
 import os
 import warnings
+from functools import partial
 from pathlib import Path
 from urllib.parse import quote, unquote
 
@@ -43,15 +44,16 @@ def write_gltf(file: GltfFile, path: str | Path) -> None:
     """
     path = Path(path)
     check_gltf_output(path)
-    tree = _relocated(file, path)
-    if path.suffix.lower() == ".gltf":
+    write_atomically(path, partial(fill_gltf, file=file, place=path))
+
+
+def fill_gltf(path: Path, file: GltfFile, place: Path) -> None:
+    """Write a file, as `write_gltf`, to a path from which it will be moved to its place."""
+    tree = _relocated(file, place)
+    if place.suffix.lower() == ".gltf":
         content = (json.dumps(_unpacked(file, tree), indent=2, ensure_ascii=False) + "\n").encode()
     else:
         content = _packed(file, tree)
-    write_atomically(path, lambda temporary: _fill(temporary, content))
-
-
-def _fill(path: Path, content: bytes) -> None:
     path.write_bytes(content)
 
 

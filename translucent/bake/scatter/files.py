@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from translucent.bake.gltf.builder import GlbBuilder
 from translucent.bake.record import Record, plain
 from translucent.errors import InputError
 from translucent.files.images import write_exr
-from translucent.files.paths import require_file, write_atomically
+from translucent.files.paths import require_file
 from translucent.files.unpacking import read_exr
 from translucent.formulas.spherical_harmonics import COUNT
 from translucent.gltf.accessors import Accessors
@@ -41,21 +40,15 @@ ATTRIBUTES, EXTRAS = tuple(f"_SCATTER_SH{i}" for i in range(COUNT)), "translucen
 _CHANNELS = {f"SH{i}.{color}": (i, k) for i in range(COUNT) for k, color in enumerate("RGB")}
 
 
-def write_scatter_exr(path: Path, values: Floats, coverage: Mask, meaning: Record) -> None:
-    """Write a map (h, w, 9, 3) as an OpenEXR file with what it means.
-
-    Raises
-    ------
-    RenderError
-        If the file cannot be written.
-    """
+def fill_scatter_exr(path: Path, values: Floats, coverage: Mask, meaning: Record) -> None:
+    """Write a map (h, w, 9, 3) as an OpenEXR file with what it means; raises `OSError` if it cannot be written."""
     channels = {name: values[:, :, i, k] for name, (i, k) in _CHANNELS.items()} | {"coverage.Y": coverage}
     header = {"comments": str(meaning["definition"]), "scatter": json.dumps(plain(meaning), ensure_ascii=False)}
-    write_atomically(path, partial(write_exr, channels=channels, header=header))
+    write_exr(path, channels, header)
 
 
 def read_scatter_exr(path: Path) -> tuple[Floats, Mask, Record]:
-    """Map (h, w, 9, 3), its coverage (h, w), and what it means, of a file that `write_scatter_exr` wrote.
+    """Map (h, w, 9, 3), its coverage (h, w), and what it means, of a file that `fill_scatter_exr` wrote.
 
     Raises
     ------

@@ -19,8 +19,8 @@ from translucent.bake.gltf.targets import Target, find_targets, left_out
 from translucent.bake.record import Record, write_record
 from translucent.bake.scatter.bake import bake_scatter, bake_vertex_scatter
 from translucent.bake.scatter.files import MAP_SUFFIX, VERTEX_SUFFIX, positions_of, write_scatter_glb
-from translucent.bake.scatter.result import ScatterMap, VertexScatter
-from translucent.bake.writing import check_map_output, write_uv_file
+from translucent.bake.scatter.result import ScatterMap, VertexScatter, save_scatter_map
+from translucent.bake.writing import check_map_output
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.file import read_gltf
@@ -136,10 +136,10 @@ def _bake_gltf(job: ScatterJob, about: Record) -> tuple[Record, dict[PrimitiveKe
     baked = {target.key: _bake_target(job, target, stretches.get(target.key[0], np.eye(4))) for target in targets}
     if job.makes_map:
         ((target, one),) = zip(targets, baked.values(), strict=True)
-        if target.made_uv:
-            about["uv_file"] = write_uv_file(builder.file(), job.output)
+        assert isinstance(one.result, ScatterMap)
         about |= {"place": list(target.key), "tex_coord": target.tex_coord}
-        return one.result.save(job.output, about), baked
+        model = builder.file() if target.made_uv else None
+        return save_scatter_map(one.result, job.output, about, model), baked
     values = {}
     for key, one in baked.items():
         assert isinstance(one.result, VertexScatter)

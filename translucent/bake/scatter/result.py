@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +12,20 @@ import numpy.typing as npt
 from translucent.arrays import Array, Floats, Mask
 from translucent.bake.gltf.builder import GlbBuilder
 from translucent.bake.gltf.export import mesh_file
-from translucent.bake.record import Record, write_record
+from translucent.bake.record import Record, add_record, fingerprint, write_record
 from translucent.bake.scatter.files import (
     MAP_SUFFIX,
     VERTEX_SUFFIX,
+    fill_scatter_exr,
     positions_of,
-    write_scatter_exr,
     write_scatter_glb,
 )
-from translucent.bake.writing import check_map_output, write_uv_file
+from translucent.bake.writing import add_uv_file, check_map_output
+from translucent.files.paths import OutputFiles
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.spherical_harmonics import scattered_radiance
 from translucent.geometry.mesh import Mesh
+from translucent.gltf.file import GltfFile
 from translucent.media.medium import Medium
 
 #: What the numbers are.
@@ -150,14 +153,7 @@ class ScatterMap(BakedScatter):
         RenderError
             If the file cannot be written.
         """
-        path = Path(path)
-        check_map_output(path, (MAP_SUFFIX,))
-        known = dict(about or {})
-        if self.uv_from == "xatlas" and "uv_file" not in known:
-            known["uv_file"] = write_uv_file(mesh_file(self.mesh), path)
-        write_scatter_exr(path, self.values, self.coverage, self.meaning())
-        size = {"kind": "scatter map", "size": [self.values.shape[1], self.values.shape[0]]}
-        return write_record(path, {**known, **size, **self.summary()})
+        return save_scatter_map(self, path, about, mesh_file(self.mesh) if self.uv_from == "xatlas" else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,3 +197,17 @@ class VertexScatter(BakedScatter):
         with np.errstate(under="ignore"):
             _, nearest = cKDTree(self.mesh.vertices).query(positions)
         return np.ascontiguousarray(self.values[nearest])
+
+
+def save_scatter_map(result: ScatterMap, path: str | Path, about: Record | None, model: GltfFile | None) -> Record:
+    """Write a map as `ScatterMap.save` does, with a model beside it, if any, that has new uv; returns the record."""
+    path = Path(path)
+    check_map_output(path, (MAP_SUFFIX,))
+    about = dict(about or {})
+    size = {"kind": "scatter map", "size": [result.values.shape[1], result.values.shape[0]]}
+    fill = partial(fill_scatter_exr, values=result.values, coverage=result.coverage, meaning=result.meaning())
+    with OutputFiles() as files:
+        if model is not None:
+            about["uv_file"] = add_uv_file(files, model, path)
+        filled = files.write(path, fill)
+        return add_record(files, path, {**fingerprint(path, filled), **about, **size, **result.summary()})
