@@ -29,6 +29,19 @@ float last_axial_depth() {
 #endif
 }
 
+// Where a list keeps a crossing at this axial depth; false where it needs none, since an opaque surface hides it. Of a body that
+// may be open before that surface, what is hidden tells whether the ray has rightly come to be in it: it is kept, moved onto it.
+bool is_kept(inout float axial_depth) {
+#if OPAQUE
+    float last = last_axial_depth();
+    if (axial_depth <= last) { return true; }
+    axial_depth = last;
+    return last >= slot_scattering[slot_of_body].w;
+#else
+    return true;
+#endif
+}
+
 uint fragment_word(float axial_depth) {
     // A choice between words: where the side itself becomes a number, softpipe takes every face for a back face.
     uint word = pack_crossing(axial_depth, slot_of_body, false);

@@ -18,7 +18,7 @@ void main() {
 #else
     misplaced = misplaced_axial_depth();
 #endif
-    if (axial_depth > last_axial_depth()) { discard; }
+    if (!is_kept(axial_depth)) { discard; }
     uint node = atomicAdd(node_count, 1u);
     if (node < uint(nodes.length())) {
         uint pixel = uint(cell_offset) + pixel_index(gl_FragCoord.xy, frame_size.x);

@@ -18,7 +18,7 @@ void main() {
         cross_surface(walk, word_at(link), 1, false, metres_per_step);
         layers += 1.0;
 #if INTERFACES
-        note_exit(walk);
+        note_exit(walk, word_at(link));
 #endif
     }
     end_walk(walk, metres_per_step, layers, layers);

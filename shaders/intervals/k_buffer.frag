@@ -10,7 +10,7 @@ layout(location = 0) out float misplaced;  // maximum blending keeps that of the
 void main() {
     float axial_depth = fragment_axial_depth();
     misplaced = misplaced_axial_depth();
-    if (axial_depth > last_axial_depth()) { discard; }
+    if (!is_kept(axial_depth)) { discard; }
     uint base = k_base(gl_FragCoord.xy, frame_size.x);
     atomicAdd(words[base], 1u);
     uint word = fragment_word(axial_depth);

@@ -24,7 +24,7 @@ void main() {
     for (uint i = 1u; i <= kept; ++i) {
         cross_surface(walk, words[base + i], 1, false, metres_per_step);
 #if INTERFACES
-        note_exit(walk);
+        note_exit(walk, words[base + i]);
 #endif
     }
     end_walk(walk, metres_per_step, float(counted), float(kept));

@@ -11,12 +11,30 @@ layout(location = 0) out vec4 out_optical_depth;  // alpha: 1 where the walk end
 layout(location = 1) out vec4 out_emitted;        // alpha: thickness
 layout(location = 2) out vec4 out_layers;         // counted, kept, metres with a negative winding number, first exit
 
+#if OPAQUE
+float last_axial_depth() {
+    return texelFetch(opaque_axial_depth, ivec2(gl_FragCoord.xy), 0).r;
+}
+
+// Whether the walk, which has passed what is kept of the crossings behind the opaque surface, may end as it does.
+bool may_end(Walk walk, float last) {
+    for (int slot = 0; slot < SLOTS; ++slot) {
+        if (walk.winding[slot] < 0 || (walk.winding[slot] > 0 && last >= slot_scattering[slot].w)) { return false; }
+    }
+    return true;
+}
+#endif
+
 #if INTERFACES
 // Where the ray first leaves all bodies; bodies that touch are one here.
 float first_exit = NOTHING;
 float maybe_exit = NOTHING;
 
-void note_exit(Walk walk) {
+void note_exit(Walk walk, uint word) {
+#if OPAQUE
+    float last = last_axial_depth();
+    if (last <= 1.0 && last >= slot_scattering[crossing_slot(word)].w && walk.axial_step >= step_of_axial_depth(last)) { return; }
+#endif
     float axial_depth = float(walk.axial_step) / float(axial_steps());
     if (first_exit < NOTHING) { return; }
     if (maybe_exit < NOTHING && axial_depth - maybe_exit > TOUCHING) {
@@ -47,10 +65,9 @@ void write_walk(Walk walk, bool sound, float counted, float kept) {
 void end_walk(Walk walk, float metres_per_step, float counted, float kept) {
     bool sound = counted == kept;
 #if OPAQUE
-    float last = texelFetch(opaque_axial_depth, ivec2(gl_FragCoord.xy), 0).r;
+    float last = last_axial_depth();
     if (last <= 1.0) {
-        // Nothing is known of what lies behind: what has been entered may stay so.
-        sound = sound && !is_negative(walk);
+        sound = sound && may_end(walk, last);
         uint axial_step = step_of_axial_depth(last);
         if (sound && axial_step > walk.axial_step) {
             add_segment(walk, float(axial_step - walk.axial_step) * metres_per_step, false);

@@ -18,7 +18,7 @@ int slot_turns(int winding[SLOTS], int slot) {
     // Open bodies have slots of their own: a medium that an earlier slot has brought does not count again.
     for (int other = 0; other < slot; ++other) {
         bool alike = slot_extinction[other].rgb == slot_extinction[slot].rgb
-            && slot_emission[other].rgb == slot_emission[slot].rgb && slot_scattering[other] == slot_scattering[slot]
+            && slot_emission[other].rgb == slot_emission[slot].rgb && slot_scattering[other].rgb == slot_scattering[slot].rgb
             && slot_phase[other] == slot_phase[slot];
 #if VARIES
         alike = alike && !slot_varies(slot) && !slot_varies(other);

@@ -123,10 +123,3 @@ bool is_outside(Walk walk) {
     }
     return true;
 }
-
-bool is_negative(Walk walk) {
-    for (int slot = 0; slot < SLOTS; ++slot) {
-        if (walk.winding[slot] < 0) { return true; }
-    }
-    return false;
-}

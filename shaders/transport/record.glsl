@@ -74,6 +74,14 @@ int dominant_body(uvec4 record) {
 #endif
 }
 
+// Whether a body in the record has holes.
+bool is_in_open_body(uvec4 record) {
+    for (; record.x != 0u; record = next_entries(record)) {
+        if (traced_body(int(record.x & 0xffffu) - 1).not_closed == 1.0) { return true; }
+    }
+    return false;
+}
+
 struct Filling {
     vec3 extinction;
     vec3 emission;

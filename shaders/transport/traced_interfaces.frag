@@ -208,6 +208,8 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             sum.light += ray.share * place.glow;
             ray.share *= place.coat;
             if (kind == KIND_OPAQUE && (outside || body.one_sided == 0.0)) {
+                // It is in an open body, and whether rightly so, what is behind the opaque object would tell.
+                if (all_closed == 0 && is_in_open_body(ray.record)) { sum.lost += strength(ray.share) / 3.0; }
                 glimpses[ended++] = Glimpse(place.object, smooth_normal, ray.origin, point, ray.direction, ray.share, ray.reflected, ray.blur
 #if FOOTPRINTS
                     , ellipse_of(ray.footprint.direction)
@@ -453,6 +455,7 @@ void main() {
     if (mirrored == 1) {
         vec3 without = environment_seen(ray.origin, ray.direction, true, ray.blur);
         out_radiance = vec4(mirrored_share * through * (min(sum.light, vec3(NOTHING)) - without), 0.0);
+        out_transmittance.a = -strength(mirrored_share) / 3.0 * min(sum.lost, 1.0);
         return;
     }
 #endif

@@ -16,6 +16,7 @@ SIZE = (112, 84)
 BODY = Box(low=(-1, -1, -1), high=(1, 1, 1)).tessellate()
 WALL = Box.slab((6.0, 6.0), 0.2).tessellate()
 BALL = Sphere().tessellate(48)
+GROUND = Box((-40, -1.3, -40), (40, -1.1, 40)).tessellate()
 RED = (0.8, 0.2, 0.1)
 WINE = tl.Medium.from_color("#7b1e3a", distance=1.0)
 EMBER = tl.Medium(absorption=(0.5, 1.0, 2.0), emission=(1.0, 0.2, 0.1))
@@ -122,22 +123,91 @@ def test_emission_in_front_of_an_opaque_object(renderer: tl.Renderer, method: An
     assert_equal(renderer, scene, method)
 
 
+CUP = tl.Mesh(BODY.vertices, BODY.faces[~(BODY.vertices[BODY.faces][..., 2] == -1).all(axis=1)], name="cup")
+_BACK = (BODY.vertices[BODY.faces][..., 2] == -1).all(axis=1)
+CUP = tl.Mesh(BODY.vertices, BODY.faces[~_BACK], name="cup")
+TURNED = tl.Mesh(BODY.vertices, np.where(_BACK[:, None], BODY.faces[:, ::-1], BODY.faces), name="turned")
+
+#: Of what is solid: each may end inside a body at an opaque surface.
+SOLID = {name: method for name, method in METHODS.items() if name != "thin"} | {"marched": tl.RayMarched(steps=4)}
+
+
+@pytest.mark.filterwarnings("ignore::translucent.TranslucentWarning")
+@pytest.mark.parametrize("mesh", [CUP, TURNED], ids=["open", "turned"])
+@pytest.mark.parametrize("ends", ["wall", "ground", "backdrop"])
+@pytest.mark.parametrize("method", [None, *SOLID.values()], ids=["chosen", *SOLID])
+def test_a_hole_before_an_opaque_surface_is_marked(
+    renderer: tl.Renderer, method: Any, ends: str, mesh: tl.Mesh
+) -> None:
+    """A ray that comes out through the open back of a box, or one that looks inwards, is not in the box where it ends.
+
+    Media go on behind the opaque surface.
+    """
+    camera = tl.Camera.look_at((0.5, 2.5, 5), (0, 0, 0))
+    beyond = np.eye(4)
+    beyond[:3, 3] = -2, -9, -18
+    bodies = [tl.Object(mesh, WINE), tl.Object(BODY, WINE, beyond)]
+    around = {"wall": [opaque(WALL, (0, 0, -3), 4.0)], "ground": [opaque(GROUND)], "backdrop": []}[ends]
+    backdrop = tl.Backdrop(np.zeros((*SIZE[::-1], 3)), np.full(SIZE[::-1], 9.0)) if ends == "backdrop" else None
+    alone = renderer.render(tl.Scene(bodies, camera), SIZE, method)
+    frame = renderer.render(tl.Scene([*bodies, *around], camera), SIZE, method, backdrop=backdrop)
+    assert (~alone.valid).sum() > 500
+    assert not (frame.valid & ~alone.valid).any()
+
+
+@pytest.mark.filterwarnings("ignore::translucent.TranslucentWarning")
+def test_bent_rays_that_end_in_an_open_body_are_marked(renderer: tl.Renderer) -> None:
+    """A box of glass without a bottom: straight rays leave it through its sides, bent ones by way of the ground."""
+    open_below = tl.Mesh(BODY.vertices, BODY.faces[~(BODY.vertices[BODY.faces][..., 1] == -1).all(axis=1)])
+    glass = tl.Medium(absorption=0.1, ior=1.5)
+    camera = tl.Camera.look_at((0.5, 3.5, 5), (0, 0, 0), fov_y=30)
+    marked = []
+    for objects in ([], [opaque(GROUND)]):
+        scene = tl.Scene([tl.Object(open_below, glass), *objects], camera)
+        straight = renderer.render(tl.Scene([tl.Object(open_below, WINE), *objects], camera), SIZE)
+        for frame in (renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)):
+            bent = straight.valid & ~frame.valid & interior(straight.valid)
+            assert bent.sum() > 300
+            marked.append(bent)
+    alone, truly_alone, grounded, truly_grounded = marked
+    assert (alone & ~grounded).sum() <= 0.02 * alone.sum()
+    assert (truly_alone & ~truly_grounded).sum() <= 0.02 * alone.sum()
+
+
+@pytest.mark.filterwarnings("ignore::translucent.TranslucentWarning")
+def test_a_ground_is_marked_where_it_mirrors_a_hole(renderer: tl.Renderer) -> None:
+    """Nothing of the body is seen there directly."""
+    camera = tl.Camera.look_at((0.5, 0.6, 6), (0, -0.8, 0), fov_y=35)
+    frames = []
+    for mesh in (BODY, CUP):
+        scene = tl.staged(tl.Scene([tl.Object(mesh, tl.Medium(absorption=0.1, ior=1.5))], camera), "night")
+        frames.append(renderer.render(scene, SIZE))
+    closed, cup = frames
+    assert closed.valid.all()
+    assert (~closed.coverage & ~cup.valid).sum() > 100
+
+
+def test_an_opaque_object_in_a_closed_body_beside_an_open_one_is_trusted(renderer: tl.Renderer) -> None:
+    aside = np.eye(4)
+    aside[0, 3] = 20
+    unseen = tl.Object(CUP, tl.Medium(absorption=0.1, ior=1.5), aside)
+    glass = tl.Object(BODY, tl.Medium(absorption=0.1, ior=1.5))
+    camera = tl.Camera.look_at((0.1, 0.2, 6), (0, 0, 0), fov_y=12)
+    scene = tl.Scene([glass, opaque(BALL, scale=0.9), unseen], camera)
+    assert renderer.render(scene, SIZE).valid.all()
+
+
 def test_a_hole_behind_the_wall_does_not_matter_to_lists(renderer: tl.Renderer) -> None:
     """Bodies behind an opaque surface are not looked at: an open body whose hole is there is sound."""
-    cup = tl.Mesh(BODY.vertices, BODY.faces[[i for i in range(12) if not _faces_back(i)]], name="cup")
     camera = tl.Camera.look_at((0.1, 0.2, 6), (0, 0, 0))
     for wall, valid in (((0, 0, 0), True), ((0, 0, -4), False)):
-        scene = tl.Scene([tl.Object(cup, WINE), opaque(WALL, wall)], camera)
+        scene = tl.Scene([tl.Object(CUP, WINE), opaque(WALL, wall)], camera)
         if valid:
             frame = renderer.render(scene, SIZE, tl.FragmentLists())
         else:
             with pytest.warns(tl.TranslucentWarning, match="'cup'"):
                 frame = renderer.render(scene, SIZE, tl.FragmentLists())
         assert frame.valid.all() == valid
-
-
-def _faces_back(i: int) -> bool:
-    return bool((BODY.vertices[BODY.faces[i]][:, 2] == -1).all())
 
 
 def test_the_nearest_of_many_opaque_objects_is_seen(renderer: tl.Renderer) -> None:

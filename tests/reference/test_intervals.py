@@ -10,6 +10,7 @@ from translucent.geometry.solids import Box, SphericalShell
 from translucent.media.medium import Medium
 from translucent.reference import Hits, line_hits
 from translucent.reference.intervals import Intervals, body_intervals, merge, scene_intervals, unbalanced
+from translucent.reference.rays import pixel_rays
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 
@@ -28,7 +29,8 @@ def hits(*rows: tuple[int, float, int]) -> Hits:
 def intervals(scene: Scene) -> tuple[Intervals, bool]:
     """Intervals of all objects on the one ray of the scene, and True if it is defective."""
     hits = [line_hits(body.mesh, body.matrix, scene.camera, (1, 1)) for body in scene.objects]
-    found, defective = scene_intervals(scene, hits, range(len(hits)), np.array([np.inf]))
+    rays = pixel_rays(scene.camera, (1, 1))
+    found, defective = scene_intervals(scene, rays, hits, range(len(hits)), np.array([np.inf]))
     return found, bool(defective[0])
 
 
@@ -45,19 +47,18 @@ def test_windings_count_from_the_origin_of_each_ray() -> None:
     assert rows(found) == [(0, 1, 2, 1), (0, 2, 3, 2), (0, 3, 5, 1), (2, 0, 4, 1), (3, 2, 3, 1)]
     assert found.body.tolist() == [7] * 5
     assert found.thickness.tolist() == [1, 2, 2, 4, 1]
-    assert not unbalanced(surface, origin, FREE).any()
+    assert not unbalanced(surface, origin).any()
 
 
 def test_unbalanced_rays_are_named() -> None:
     surface = hits((0, 1, 1), (1, 1, 1), (1, 2, -1), (2, 3, -1), (3, 1, -1))
-    assert unbalanced(surface, np.array([0, 0, 1, 0, 1]), FREE).tolist() == [True, False, False, True, True]
+    assert unbalanced(surface, np.array([0, 0, 1, 0, 1])).tolist() == [True, False, False, True, True]
 
 
-def test_a_stopped_ray_is_in_a_body_up_to_its_end_and_never_unbalanced() -> None:
+def test_a_stopped_ray_is_in_a_body_up_to_its_end() -> None:
     surface = hits((0, 1, 1), (1, 1, 1), (1, 2, -1), (3, 1, -1))
     origin, end = np.array([0, 0, 1, 1, 0]), np.array([3.0, 3, 4, np.inf, 2])
     assert rows(body_intervals(surface, origin, end)) == [(0, 1, 3, 1), (1, 1, 2, 1), (2, 0, 4, 1), (3, 0, 1, 1)]
-    assert not unbalanced(surface, origin, end).any()
 
 
 def test_hits_before_the_end_of_a_ray() -> None:

@@ -175,8 +175,11 @@ def test_a_hole_matters_only_before_the_wall(shade: Shade) -> None:
     behind = seen(0, 0.5)
     assert behind["valid"]
     assert behind["thickness"] == pytest.approx(1.5, abs=1e-14)
-    # A ray that leaves without having entered gives the hole away.
+    # Such as a ground below a body without a bottom: the ray is not in the body any more when it ends.
+    assert not seen(0, -1.0)["valid"]
+    # A ray that leaves without having entered gives the hole away, also behind the wall.
     assert not seen(1, -1.0)["valid"]
+    assert not seen(1, 0.5)["valid"]
     in_front = seen(1, 5.0)
     assert in_front["valid"]
     assert not in_front["coverage"]

@@ -136,6 +136,8 @@ class _Growth:
         kinds[0, own.solids] = kinds[1, own.walls] = True
         kinds[2, [i for i, body in enumerate(tree.scene.objects) if body.medium is None]] = True
         self.is_solid, self.is_wall, self.is_opaque = kinds
+        self.is_open = self.is_solid.copy()
+        self.is_open[own.solids] = [not tree.scene.objects[i].mesh.diagnosis.solid for i in own.solids]
         self.is_film = np.append(~kinds[:, :-1].any(axis=0), False)
 
     def grow(self, rays: Rays, hits: Sequence[Hits], carried: Array) -> None:
@@ -264,6 +266,9 @@ class _Growth:
         opaque = self.is_opaque[item]
         stopped = np.asarray(opaque.any(axis=1))
         if stopped.any():
+            # Whether a ray is rightly in an open body, what is behind the opaque object would tell.
+            astray = self.is_open[beams.record[stopped]].any(axis=1)
+            self.found.valid[beams.owner[stopped][astray]] = False
             self._end(beams.where(stopped), item[stopped], opaque[stopped].argmax(axis=1))
             beams, item = beams.where(~stopped), item[~stopped]
         before, record = self.media.dominant(beams.record), beams.record.copy()

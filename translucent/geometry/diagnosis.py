@@ -20,6 +20,9 @@ from translucent.geometry.winding import inside_out_parts, one_volume, winds_neg
 #: Deepest dent of a convex body, as a share of its size.
 CONVEX_TOLERANCE = 1e-6
 
+#: Smallest and largest x, y, z.
+Bounds = tuple[tuple[float, ...], tuple[float, ...]]
+
 #: Largest number of offenders that a finding names.
 FIRST = 3
 
@@ -77,6 +80,9 @@ class Diagnosis:
         Solid, with all faces looking inwards.
     convex : bool
         Solid, one component, and no edge bends inwards.
+    open_bounds : ((x, y, z), (x, y, z)), optional
+        Smallest and largest coordinates of edges that faces pass more often in one direction than in the other: where
+        the mesh is open, or changes its winding. None for a solid.
     """
 
     nonfinite_vertices: Finding
@@ -94,6 +100,7 @@ class Diagnosis:
     negative_winding: bool
     inverted: bool
     convex: bool
+    open_bounds: Bounds | None = None
 
     @property
     def inside_out(self) -> bool:
@@ -180,6 +187,7 @@ def diagnose(vertices: Array, faces: npt.NDArray[np.int32], one_closed_part: boo
         negative_winding=whole and not convex and winds_negatively(vertices, outwards),
         inverted=inverted,
         convex=convex,
+        open_bounds=None if solid else _open_bounds(vertices[used & finite], vertices, edges if whole else None),
     )
 
 
@@ -258,6 +266,15 @@ def _inside_out(vertices: Array, faces: npt.NDArray[np.integer]) -> int:
     """Number of closed parts that face inwards and lie inside no other."""
     part, _ = spread_winding(faces)
     return len(inside_out_parts(vertices, faces, part))
+
+
+def _open_bounds(used: Array, vertices: Array, edges: _Edges | None) -> Bounds | None:
+    """Bounds of the edges at which a mesh that is no solid is open; without edges, of all that faces use."""
+    ends = used if edges is None else vertices[edges.sides.ends(np.flatnonzero(edges.net)).ravel()]
+    if not len(ends):
+        return None
+    low, high = extent(ends)
+    return tuple(low.tolist()), tuple(high.tolist())
 
 
 def _finite(vertices: Array) -> Mask:

@@ -169,6 +169,7 @@ class SceneHierarchies:
             "extinction": metres * extinction,
             "scattering": metres * extinction * albedo,
             "phase": medium.phase_function.parameters,
+            "not_closed": float(not opaque and not body.mesh.diagnosis.solid),
             "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
             "emission": metres * np.asarray(medium.emission),
             "kind": _kind(body, sheet),

@@ -85,7 +85,7 @@ MEDIA = UniformBlock(
     (
         ("slot_extinction", "f4", (MAX_SLOTS, 4)),  # w: least winding number at the start of a ray
         ("slot_emission", "f4", (MAX_SLOTS, 4)),  # w: greatest
-        ("slot_scattering", "f4", (MAX_SLOTS, 4)),
+        ("slot_scattering", "f4", (MAX_SLOTS, 4)),  # w: axial depth from which on its surface may be open
         ("slot_phase", "f4", (MAX_SLOTS, 4)),  # parameters of the phase function
         ("media_length", "f4", ()),  # metres along the forward axis from axial depth 0 to 1
         ("slot_bits", "i4", ()),  # bits that tell slots apart
@@ -275,6 +275,7 @@ TRACED_BODY = PackedTable(
         ("metallic", "f4", ()),
         ("one_sided", "f4", ()),
         ("rank", "f4", ()),  # the higher, the more it decides on the medium of a ray; 0: not at all
+        ("not_closed", "f4", ()),  # 1 for a solid with holes
         ("scattering", "f4", (3,)),
         ("slot", "f4", ()),  # the same for objects of one medium
         ("phase", "f4", (4,)),  # parameters of the phase function

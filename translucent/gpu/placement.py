@@ -52,6 +52,8 @@ class PlacedScene:
         From the object to the world.
     anchors : (objects, 3) float64
         World-space vector from the eye to the center of the mesh.
+    open_from : (objects,) float64
+        Metres ahead of the eye, along the camera's axis, from which on the surface of a body may be open.
     cut : (objects,) bool
         The eye, or an orthographic image plane, is within the object's bounds: distances count from there.
     expected_counts : (objects, 2) float64
@@ -66,6 +68,7 @@ class PlacedScene:
     scene: Scene
     matrices: Array
     anchors: Array
+    open_from: Array
     cut: Mask
     expected_counts: Array
     media: AxialRange
@@ -82,9 +85,10 @@ class PlacedScene:
         expected = np.zeros((len(objects), 2))
         for i in np.flatnonzero(cut & scene.filled).tolist():
             expected[i] = _expected_count(objects[i], camera)
+        open_from = np.array([item.open_from(camera) if item.medium is not None else np.inf for item in objects])
         opaque = AxialRange.of_boxes(scene.boxes[~scene.filled], camera) if scene.opaque else None
         media = AxialRange.of_boxes(scene.boxes[scene.filled], camera)
-        return cls(scene, matrices, anchors, cut, expected, media, opaque)
+        return cls(scene, matrices, anchors, open_from, cut, expected, media, opaque)
 
     @property
     def on_surface(self) -> Mask:

@@ -93,6 +93,7 @@ def media_uniforms(placed: PlacedScene, slots: tuple[Slot, ...]) -> bytes:
     """Contents of the Media block."""
     scene = placed.scene
     extinction, emission, scattering, phase = (np.zeros((MAX_SLOTS, 4)) for _ in range(4))
+    nothing = float(CONSTANTS["NOTHING"])
     for i, slot in enumerate(slots[:MAX_SLOTS]):
         density = scene.objects[slot.objects[0]].density
         densest = 1.0 if density is None else max(density.maximum, 1.0)
@@ -102,6 +103,8 @@ def media_uniforms(placed: PlacedScene, slots: tuple[Slot, ...]) -> bytes:
         scattering[i, :3] = share * np.asarray(slot.medium.scattering)
         phase[i] = slot.medium.phase_function.parameters
         extinction[i, 3], emission[i, 3] = placed.expected_counts[list(slot.objects)].sum(axis=0)
+        open_from = (placed.open_from[list(slot.objects)].min() - placed.media.near) / placed.media.length
+        scattering[i, 3] = np.clip(open_from, -nothing, nothing)
     return MEDIA.pack(
         slot_extinction=extinction,
         slot_emission=emission,

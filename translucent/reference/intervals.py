@@ -9,6 +9,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.reference.hits import Hits
+from translucent.reference.rays import Rays
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 
@@ -73,17 +74,18 @@ def body_intervals(hits: Hits, origin: Integers, end: Array, body: int = 0) -> I
     return Intervals(pixel[keep], t[keep], t[keep + 1], np.full(len(keep), body, dtype=np.int64), winding[keep])
 
 
-def unbalanced(hits: Hits, origin: Integers, end: Array) -> Mask:
+def unbalanced(hits: Hits, origin: Integers) -> Mask:
     """(pixels,): mask of rays whose entries and exits of a body do not balance.
-
-    What an opaque surface hides cannot tell, so a ray that it stops is none of them.
 
     Parameters
     ----------
-    hits, origin, end
+    hits : Hits
+        All surfaces of the body ahead of the origins, also behind what stops the rays: a ray may end inside a body, and
+        what lies behind tells whether it has rightly come to be there.
+    origin : (pixels,) int64
         As for `body_intervals`.
     """
-    return np.asarray(np.isinf(end) & (sum_signs(hits, len(origin)) != -origin))
+    return np.asarray(sum_signs(hits.where(hits.distance >= 0), len(origin)) != -origin)
 
 
 def sum_signs(hits: Hits, pixels: int) -> Integers:
@@ -119,12 +121,15 @@ def merge(parts: Sequence[Intervals]) -> Intervals:
     return Intervals(**{name: array[order] for name, array in arrays.items()})
 
 
-def scene_intervals(scene: Scene, hits: Sequence[Hits], solids: Sequence[int], end: Array) -> tuple[Intervals, Mask]:
+def scene_intervals(
+    scene: Scene, rays: Rays, hits: Sequence[Hits], solids: Sequence[int], end: Array
+) -> tuple[Intervals, Mask]:
     """Intervals of bodies on rays of the scene's camera.
 
     Parameters
     ----------
     scene : Scene
+    rays : Rays
     hits : sequence of Hits
         Of each of `Scene.objects`, as `line_hits` gives them.
     solids : sequence of int
@@ -136,17 +141,19 @@ def scene_intervals(scene: Scene, hits: Sequence[Hits], solids: Sequence[int], e
     -------
     intervals : Intervals
     defective : (pixels,) bool
-        Rays on which some body shows a hole or faces wound wrongly: its entries and exits do not balance, or its
-        surface winds around a place a negative number of times.
+        Rays on which some body shows a hole or faces wound wrongly: its entries and exits do not balance, also behind
+        what stops the ray, unless all that is open of it lies behind there; or before that its surface winds around a
+        place a negative number of times.
     """
+    # Along the camera's axis.
+    depth = end * (rays.directions @ scene.camera.forward)
     defective = np.zeros(len(end), dtype=bool)
     nothing = (np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int64), np.empty(0, np.int64))
     parts = [Intervals(*nothing)]
     for index in solids:
         origin = origin_windings(scene.objects[index], hits[index], scene.camera, len(end))
-        ahead = hits[index].before(end)
-        parts.append(body_intervals(ahead, origin, end, index))
-        defective |= unbalanced(ahead, origin, end)
+        parts.append(body_intervals(hits[index].before(end), origin, end, index))
+        defective |= unbalanced(hits[index], origin) & ~(depth < scene.objects[index].open_from(scene.camera))
     intervals = merge(parts)
     negative = np.bincount(intervals.pixel, np.minimum(intervals.thickness, 0.0), len(end))
     return intervals, defective | (negative < -ROUNDING * scene.diagonal)

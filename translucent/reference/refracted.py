@@ -23,7 +23,7 @@ from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits
 from translucent.reference.interactions import Legs, Meetings, joined
 from translucent.reference.interfaces import Interfaces, Optics
-from translucent.reference.intervals import Intervals, body_intervals, merge, unbalanced
+from translucent.reference.intervals import Intervals, body_intervals, merge, sum_signs, unbalanced
 from translucent.reference.opaque import OpaqueHits, nearest_opaque, reflected_radiance
 from translucent.reference.rays import Rays
 from translucent.reference.scattering import scattered_once
@@ -223,6 +223,13 @@ class _Tree:
             points = legs.rays.origins + interfaces.distance[:, None] * legs.rays.directions
         return replace(legs, rays=replace(legs.rays, origins=points)), interfaces
 
+    def _goes_astray(self, body: int, hits: Hits, origin: Integers, interface: Array, wall: Array) -> Mask:
+        """(n,): ray segments that show a hole of a body: they never leave it, or would not if nothing stopped them."""
+        closed = self.scene.objects[body].mesh.diagnosis.solid
+        outside = closed | (origin + sum_signs(hits.before(wall), len(origin)) == 0)
+        rightly = np.isfinite(interface) | (np.isfinite(wall) & outside)
+        return np.asarray(~rightly & unbalanced(hits, origin))
+
     def _through_media(self, legs: Legs, hits: Sequence[Hits], interface: Array, wall: Array) -> Legs:
         """Attenuate ray segments by the media, and add emitted and scattered radiance."""
         scene, volume, rays = self.scene, self.refracted.volume, legs.rays
@@ -230,9 +237,9 @@ class _Tree:
         none = np.empty(0, np.int64)
         parts = [Intervals(none, np.empty(0), np.empty(0), none, none)]
         for i in self.own.solids:
-            origin, ahead = legs.inside.windings[:, i].astype(np.int64), hits[i].before(end)
-            parts.append(body_intervals(ahead, origin, end, i))
-            self.found.valid[legs.owner[unbalanced(ahead, origin, end)]] = False
+            origin = legs.inside.windings[:, i].astype(np.int64)
+            parts.append(body_intervals(hits[i].before(end), origin, end, i))
+            self.found.valid[legs.owner[self._goes_astray(i, hits[i], origin, interface, wall)]] = False
         sheets = [None if i in self.own.walls else metres for i, metres in enumerate(self.refracted.sheets)]
         # A sheet that lies on an interface is met on one side of it only.
         until = np.where(interface < wall, interface - SHEET_ON_OPAQUE * scene.diagonal, wall)

@@ -184,8 +184,9 @@ def shade_hits(
     -------
     dict of str to ndarray
         The arrays of a frame by their names, (n,) or (n, 3), float64 and bool. Covered is a ray that crosses a medium
-        before an opaque surface stops it. Invalid is one that ends inside a solid though nothing stops it, that a
-        solid's faces wind around a negative number of times, or whose optical depth overflows.
+        before an opaque surface stops it. Invalid is one that leaves a solid less often than it enters, or more often,
+        also behind the opaque surface unless all holes of the solid are there; that a solid's faces wind around a
+        negative number of times, or whose optical depth overflows.
     """
     light = light or SurfaceLight(LightPaths(scene, tuple(sheets)))
     media = crossed_media(light, rays, hits, sheets)
@@ -235,7 +236,7 @@ def crossed_media(
     scene, volume = light.scene, light.paths.volume
     wall = nearest_opaque(scene, hits, len(rays))
     solids = [i for i, body in enumerate(scene.objects) if body.medium is not None and sheets[i] is None]
-    intervals, defective = scene_intervals(scene, hits, solids, wall.distance)
+    intervals, defective = scene_intervals(scene, rays, hits, solids, wall.distance)
     crossings = scene_crossings(scene, rays, hits, sheets, wall.distance, light.on_interfaces)
     segments, filling = volume_segments(scene, volume, rays, intervals, crossings)
     segments = emission_of_mixtures(volume, rays, segments, filling)

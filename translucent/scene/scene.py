@@ -212,6 +212,19 @@ class Object(Frozen):
         """Radius of a ball around the center of the bounds that holds the object."""
         return float(np.linalg.norm(self.matrix[:3, :3], ord=2)) * self.mesh.radius
 
+    def open_from(self, camera: Camera) -> float:
+        """Metres ahead of the eye, along the camera's axis, from which on the surface may be open; inf for a solid.
+
+        Before that all rays enter as often as they leave, up to what they are in. From within its bounds an open body
+        may be open anywhere.
+        """
+        if (found := self.mesh.diagnosis.open_bounds) is None:
+            return np.inf
+        if camera.fov_y is not None and (self.bounds[0] <= camera.eye).all() and (self.bounds[1] >= camera.eye).all():
+            return -np.inf
+        corners = np.array([[found[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
+        return float(((corners @ self.matrix[:3, :3].T + (self.matrix[:3, 3] - camera.eye)) @ camera.forward).min())
+
     def winding_number(self, point: npt.ArrayLike) -> float:
         """Winding number around a world-space point: 0 or 1 for a simple solid; quick outside the bounds."""
         local = np.linalg.solve(self.matrix[:3, :3], np.asarray(point, dtype=np.float64) - self.matrix[:3, 3])
