@@ -30,19 +30,18 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.assets import mesh_path
+from translucent.bake.atlas import Atlas, Unwrapped, unwrap
 from translucent.bake.bake import bake_thickness
 from translucent.bake.batch import BatchReport, bake_many
-from translucent.bake.gltf.export import mesh_file
+from translucent.bake.gltf_builder import mesh_file
 from translucent.bake.jobs import Job
 from translucent.bake.measure import Measure
 from translucent.bake.record import parts_of, read_record
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points, Surface
-from translucent.bake.texels import Atlas
-from translucent.bake.unwrap import Unwrapped, unwrap
 from translucent.cpu.threads import in_threads, processors
 from translucent.geometry.mesh import Mesh
-from translucent.gltf.write_file import write_gltf
+from translucent.gltf.file import write_gltf
 from translucent.mesh_files import load_mesh
 
 #: Rays that Embree alone traces in a round: enough for some seconds, and little memory.

@@ -254,7 +254,7 @@ def _read_script(path: Path) -> None:
 
 def readers(folder: Path) -> dict[str, Reader]:
     """Every reader by its name; `folder` is for files that only a library can make."""
-    from translucent.bake.reading import load_thickness_map
+    from translucent.bake.thickness_map import load_thickness_map
     from translucent.media.fitting import fit_wedge
 
     glb = ("scene.glb", packed_glb(*gltf_tree(b"")))

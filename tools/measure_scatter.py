@@ -19,8 +19,7 @@ from PIL import Image
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.bake.scatter.check import check_scatter, lines
-from translucent.bake.scatter.job import Baked
+from translucent.bake.scatter_job import Baked, check_scatter, lines
 from translucent.diffusion.harmonics import LitAlone, exit_radiance
 from translucent.formulas.color import linear_to_srgb
 from translucent.scene.environment_map import texel_directions

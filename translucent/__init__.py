@@ -15,24 +15,24 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent import bench as bench
     from translucent import reference as reference
     from translucent.bake.audit.check import check_materials as check_materials
-    from translucent.bake.audit.finding import MaterialCheck as MaterialCheck
-    from translucent.bake.audit.finding import MaterialFinding as MaterialFinding
-    from translucent.bake.audit.fix import fix_materials as fix_materials
+    from translucent.bake.audit.check import fix_materials as fix_materials
+    from translucent.bake.audit.rules import MaterialCheck as MaterialCheck
+    from translucent.bake.audit.rules import MaterialFinding as MaterialFinding
     from translucent.bake.bake import bake_thickness as bake_thickness
-    from translucent.bake.baked import BakeReport as BakeReport
+    from translucent.bake.bake import bake_vertex_thickness as bake_vertex_thickness
     from translucent.bake.batch import BatchReport as BatchReport
     from translucent.bake.batch import bake_many as bake_many
     from translucent.bake.lithophane import Lithophane as Lithophane
     from translucent.bake.lithophane import lithophane as lithophane
-    from translucent.bake.reading import load_thickness_map as load_thickness_map
-    from translucent.bake.scatter.bake import bake_scatter as bake_scatter
-    from translucent.bake.scatter.bake import bake_vertex_scatter as bake_vertex_scatter
-    from translucent.bake.scatter.result import ScatterMap as ScatterMap
-    from translucent.bake.scatter.result import VertexScatter as VertexScatter
+    from translucent.bake.scatter import ScatterMap as ScatterMap
+    from translucent.bake.scatter import VertexScatter as VertexScatter
+    from translucent.bake.scatter import bake_scatter as bake_scatter
+    from translucent.bake.scatter import bake_vertex_scatter as bake_vertex_scatter
     from translucent.bake.settings import BakeSettings as BakeSettings
+    from translucent.bake.thickness_map import BakeReport as BakeReport
     from translucent.bake.thickness_map import ThicknessMap as ThicknessMap
     from translucent.bake.thickness_map import VertexThickness as VertexThickness
-    from translucent.bake.vertices import bake_vertex_thickness as bake_vertex_thickness
+    from translucent.bake.thickness_map import load_thickness_map as load_thickness_map
     from translucent.errors import InputError as InputError
     from translucent.errors import RenderError as RenderError
     from translucent.errors import TranslucentError as TranslucentError
@@ -115,19 +115,14 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
 
 #: Modules of the public names. Each is imported when it is first asked for: SciPy and OpenGL take their time.
 _NAMES = {
-    "bake.audit.check": "check_materials",
-    "bake.audit.finding": "MaterialCheck MaterialFinding",
-    "bake.audit.fix": "fix_materials",
-    "bake.bake": "bake_thickness",
-    "bake.baked": "BakeReport",
+    "bake.audit.check": "check_materials fix_materials",
+    "bake.audit.rules": "MaterialCheck MaterialFinding",
+    "bake.bake": "bake_thickness bake_vertex_thickness",
     "bake.batch": "BatchReport bake_many",
     "bake.lithophane": "Lithophane lithophane",
-    "bake.reading": "load_thickness_map",
-    "bake.scatter.bake": "bake_scatter bake_vertex_scatter",
-    "bake.scatter.result": "ScatterMap VertexScatter",
+    "bake.scatter": "ScatterMap VertexScatter bake_scatter bake_vertex_scatter",
     "bake.settings": "BakeSettings",
-    "bake.thickness_map": "ThicknessMap VertexThickness",
-    "bake.vertices": "bake_vertex_thickness",
+    "bake.thickness_map": "BakeReport ThicknessMap VertexThickness load_thickness_map",
     "errors": "InputError RenderError TranslucentError TranslucentWarning",
     "formulas.phase": "Draine HenyeyGreenstein PhaseFunction WaterDroplets",
     "frames.appearance": "Appearance appearance_of average_color medium_for_average_color",

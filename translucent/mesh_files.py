@@ -19,7 +19,7 @@ from translucent.errors import InputError
 from translucent.files.paths import require_file
 from translucent.files.reading import open_file, require_memory, require_room, shown, size_text
 from translucent.geometry.mesh import PER_TRIANGLE, Mesh, Triangles, adopted, joined, mended
-from translucent.gltf.whole import read_whole
+from translucent.gltf.load import read_whole
 from translucent.units import metres_per_unit
 
 #: Bytes of memory that loading and diagnosing take at most for each byte of a text file, and for each triangle of a

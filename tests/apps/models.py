@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.boxes import boxes
-from translucent.gltf.write_file import write_gltf
+from translucent.gltf.file import write_gltf
 
 
 def write_scene(path: Path, *materials: dict[str, Any], cameras: bool = True) -> Path:

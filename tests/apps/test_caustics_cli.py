@@ -10,7 +10,7 @@ import pytest
 
 from tests.boxes import boxes
 from tests.command_line import Run
-from translucent.gltf.write_file import write_gltf
+from translucent.gltf.file import write_gltf
 
 GLASS = {
     "extensions": {

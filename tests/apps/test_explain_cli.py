@@ -12,7 +12,7 @@ import trimesh
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Run, one_error_line, strict_json
-from translucent.commands.common import SCATTERING_NAMES
+from translucent.commands.options import SCATTERING_NAMES
 from translucent.planning.scattering import SCATTERINGS
 
 

@@ -19,8 +19,7 @@ from PIL import Image
 import translucent as tl
 from tests.command_line import Run, one_error_line
 from translucent.assets import mesh_path
-from translucent.commands.extinction import TARGETS
-from translucent.commands.on_model import SIZE
+from translucent.commands.extinction import SIZE, TARGETS
 from translucent.formulas.color import linear_to_srgb
 from translucent.media.batch import MOST_SHOWN, convert_table
 from translucent.media.colors import parse_color
@@ -419,7 +418,7 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
         (["gray", "--from", "dict.json"], "--from with COLOR; each asks for something else"),
         (["--preset", "jade", "--from", "dict.json"], "--from with --preset"),
         (["--from", "none.mtlx"], "material 'none.mtlx'; no such file"),
-        (["--from", "good.csv"], "material 'good.csv'; suffix '.csv'; give a .mtlx, .usda, .json, .py, .js,"),
+        (["--from", "good.csv"], "material 'good.csv'; suffix '.csv'; give a .json, .mtlx, .py, .js,"),
         (["--from", "dict.json"], "material 'dict.json'; medium as JSON; unknown name"),
         (["--from", "bytes.usda"], "material 'bytes.usda'; not UTF-8 text"),
         (["gray", "1cm", "--unit-out", "furlong"], "unit 'furlong'; not a known unit"),

@@ -12,9 +12,8 @@ import trimesh
 
 import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
-from translucent.gltf.file import GltfFile, read_gltf
+from translucent.gltf.file import GltfFile, read_gltf, write_gltf
 from translucent.gltf.materials import read_materials
-from translucent.gltf.write_file import write_gltf
 
 WINE = ("--color", "linear(0.2,0.02,0.05)", "--distance", "1cm")
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 from tests.boxes import GLASS, boxes
 from tests.command_line import Run
-from translucent.gltf.write_file import write_gltf
+from translucent.gltf.file import write_gltf
 
 LOOK = ("--size", "16x12", "--samples", "1", "--backend", "cpu")
 QUICK = ("--size", "16", "--rays", "2", "--padding", "1")

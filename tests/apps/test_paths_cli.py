@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tests.command_line import Run
-from translucent.commands import progress
-from translucent.commands.progress import Progress, time_text
+from translucent.commands import console
+from translucent.commands.console import Progress, time_text
 
 JADE = ("bear", "--preset", "jade", "--method", "path-traced", "--size", "16x12")
 
@@ -55,7 +55,7 @@ def test_what_does_not_go_with_paths(run: Run, tmp_path: Path, options: tuple[ob
 def clock(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
     """A clock that shows its only entry."""
     now = [100.0]
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
     return now
 
 

@@ -16,7 +16,7 @@ from PIL import Image
 import translucent as tl
 from tests.little import with_few_shadows, without_processes
 from translucent.assets import web_path
-from translucent.bake import unwrap
+from translucent.bake import atlas
 from translucent.cli import cli, main
 from translucent.planning.methods import METHODS
 
@@ -47,7 +47,7 @@ def little(snippet: str) -> str:
     return re.sub(r"\((?:640, 480|320, 240|160, 120)\)", "(80, 60)", snippet)
 
 
-NEW_UV = unwrap._new_uv
+NEW_UV = atlas._new_uv
 
 #: What xatlas has made, which takes it seconds for a bear.
 UNWRAPPED: dict[tuple[bytes, bytes], Any] = {}
@@ -70,7 +70,7 @@ def small(monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer) -> None:
     )
     with_few_shadows(monkeypatch)
     without_processes(monkeypatch)
-    monkeypatch.setattr(unwrap, "_new_uv", new_uv)
+    monkeypatch.setattr(atlas, "_new_uv", new_uv)
 
 
 @pytest.mark.usefixtures("small")

@@ -15,7 +15,7 @@ from PIL import Image
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Result, Run, one_error_line, strict_json
-from translucent.commands.common import read_roughness
+from translucent.commands.options import read_roughness
 from translucent.planning.methods import METHODS
 
 GREEN = "linear(0.18,0.62,0.35)"

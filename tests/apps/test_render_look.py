@@ -12,7 +12,7 @@ from PIL import Image
 
 import translucent as tl
 from tests.command_line import Run, one_error_line
-from translucent.commands.common import TONE_NAMES, read_environment
+from translucent.commands.options import TONE_NAMES, read_environment
 from translucent.formulas.tone import TONES
 from translucent.scene.showcase import LIGHT_TABLE
 

@@ -12,10 +12,8 @@ import translucent as tl
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Result, Run, one_error_line
-from translucent.commands.model import FileLook, read_scene
-from translucent.commands.objects import NamedMedium, _grouped
-from translucent.gltf.file import read_gltf
-from translucent.gltf.write_file import write_gltf
+from translucent.commands.model import FileLook, NamedMedium, _grouped, read_scene
+from translucent.gltf.file import read_gltf, write_gltf
 
 MERLOT, JADE = tl.preset("merlot").medium, tl.preset("jade").medium
 

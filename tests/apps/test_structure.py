@@ -58,7 +58,6 @@ SHARED = {
     "Progress",
     "Rays",
     "SceneView",
-    "Shader",
     "Steps",
     "Surface",
     "SurfaceLight",

@@ -11,9 +11,8 @@ import pytest
 import trimesh
 
 import translucent as tl
-from translucent.bake.baked import BakeReport
 from translucent.bake.settings import BakeSettings
-from translucent.bake.thickness_map import ThicknessMap, VertexThickness
+from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
 
 Json = dict[str, Any]
 

@@ -24,10 +24,8 @@ import trimesh
 import translucent as tl
 from tests.bake.tasks import die_or_double, sleep_long
 from translucent.bake import jobs as jobs_module
-from translucent.bake.bake_file import bake_file
-from translucent.bake.batch import bake_many, run_job
-from translucent.bake.jobs import content_hash
-from translucent.bake.local_pool import in_processes
+from translucent.bake.batch import bake_many, in_processes, run_job
+from translucent.bake.jobs import bake_file, content_hash
 from translucent.bake.record import read_record, sidecar_of
 
 Job = dict[str, Any]
@@ -106,7 +104,7 @@ def test_a_job_of_a_batch_reads_its_model_for_the_hash_once(make_jobs: Any, monk
         asked.append(job)
         return content_hash(job)
 
-    for module in ("batch", "bake_file"):
+    for module in ("batch", "jobs"):
         monkeypatch.setattr(f"translucent.bake.{module}.content_hash", counted)
     assert run_job(job)["status"] == "baked"
     assert asked == [job]
@@ -152,7 +150,7 @@ def test_results_that_are_told_are_let_go(make_jobs: Any) -> None:
 FAULTS = """
 import resource
 import numpy as np
-from translucent.bake.memory import reuse_freed_memory_if_fixed
+from translucent.bake.batch import reuse_freed_memory_if_fixed
 
 def faults():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
@@ -300,7 +298,7 @@ def test_processes_end_when_the_work_is_given_up() -> None:
 def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     code = (
         "import sys, time; from tests.bake.tasks import tell_and_sleep\n"
-        "from translucent.bake.local_pool import in_processes\n"
+        "from translucent.bake.batch import in_processes\n"
         "if __name__ == '__main__': list(in_processes(tell_and_sleep, [0, 1], 2, lambda item: -item))\n"
     )
     (tmp_path / "batch.py").write_text(code)

@@ -13,8 +13,7 @@ import trimesh
 from PIL import Image
 
 import translucent as tl
-from translucent.bake.check import check_map, first_uv
-from translucent.bake.check_picture import NO_BODY, RIGHT, THICK, THIN, picture
+from translucent.bake.check import NO_BODY, RIGHT, THICK, THIN, check_map, first_uv, picture
 from translucent.cli import main
 
 SIZE = (96, 80)

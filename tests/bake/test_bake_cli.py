@@ -17,13 +17,13 @@ import trimesh
 import translucent as tl
 from tests.command_line import Result, Run, one_error_line
 from tests.little import without_processes
-from translucent.bake.gltf.builder import GlbBuilder
+from translucent.bake.gltf_builder import GlbBuilder
 from translucent.bake.record import sidecar_of
 from translucent.cli import main
 from translucent.commands import bake as command
 from translucent.gltf.file import read_gltf
 from translucent.gltf.materials import read_materials
-from translucent.gltf.scene_media import thickness_at, thickness_map
+from translucent.gltf.nodes import thickness_at, thickness_map
 
 QUICK = ("--size", "32", "--rays", "4", "--padding", "2")
 
@@ -315,7 +315,7 @@ def test_an_interrupted_bake_goes_on(run: Run, ball: Path, tmp_path: Path, monke
     assert run(*arguments).code == 0
     whole = path.read_bytes()
     path.unlink(), sidecar_of(path).unlink()
-    monkeypatch.setattr("translucent.bake.canvas.EVERY", 0.0, raising=False)
+    monkeypatch.setattr("translucent.bake.strips.EVERY", 0.0)
 
     @contextmanager
     def interrupt(_: str) -> Any:
@@ -377,7 +377,7 @@ def test_their_map_is_read_by_its_green_channel(assets: Path) -> None:
 
 def test_our_maps_agree_with_what_its_authors_wrote(assets: Path, attenuation: Path) -> None:
     """Cubes, whose thickness along the normal is their edge: by a texture in one row, by factors in others."""
-    from translucent.bake.gltf.targets import find_targets
+    from translucent.bake.gltf_targets import find_targets
 
     source, baked = read_gltf(assets / "gltf" / "AttenuationTest.glb"), read_gltf(attenuation)
     theirs = {one.index: one for one in read_materials(source.path)}

@@ -12,10 +12,12 @@ import pytest
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.bake import canvas, directions, measure, strips
+from translucent.bake import measure, strips
+from translucent.bake import rays as directions
 from translucent.bake import rays as following
-from translucent.bake.directions import Directions, _plain_sobol
-from translucent.bake.modes import RayMean, block_edges
+from translucent.bake import strips as canvas
+from translucent.bake.measure import RayMean, block_edges
+from translucent.bake.rays import Directions, _plain_sobol
 from translucent.bake.settings import BakeSettings
 from translucent.formulas.sampling import MOST_POINTS
 from translucent.geometry.solids import Box, Sphere, Torus

@@ -17,11 +17,10 @@ import trimesh
 from PIL import Image
 
 import translucent as tl
-from translucent.bake import record, writing
-from translucent.bake.encoding import Encoding
-from translucent.bake.reading import load_thickness_map
-from translucent.bake.record import file_hash, sidecar_of
-from translucent.bake.writing import save_map, save_vertices
+from translucent.bake import thickness_map
+from translucent.bake.record import Encoding, file_hash, plain, sidecar_of
+from translucent.bake.settings import DEFINITIONS
+from translucent.bake.thickness_map import load_thickness_map, save_map, save_vertices
 
 MapMaker = Callable[..., Any]
 
@@ -114,12 +113,12 @@ def test_every_mode_has_a_definition() -> None:
 
     from translucent.bake.settings import Mode
 
-    assert set(record.DEFINITIONS) == set(get_args(Mode))
+    assert set(DEFINITIONS) == set(get_args(Mode))
 
 
 def test_numbers_of_numpy_and_infinity_fit_into_the_record() -> None:
     given = {"a": np.float32(0.5), "b": [np.int64(3), float("inf")], "c": (float("nan"), True, None, "x")}
-    assert record.plain(given) == {"a": 0.5, "b": [3, None], "c": [None, True, None, "x"]}
+    assert plain(given) == {"a": 0.5, "b": [3, None], "c": [None, True, None, "x"]}
 
 
 def test_the_local_mode_has_no_unit(make_map: MapMaker, ramp: np.ndarray, tmp_path: Path) -> None:
@@ -187,7 +186,7 @@ def test_a_read_only_folder_is_noticed_before_any_work(
 ) -> None:
     monkeypatch.setattr("os.access", lambda *_: False)  # root may write everywhere
     with pytest.raises(tl.RenderError, match="is read-only"):
-        writing.check_map_output(tmp_path / f"t{suffix}")
+        thickness_map.check_map_output(tmp_path / f"t{suffix}")
 
 
 # In a process of its own, whose files must stay below a limit as those of a full disk do: writes fail in the middle.
@@ -200,7 +199,7 @@ sys.path.insert(0, {tests!r})
 import conftest, translucent as tl
 from translucent.bake.settings import BakeSettings
 from translucent.bake.thickness_map import ThicknessMap
-from translucent.bake.writing import save_map
+from translucent.bake.thickness_map import save_map
 values = np.random.default_rng(1).uniform(0.1, 1, (256, 256)).astype(np.float32)
 made = ThicknessMap(values, values > 0, values, 0.0, conftest.quad(), BakeSettings(size=256), conftest.report())
 resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))

@@ -18,15 +18,13 @@ import trimesh
 from PIL import Image
 
 import translucent as tl
-from translucent.bake.gltf.builder import INDICES, GlbBuilder
-from translucent.bake.gltf.maps import write_maps
-from translucent.bake.gltf.targets import find_targets
-from translucent.bake.writing import save_map, save_vertices
+from translucent.bake.gltf_builder import INDICES, GlbBuilder
+from translucent.bake.gltf_targets import find_targets
+from translucent.bake.thickness_map import save_map, save_vertices, write_maps
 from translucent.gltf.accessors import Accessors
-from translucent.gltf.file import GltfFile, read_gltf
+from translucent.gltf.file import GltfFile, read_gltf, write_gltf
 from translucent.gltf.materials import read_materials
-from translucent.gltf.scene_media import thickness_at, thickness_map
-from translucent.gltf.write_file import write_gltf
+from translucent.gltf.nodes import thickness_at, thickness_map
 
 MapMaker = Callable[..., Any]
 Json = dict[str, Any]
@@ -148,7 +146,7 @@ def test_everything_else_in_the_file_stays(
     source = tmp_path / f"in{suffix}"
     if suffix == ".gltf":
         write_gltf(before, source)
-    write_maps(read_gltf(source), tmp_path / "out.glb", {(1, 0): make_map(ramp)})
+    write_maps(GlbBuilder(read_gltf(source)), tmp_path / "out.glb", {(1, 0): make_map(ramp)})
     after = read_gltf(tmp_path / "out.glb")
     for key in ("asset", "scene", "scenes", "nodes", "extras", "accessors"):
         assert after.tree[key] == before.tree[key], key
@@ -177,7 +175,7 @@ def test_meshes_that_share_a_material_get_their_own(
 ) -> None:
     before = scene(tmp_path / "in.glb", 3, extensions=GLASS)
     maps = {(i, 0): make_map(ramp * (i + 1)) for i in range(3)}
-    write_maps(before, tmp_path / "out.glb", maps)
+    write_maps(GlbBuilder(before), tmp_path / "out.glb", maps)
     after = read_gltf(tmp_path / "out.glb")
     materials = read_materials(tmp_path / "out.glb")
     used = [mesh["primitives"][0]["material"] for mesh in after.tree["meshes"]]
@@ -191,13 +189,13 @@ def test_variants_keep_their_materials(scene: MapMaker, make_map: MapMaker, ramp
     before = scene(tmp_path / "in.glb", 1, extensions=GLASS)
     primitive = before.tree["meshes"][0]["primitives"][0]
     primitive["extensions"] = {"KHR_materials_variants": {"mappings": [{"material": 0, "variants": [0]}]}}
-    write_maps(before, tmp_path / "out.glb", {(0, 0): make_map(ramp)})
+    write_maps(GlbBuilder(before), tmp_path / "out.glb", {(0, 0): make_map(ramp)})
     after = read_gltf(tmp_path / "out.glb")
     assert after.tree["materials"][0] == before.tree["materials"][0]
     assert after.tree["meshes"][0]["primitives"][0]["material"] == 1
     primitive["extensions"]["KHR_materials_variants"]["mappings"] = [{"variants": [0]}]
     with pytest.raises(tl.InputError, match="KHR_materials_variants is malformed"):
-        write_maps(before, tmp_path / "bad.glb", {(0, 0): make_map(ramp)})
+        write_maps(GlbBuilder(before), tmp_path / "bad.glb", {(0, 0): make_map(ramp)})
 
 
 def test_an_opaque_material_lets_light_in_then(
@@ -205,7 +203,7 @@ def test_an_opaque_material_lets_light_in_then(
 ) -> None:
     before = scene(tmp_path / "in.glb", 1, doubleSided=True, pbrMetallicRoughness={"roughnessFactor": 0.3})
     wine = tl.Medium.from_color("#7b1e3a", 0.01)
-    write_maps(before, tmp_path / "out.glb", {(0, 0): make_map(ramp)}, medium=wine)
+    write_maps(GlbBuilder(before), tmp_path / "out.glb", {(0, 0): make_map(ramp)}, medium=wine)
     (found,) = read_materials(tmp_path / "out.glb")
     assert (found.kind, found.transmission, found.warnings) == ("volume", 1.0, ())
     np.testing.assert_allclose(found.medium().extinction, wine.extinction, rtol=1e-12)
@@ -220,7 +218,7 @@ def test_a_volume_keeps_its_color_and_a_share_of_light_its_size(
     volume = {"attenuationColor": [0.1, 0.5, 0.9], "attenuationDistance": 2, "thicknessFactor": 5, "extras": {"a": 1}}
     extensions = {"KHR_materials_transmission": {"transmissionFactor": 0.5}, "KHR_materials_volume": volume}
     before = scene(tmp_path / "in.glb", 1, extensions=extensions)
-    write_maps(before, tmp_path / "out.glb", {(0, 0): make_map(ramp)}, medium=tl.Medium(absorption=1))
+    write_maps(GlbBuilder(before), tmp_path / "out.glb", {(0, 0): make_map(ramp)}, medium=tl.Medium(absorption=1))
     after = read_gltf(tmp_path / "out.glb").tree["materials"][0]["extensions"]
     texture = {"thicknessTexture": {"index": 1}, "thicknessFactor": pytest.approx(float(ramp.max()))}
     assert after == {**extensions, "KHR_materials_volume": {**volume, **texture}}
@@ -228,7 +226,7 @@ def test_a_volume_keeps_its_color_and_a_share_of_light_its_size(
 
 def test_the_unit_of_the_file_counts(scene: MapMaker, make_map: MapMaker, ramp: np.ndarray, tmp_path: Path) -> None:
     before = scene(tmp_path / "in.glb", 1, extensions=GLASS)
-    write_maps(before, tmp_path / "out.glb", {(0, 0): make_map(ramp)}, metres=0.01)
+    write_maps(GlbBuilder(before), tmp_path / "out.glb", {(0, 0): make_map(ramp)}, metres=0.01)
     (found,) = read_materials(tmp_path / "out.glb")
     assert found.thickness == pytest.approx(100 * float(ramp.max()), rel=1e-12)
 
@@ -238,7 +236,7 @@ def test_a_material_that_excludes_a_volume_is_refused(
 ) -> None:
     before = scene(tmp_path / "in.glb", 1, extensions={"KHR_materials_unlit": {}})
     with pytest.raises(tl.InputError, match="material 0 'Glass'; KHR_materials_unlit excludes a volume"):
-        write_maps(before, tmp_path / "out.glb", {(0, 0): make_map(ramp)})
+        write_maps(GlbBuilder(before), tmp_path / "out.glb", {(0, 0): make_map(ramp)})
     assert [p.name for p in tmp_path.iterdir()] == ["in.glb"]
 
 
@@ -246,7 +244,7 @@ def test_objects_without_thickness_are_left_as_they_are(
     scene: MapMaker, make_map: MapMaker, ramp: np.ndarray, tmp_path: Path
 ) -> None:
     before = scene(tmp_path / "in.glb", 2, extensions=GLASS)
-    told = write_maps(before, tmp_path / "out.glb", {(0, 0): make_map(0 * ramp), (1, 0): make_map(ramp)})
+    told = write_maps(GlbBuilder(before), tmp_path / "out.glb", {(0, 0): make_map(0 * ramp), (1, 0): make_map(ramp)})
     assert [one.get("warnings", []) for one in told["maps"]] == [["no thickness: its material is left as it is"], []]
     assert read_gltf(tmp_path / "out.glb").tree["meshes"][0] == before.tree["meshes"][0]
 
@@ -379,14 +377,14 @@ def test_what_cannot_be_unwrapped_is_refused(scene: MapMaker, change: str, tmp_p
 
 @pytest.mark.parametrize("metres", [1.0, 0.01])
 def test_vertices_get_an_attribute(scene: MapMaker, metres: float, make_vertices: MapMaker, tmp_path: Path) -> None:
-    from translucent.bake.gltf.vertices import write_vertices
+    from translucent.bake.thickness_map import write_vertices
 
     before = scene(tmp_path / "in.glb", 1, extensions=GLASS)
     (target,) = find_targets(GlbBuilder(before), metres, needs_uv=False)
     assert target.mesh.uv is None
     assert len(target.mesh.vertices) == 42  # welded; the file has three vertices per face
     result = make_vertices(target.mesh.vertices[:, 0] + 2 * metres, target.mesh)
-    write_vertices(before, tmp_path / "out.glb", {(0, 0): result}, metres=metres)
+    write_vertices(GlbBuilder(before), tmp_path / "out.glb", {(0, 0): result}, metres=metres)
     found = vertices_of(read_gltf(tmp_path / "out.glb"))
     np.testing.assert_allclose(found["_THICKNESS"][:, 0], found["POSITION"][:, 0] + 2, atol=1e-6)
 

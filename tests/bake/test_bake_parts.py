@@ -15,10 +15,9 @@ import trimesh
 import translucent as tl
 from tests.command_line import Run, one_error_line
 from tests.values.gltf_writer import Writer, glass
-from translucent.bake.bake_file import bake_file
 from translucent.bake.batch import asset_line, run_job
-from translucent.bake.check import look_up
-from translucent.bake.check_files import check_output
+from translucent.bake.check import check_output, look_up
+from translucent.bake.jobs import bake_file
 from translucent.bake.record import read_record
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.file import read_gltf

@@ -18,15 +18,14 @@ import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
 from translucent.assets import mesh_path
 from translucent.bake.record import sidecar_of
-from translucent.bake.scatter.check import check_scatter, environments
-from translucent.bake.scatter.files import (
+from translucent.bake.scatter import (
     ATTRIBUTES,
     EXTRAS,
     positions_of,
     read_scatter_exr,
     read_scatter_glb,
 )
-from translucent.bake.scatter.job import Baked
+from translucent.bake.scatter_job import Baked, check_scatter, environments
 from translucent.diffusion.harmonics import LitAlone, exit_radiance
 from translucent.formulas.spherical_harmonics import real_harmonics, scattered_radiance
 from translucent.geometry.solids import Sphere

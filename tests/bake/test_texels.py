@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.bake.padding import pad
+from translucent.bake.atlas import Atlas, pad, unwrap
 from translucent.bake.surface import Surface
-from translucent.bake.texels import Atlas
-from translucent.bake.unwrap import unwrap
 from translucent.geometry.solids import Box, Sphere
 
 SQUARE = [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]]]

@@ -12,7 +12,7 @@ import pytest
 
 import translucent as tl
 from tests.command_line import Run
-from translucent.commands import pictures
+from translucent.commands import render
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frames.tiled import write_tiles
 from translucent.geometry.solids import Sphere
@@ -119,7 +119,7 @@ def test_a_large_picture_is_written_in_tiles(run: Run, tmp_path: Path, monkeypat
     arguments = ("render", "knot", "--stage", "none", "--size", "48x40", "--samples", "1", "--json", "-o")
     pytest.importorskip("OpenEXR", reason="writes .exr files")
     whole = json.loads(run(*arguments, tmp_path / "whole.exr").out)
-    monkeypatch.setattr(pictures, "LARGE", 40 * 40)
+    monkeypatch.setattr(render, "TILED", 40 * 40)
     monkeypatch.setattr("translucent.tiles.TILE", TILE)
     tiled = json.loads(run(*arguments, tmp_path / "tiles.exr").out)
     for name in ("size", "covered_pixels", "invalid_pixels", "plan"):

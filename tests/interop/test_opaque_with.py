@@ -11,7 +11,7 @@ import numpy as np
 
 from tests.boxes import GLASS, boxes
 from tests.command_line import Run
-from translucent.gltf.write_file import write_gltf
+from translucent.gltf.file import write_gltf
 
 
 def write(path: Path, *materials: dict[str, Any]) -> Path:

@@ -14,7 +14,7 @@ from PIL import Image
 
 import translucent as tl
 from translucent.formulas.color import srgb_to_linear
-from translucent.gltf import images
+from translucent.gltf import textures as images
 from translucent.gltf.textures import TextureTransform
 from translucent.gltf.textures import sample as sample_gltf
 

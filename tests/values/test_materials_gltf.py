@@ -11,15 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 from PIL import Image
 
 import translucent as tl
-from tests.values.gltf_json import gltf
+from tests.values.gltf_json import gltf, uses
 from translucent.formulas import optics
 from translucent.gltf.file import GltfFile, read_gltf
 from translucent.gltf.materials import GltfMaterial, materials_of, read_materials
-from translucent.gltf.scene_media import material_uses, thickness_at, thickness_map, world_thickness
+from translucent.gltf.nodes import node_transforms, thickness_at, thickness_map
 from translucent.gltf.textures import TextureTransform
 from translucent.media.medium import BLACKEST
 
@@ -45,6 +44,11 @@ def transformed(**transform: Any) -> Json:
 
 def parsed(*materials: Json, **more: Any) -> list[GltfMaterial]:
     return materials_of(GltfFile(Path("a.gltf"), gltf(*materials, **more)))
+
+
+def world_length(transform: np.ndarray) -> float:
+    """World length of 1 in mesh space, along the world's z axis."""
+    return 1.0 / float(np.linalg.norm(np.linalg.solve(transform[:3, :3], (0.0, 0.0, 1.0))))
 
 
 # Reading
@@ -187,16 +191,16 @@ def test_the_attenuation_answer_key(assets: Path) -> None:
     columns = ("0.25", "0.50", "1.0", "1.5", "2.0")
     key = {float(c): np.power(COLOR, float(c)) for c in columns}
     seen: dict[str, int] = {"R1": 0, "R2": 0, "R4": 0, "R5": 0}
-    for use in material_uses(file):
-        row, column = use.name[:2], use.name.rpartition("_")[2]
-        material = materials[use.material]
+    for name, index, transform in uses(file):
+        row, column = name[:2], name.rpartition("_")[2]
+        material = materials[index]
         if row == "R1":
-            tint = file.items("materials")[use.material]["pbrMetallicRoughness"]["baseColorFactor"][:3]
+            tint = file.items("materials")[index]["pbrMetallicRoughness"]["baseColorFactor"][:3]
             np.testing.assert_allclose(tint, key[float(column)], atol=1e-9)
         elif row in ("R2", "R4", "R5"):
-            thickness = world_thickness(material.thickness, use.transform, (0, 0, 1))
+            thickness = material.thickness * world_length(transform)
             color = optics.transmittance(material.medium().extinction * thickness)
-            np.testing.assert_allclose(color, key[float(column)], atol=1e-6, err_msg=use.name)
+            np.testing.assert_allclose(color, key[float(column)], atol=1e-6, err_msg=name)
         else:
             continue
         seen[row] += 1
@@ -206,12 +210,12 @@ def test_the_attenuation_answer_key(assets: Path) -> None:
 def test_the_attenuation_answer_key_of_the_texture(assets: Path) -> None:
     file = read_gltf(assets / "gltf" / "AttenuationTest.glb")
     material = materials_of(file)[6]
-    (use,) = [use for use in material_uses(file) if use.material == 6]
+    (transform,) = [transform for _, index, transform in uses(file) if index == 6]
     levels = np.unique(thickness_map(file, material))
     expected = 2.0 * np.array([32, 64, 128, 191, 255]) / 255.0
     for thickness in expected:
         assert np.abs(levels - thickness).min() < 1e-12
-    world = world_thickness(expected, use.transform, (0, 0, 1))
+    world = expected * world_length(transform)
     colors = optics.transmittance(world[:, None] * material.medium().extinction)
     np.testing.assert_allclose(colors[:, 0], [0.5611, 0.3148, 0.0991, 0.03176, 0.01], rtol=1e-3)
     np.testing.assert_allclose(colors, np.power(COLOR, expected[:, None]), atol=1e-6)
@@ -224,7 +228,6 @@ def test_the_attenuation_answer_key_of_the_texture(assets: Path) -> None:
 def test_third_party_files_are_read(assets: Path, name: str) -> None:
     file = read_gltf(assets / "gltf" / f"{name}.glb")
     materials = materials_of(file)
-    assert material_uses(file)
     volumes = [m for m in materials if m.has_volume]
     assert volumes
     if name == "TransmissionRoughnessTest":
@@ -330,37 +333,6 @@ def test_an_extension_of_the_texture_that_is_not_known_is_a_warning() -> None:
 # Transforms
 
 
-def rotation(axis: tuple[float, float, float], degrees: float) -> np.ndarray:
-    return trimesh.transformations.rotation_matrix(math.radians(degrees), axis)
-
-
-@pytest.mark.parametrize("mirrored", [1.0, -1.0])
-def test_thickness_under_a_rotated_uneven_scale(mirrored: float) -> None:
-    """Scaling the world direction by the lengths of the matrix columns, a known defect elsewhere, is wrong here."""
-    matrix = rotation((0, 0, 1), 90) @ np.diag([4.0 * mirrored, 1.0, 2.0, 1.0])
-    # The mesh's x axis, scaled by 4, points along the world's y axis.
-    assert world_thickness(0.5, matrix, (0, 1, 0)) == pytest.approx(2.0, rel=1e-12)
-    assert world_thickness(0.5, matrix, (1, 0, 0)) == pytest.approx(0.5, rel=1e-12)
-    assert world_thickness(0.5, matrix, (0, 0, -3)) == pytest.approx(1.0, rel=1e-12)
-    columns = np.linalg.norm(matrix[:3, :3], axis=0)
-    assert np.linalg.norm(columns * (0, 1, 0)) * 0.5 == pytest.approx(0.5)  # what those renderers get instead of 2
-
-
-def test_thickness_is_the_length_of_a_segment_of_the_mesh(rng: np.random.Generator) -> None:
-    for _ in range(20):
-        matrix, direction = rng.normal(size=(3, 3)), rng.normal(size=3)
-        start = rng.normal(size=3)
-        local = np.linalg.solve(matrix, direction)
-        end = start + 0.3 * local / np.linalg.norm(local)
-        length = np.linalg.norm(matrix @ end - matrix @ start)
-        assert world_thickness(0.3, matrix, direction) == pytest.approx(length, rel=1e-9)
-
-
-def test_a_flattening_transform_is_refused() -> None:
-    with pytest.raises(tl.InputError, match="flattens the mesh"):
-        world_thickness(1.0, np.diag([1.0, 0.0, 1.0]), (0, 1, 0))
-
-
 def test_nodes_are_transformed_by_their_parents() -> None:
     turn = [0.0, 0.0, math.sin(math.pi / 4), math.cos(math.pi / 4)]
     file = GltfFile(
@@ -374,8 +346,7 @@ def test_nodes_are_transformed_by_their_parents() -> None:
             meshes=[{"primitives": [{"attributes": {}, "material": 0}]}],
         ),
     )
-    (use,) = material_uses(file)
-    np.testing.assert_allclose(use.transform @ (0, 0, 0, 1), (0, 2, 0, 1), atol=1e-12)
+    np.testing.assert_allclose(node_transforms(file)[1] @ (0, 0, 0, 1), (0, 2, 0, 1), atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -385,9 +356,8 @@ def test_nodes_are_transformed_by_their_parents() -> None:
         ([{"children": [1, 1]}, {}], "two parents"),
         ([{"children": [7]}], "nodes 7 is not one of 1"),
         ([{"scale": [1, 2]}], "no valid transform"),
-        ([{"mesh": 0}], "meshes 0 is not one of 0"),
     ],
 )
 def test_bad_nodes_are_refused(nodes: list[Json], message: str) -> None:
     with pytest.raises(tl.InputError, match=message):
-        material_uses(GltfFile(Path("a.gltf"), gltf({}, nodes=nodes)))
+        node_transforms(GltfFile(Path("a.gltf"), gltf({}, nodes=nodes)))

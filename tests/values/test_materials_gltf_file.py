@@ -15,10 +15,9 @@ from PIL import Image
 
 import translucent as tl
 from tests.values.gltf_json import JADE, Json, gltf
-from translucent.gltf.file import GltfFile, read_gltf
+from translucent.gltf.file import GltfFile, read_gltf, write_gltf
 from translucent.gltf.materials import read_materials
 from translucent.gltf.write import write_medium
-from translucent.gltf.write_file import write_gltf
 
 
 def saved(path: Path, tree: Json) -> Path:

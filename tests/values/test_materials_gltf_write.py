@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from tests.values.gltf_json import JADE
-from translucent.gltf.file import GltfFile, read_gltf
+from tests.values.gltf_json import JADE, uses
+from translucent.gltf.file import GltfFile, read_gltf, write_gltf
 from translucent.gltf.materials import materials_of, read_materials
-from translucent.gltf.scene_media import material_uses
 from translucent.gltf.write import write_medium
-from translucent.gltf.write_file import write_gltf
 from translucent.media.medium import BLACKEST
 
 # Writing
@@ -87,7 +85,7 @@ def test_only_the_named_object_is_changed(
     assert after.tree["materials"][:2] == before.tree["materials"]
     assert after.tree["materials"][2]["name"] == f"Glass ({name})"
     found = materials_of(after)
-    filled = [use.name for use in material_uses(after) if found[use.material].medium() is not None]
+    filled = [name for name, index, _ in uses(after) if found[index].medium() is not None]
     assert len(filled) == nodes
     assert filled == (["Left", "Right"] if name == "Box" else [name])
     assert after.chunks == before.chunks
@@ -126,7 +124,7 @@ def test_a_mesh_without_a_material_gets_one(two_boxes: Path, tmp_path: Path) -> 
         del mesh["primitives"][0]["material"]
     write_gltf(GltfFile(file.path, tree, file.chunks), tmp_path / "bare.glb")
     assert write_medium(tmp_path / "bare.glb", tmp_path / "out.glb", JADE) == [0]
-    assert {use.material for use in material_uses(read_gltf(tmp_path / "out.glb"))} == {0}
+    assert {index for _, index, _ in uses(read_gltf(tmp_path / "out.glb"))} == {0}
 
 
 def test_what_gltf_cannot_hold_is_a_warning(two_boxes: Path, tmp_path: Path) -> None:

@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.materials.materialx import Shader, medium_of
-from translucent.materials.openpbr import SHADER as OPENPBR
-from translucent.materials.openpbr import read_openpbr, write_openpbr
-from translucent.materials.standard_surface import SHADER as STANDARD_SURFACE
+from translucent.materials.materialx import OPENPBR, STANDARD_SURFACE, SurfaceShader, medium_of
 
 Values = Mapping[str, Any]
 
@@ -63,7 +60,7 @@ _OPERATIONS = {
 }
 
 
-def stated(shader: Shader, rng: np.random.Generator) -> dict[str, Any]:
+def stated(shader: SurfaceShader, rng: np.random.Generator) -> dict[str, Any]:
     """Random inputs, about half of them with more scattering than extinction in some channel."""
     return {
         shader.weight: 1.0,
@@ -95,7 +92,7 @@ def test_the_medium_is_the_one_that_the_graph_of_openpbr_computes(library: Any, 
 
 @pytest.mark.parametrize(("source", "target"), [(OPENPBR, STANDARD_SURFACE), (STANDARD_SURFACE, OPENPBR)])
 def test_materialx_translates_the_two_into_each_other_input_by_input(
-    library: Any, rng: np.random.Generator, source: Shader, target: Shader
+    library: Any, rng: np.random.Generator, source: SurfaceShader, target: SurfaceShader
 ) -> None:
     inputs = stated(source, rng)
     graph = graph_of(library, f"ND_{source.node}_to_{target.node}")
@@ -115,7 +112,7 @@ def test_the_graph_of_standard_surface_itself_has_no_depth(library: Any) -> None
 
 
 @pytest.mark.parametrize("shader", [OPENPBR, STANDARD_SURFACE])
-def test_the_defaults_are_those_of_the_definition(library: Any, shader: Shader) -> None:
+def test_the_defaults_are_those_of_the_definition(library: Any, shader: SurfaceShader) -> None:
     definition = library.getNodeDef(f"ND_{shader.node}_surfaceshader")
     for key, default in shader.defaults().items():
         value = definition.getActiveInput(key).getValue()
@@ -131,9 +128,9 @@ def test_a_later_openpbr_that_scatters_is_refused() -> None:
         (milk, "2.0.1", False),
         (tl.Medium(absorption=(1, 2, 3)), "1.2", True),
     ):
-        text = write_openpbr(medium).replace("<open_pbr_surface ", f'<open_pbr_surface version="{version}" ')
+        text = OPENPBR.write(medium).replace("<open_pbr_surface ", f'<open_pbr_surface version="{version}" ')
         if readable:
-            np.testing.assert_allclose(read_openpbr(text).extinction, medium.extinction, rtol=1e-12)
+            np.testing.assert_allclose(OPENPBR.read(text).extinction, medium.extinction, rtol=1e-12)
         else:
             with pytest.raises(tl.InputError, match=f"version {version}, whose scatter color means another thing"):
-                read_openpbr(text)
+                OPENPBR.read(text)

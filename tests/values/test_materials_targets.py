@@ -17,11 +17,9 @@ from translucent.formulas.color import srgb_to_linear, to_hex
 from translucent.gltf.file import GltfFile
 from translucent.gltf.materials import materials_of
 from translucent.materials import TARGETS, load_medium, text_block
+from translucent.materials.engines import LONGEST_CM, from_mean_free_path_cm, from_unity, mean_free_path_cm
 from translucent.materials.json_text import read_json, write_json
-from translucent.materials.openpbr import read_openpbr, write_openpbr
-from translucent.materials.standard_surface import read_standard_surface, write_standard_surface
-from translucent.materials.unity import from_unity
-from translucent.materials.unreal import LONGEST_CM, from_mean_free_path_cm, mean_free_path_cm
+from translucent.materials.materialx import OPENPBR, STANDARD_SURFACE
 from translucent.media.medium import BLACKEST, color_at, extinction_at
 
 # Color at a distance
@@ -57,7 +55,7 @@ def test_black_has_a_finite_extinction() -> None:
 # MaterialX
 
 
-@pytest.mark.parametrize("surface", [(write_openpbr, read_openpbr), (write_standard_surface, read_standard_surface)])
+@pytest.mark.parametrize("surface", [(OPENPBR.write, OPENPBR.read), (STANDARD_SURFACE.write, STANDARD_SURFACE.read)])
 class TestMaterialX:
     @pytest.mark.parametrize("medium", [JADE, MILK, CLEAR], ids=["jade", "milk", "clear"])
     @pytest.mark.parametrize("distance", [None, 0.02, 10.0])
@@ -122,7 +120,7 @@ class TestMaterialX:
         assert "\n" not in str(caught.value)
 
     def test_another_surface_is_refused(self, surface: Any) -> None:
-        other = write_openpbr if surface[0] is write_standard_surface else write_standard_surface
+        other = OPENPBR.write if surface[0] == STANDARD_SURFACE.write else STANDARD_SURFACE.write
         with pytest.raises(tl.InputError, match="it has no <"):
             surface[1](other(JADE))
 
@@ -284,7 +282,7 @@ def test_files_of_other_systems_are_loaded(tmp_path: Path, name: str, target: st
         (
             "a.glb",
             "",
-            "suffix '.glb'; give a .mtlx, .usda, .json, .py, .js, .gdshader, .cs, .txt file; of glTF, translucent",
+            "suffix '.glb'; give a .json, .mtlx, .py, .js, .gdshader, .txt, .cs, .usda file; of glTF, translucent",
         ),
         ("a.mtlx", "<materialx><open_pbr_surface>", "a.mtlx'; OpenPBR document; its XML is broken"),
         ("a.mtlx", "<materialx/>", "a.mtlx'; Standard Surface document; it has no <standard_surface>"),

@@ -10,7 +10,7 @@ import pytest
 
 import translucent as tl
 from tests.values.plan_scenes import DIAMOND, NO_STORAGE, OPEN, ORDERED, SCENES, TORUS, WINE, body, scene, sheet
-from translucent.commands.common import INTERFACE_NAMES
+from translucent.commands.options import INTERFACE_NAMES
 from translucent.planning.interfaces import INTERFACES, Interfaces
 from translucent.planning.interfaces.front import ONE_INTERFACE
 from translucent.planning.interfaces.traced import TRACE_COST

@@ -19,7 +19,7 @@ from PIL import Image
 
 import translucent as tl
 from tests.boxes import box_buffer, linked_box
-from translucent.bake.reading import load_thickness_map
+from translucent.bake.thickness_map import load_thickness_map
 from translucent.bench.codec import Packed
 from translucent.files import reading
 from translucent.files.reading import json_value, open_file, require_room, toml_value

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.commands.common import STAGE_NAMES
+from translucent.commands.options import STAGE_NAMES
 from translucent.geometry.solids import Box, Sphere
 from translucent.scene.shadow_catchers import before_page, page_radiance
 from translucent.scene.showcase import DEFAULT_COLOR, default_medium, framing, showcase

@@ -1,22 +1,176 @@
-"""Batch baking: each asset is a job of its own, in any executor; finished jobs are skipped, failures isolated."""
+"""Batches of bakes: each asset is a job of its own, in any executor; finished jobs are skipped, failures isolated.
+
+The default executor is a pool of processes on this machine in which no process takes the others along when it dies.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+import threading
 import time
+import warnings
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, as_completed, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeVar, get_args
 
-from translucent.bake.bake_file import bake_file
-from translucent.bake.jobs import Job, check_job, content_hash, is_done
-from translucent.bake.local_pool import in_processes
-from translucent.bake.memory import reuse_freed_memory_if_fixed
+from translucent.bake.jobs import Job, bake_file, check_job, content_hash, is_done
 from translucent.bake.record import Record, files_of, parts_of, read_record
 from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentError
 from translucent.version import VERSION
+
+#: Parameters of glibc's mallopt (malloc.h), and the largest values that glibc itself would come to.
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
+MOST_REUSED = 32 << 20
+
+
+@cache  # once for a process
+def reuse_freed_memory() -> None:
+    """Let arrays reuse the memory of freed ones; for processes that do nothing but bake.
+
+    glibc gives memory back to the system when arrays are freed, and the system clears each page anew for the next ones.
+    It learns from their sizes to do so less, but for some sizes of maps that still takes a twentieth of a bake. Larger
+    arrays than 32 MB go back as before. Other C libraries stay as they are.
+    """
+    if sys.platform != "linux":
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(M_MMAP_THRESHOLD, MOST_REUSED)
+        mallopt(M_TRIM_THRESHOLD, 2 * MOST_REUSED)
+
+
+def reuse_freed_memory_if_fixed() -> None:
+    """`reuse_freed_memory` where ``MALLOC_TRIM_THRESHOLD_`` is set, as it is in workers of Dask.
+
+    With that, glibc learns nothing: each array of more than 128 KB is mapped anew, which takes an eighth of a bake.
+    """
+    if "MALLOC_TRIM_THRESHOLD_" in os.environ:
+        reuse_freed_memory()
+
+
+#: Seconds that a worker process has for cleaning up when the work is canceled.
+PATIENCE = 5.0
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def in_processes(
+    task: Callable[[Item], Result], items: list[Item], workers: int, lost: Callable[[Item], Result]
+) -> Iterator[Result]:
+    """Results of a task for each item, as they come.
+
+    Processes are spawned, not forked: OpenGL and threads do not survive a fork. When one dies (out of memory, or a
+    crash in a library), what was running is done again, one item at a time; `lost` makes the result of an item whose
+    process dies even then. Where the iteration is ended early, or its process is killed, the processes end, too.
+
+    Parameters
+    ----------
+    task : callable
+        Found by its name in the processes, so it must be a function of a module.
+    items : list
+        What pickle can send.
+    workers : int
+        At most so many processes.
+    lost : callable
+    """
+    waiting = deque(items)
+    suspects: deque[Item] = deque()
+    while waiting or suspects:
+        # A suspect gets a process of its own, so that it can take nothing else along.
+        alone = bool(suspects)
+        running: dict[Future[Result], Item] = {}
+        with _Pool(1 if alone else workers) as pool:
+            source = deque([suspects.popleft()]) if alone else waiting
+            broken: list[Item] = []
+            while (source or running) and not broken:
+                while source and len(running) < workers and not broken:
+                    item = source.popleft()
+                    try:
+                        running[pool.submit(_do, task, item)] = item
+                    except BrokenProcessPool:  # a process died of something else while it waited
+                        broken += [item, *running.values()]
+                        running.clear()
+                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    item = running.pop(future)
+                    if isinstance(future.exception(), BrokenProcessPool):
+                        broken.append(item)
+                    else:
+                        yield future.result()
+            broken += running.values()
+        if alone:
+            yield from map(lost, broken)
+        else:
+            suspects.extend(broken)
+
+
+class _Pool(ProcessPoolExecutor):
+    """Worker processes that end at once when the work is canceled."""
+
+    def __init__(self, workers: int) -> None:
+        super().__init__(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
+
+    def __exit__(self, kind: Any, error: Any, traceback: Any) -> None:
+        if kind is not None:
+            # Not public before Python 3.14, which has terminate_workers().
+            processes = list((self._processes or {}).values())
+            manager: Any = self._executor_manager_thread  # typeshed takes it for something else
+            for process in processes:
+                process.terminate()
+            self.shutdown(wait=False, cancel_futures=True)
+            for process in processes:
+                process.join(PATIENCE)
+                process.kill()  # one that was asked while it started may not have heard
+                process.join()
+            if manager is not None:  # it waits for the processes, too, and may be about to write down that one ended
+                manager.join(1.0)
+        self.shutdown(wait=True, cancel_futures=True)
+
+
+def _do(task: Callable[[Item], Result], item: Item) -> Result:
+    """Run a task in a worker process. Where it has tidied up since the process is to end, that ends; a pool would go
+    on.
+    """
+    try:
+        return task(item)
+    except SystemExit:
+        os._exit(143)
+
+
+def _begin() -> None:
+    """Set up a worker process: the parent handles Ctrl-C, and ends the worker so that its files are removed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _end)
+    threading.Thread(target=_follow_parent, daemon=True).start()
+    warnings.simplefilter("ignore")  # results tell their warnings
+    reuse_freed_memory()
+
+
+def _follow_parent() -> None:
+    """End this worker process when its parent is gone, as reading its pipe would wait forever."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(PATIENCE)
+    os._exit(143)  # what was running did not hear
+
+
+def _end(*_: Any) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough; a second one would disturb the tidying
+    sys.exit(143)
+
 
 Status = Literal["baked", "suspect", "skipped", "failed"]
 

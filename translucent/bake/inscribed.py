@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Floats, Integers, Mask
-from translucent.bake.directions import SPHERE_CONE
+from translucent.bake.rays import SPHERE_CONE
 from translucent.bake.surface import Points, Surface
 from translucent.geometry.bvh import curve_order
 

@@ -27,20 +27,44 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from translucent.bake.bake import bake_thickness
-from translucent.bake.record import file_hash, files_of, read_record
+import numpy as np
+
+from translucent.bake.bake import bake_thickness, bake_vertex_thickness
+from translucent.bake.gltf_builder import GlbBuilder
+from translucent.bake.gltf_targets import (
+    PrimitiveKey,
+    Target,
+    find_targets,
+    first_transforms,
+    left_out,
+    primitive_name,
+)
+from translucent.bake.record import Record, add_record, file_hash, files_of, read_record
 from translucent.bake.settings import BakeSettings
-from translucent.bake.thickness_map import ThicknessMap, VertexThickness
-from translucent.bake.vertices import bake_vertex_thickness
-from translucent.bake.writing import MAP_SUFFIXES, VERTEX_SUFFIXES, check_map_output
+from translucent.bake.thickness_map import (
+    MAP_SUFFIXES,
+    VERTEX_SUFFIXES,
+    ThicknessMap,
+    VertexThickness,
+    add_map,
+    add_uv_file,
+    check_map_output,
+    save_map,
+    save_vertices,
+    shared,
+    write_maps,
+    write_vertices,
+)
 from translucent.errors import InputError
+from translucent.files.paths import OutputFiles
 from translucent.files.reading import read_bytes
 from translucent.geometry.mesh import Mesh
-from translucent.gltf.file import read_gltf
+from translucent.gltf.file import GltfFile, read_gltf
 from translucent.gltf.load import SUFFIXES
 from translucent.media.medium import Medium
 from translucent.mesh_files import load_mesh
@@ -48,6 +72,8 @@ from translucent.units import metres_per_unit
 from translucent.version import VERSION
 
 Job = dict[str, Any]
+#: Results by mesh and primitive of a glTF file; else one, for (0, 0).
+Results = dict[PrimitiveKey, Any]
 #: Callback with the share that is done, 0..1, and the rays traced so far.
 Progress = Callable[[float, int], None]
 
@@ -62,6 +88,8 @@ ON_SURFACE = 1e-4
 #: Keys that do not change the contents of the file.
 _HOW = {"output", "model", "high", "cage", "resume", "threads", "max_escaped", "outside"}
 _LENGTHS = ("max_distance", "tolerance", "high_distance")
+#: Largest length of the name of a map, and the characters besides letters and digits that are safe in file names.
+_LONGEST, _SAFE = 60, "._-"
 #: Keys without meaning for vertices: those that are a mistake, and those that merely have a default.
 _OF_MAPS, _TEXELS = ("tile", "high", "cage", "high_distance"), ("size", "supersample", "padding")
 
@@ -76,9 +104,8 @@ def check_job(job: Job) -> None:
     if not 0 <= (share := job.get("max_escaped", 0)) <= 1:
         raise InputError(f"max_escaped {share!r}", "not in 0..1", "give a share of the rays, for example 0.05")
     suffixes = VERTEX_SUFFIXES if job.get("vertices") else MAP_SUFFIXES
-    normalize, invert = bool(job.get("normalize")), bool(job.get("invert"))
     output = Path(job["output"])
-    suffix = check_map_output(output, suffixes, normalize=normalize, invert=invert)
+    suffix = check_map_output(output, suffixes, **_storing(job))
     settings = job.get("settings", {})
     of_maps = [key for key in (*_OF_MAPS, "normalize", "invert", "resume") if job.get(key) or settings.get(key)]
     if job.get("vertices") and of_maps:
@@ -127,51 +154,50 @@ def stays_gltf(job: Job) -> bool:
     return Path(job["output"]).suffix.lower() == ".glb" and Path(job["model"]).suffix.lower() in SUFFIXES
 
 
-def content_hash(job: Job) -> str:
-    """SHA-256 of everything that the result depends on: the bytes of the meshes, the settings, and the version.
+def bake_file(job: Job, progress: Progress | None = None, content: str | None = None) -> tuple[Record, Results]:
+    """Run a bake job and write its files.
+
+    Parameters
+    ----------
+    job : dict
+        See `translucent.bake.jobs`.
+    progress : callable, optional
+    content : str, optional
+        The `content_hash` of the job, where it is known.
+
+    Returns
+    -------
+    record : dict
+        As it was written beside the output.
+    results : dict
+        A `ThicknessMap` or `VertexThickness` per mesh and primitive of a glTF file; else one, for (0, 0).
+        Maps that are files of their own are in the space of the scene, those in a glTF file in that of their meshes.
 
     Raises
     ------
     InputError
-        If a file cannot be read.
+        If the job or its model is wrong.
+    RenderError
+        If a file cannot be written, or a package is missing.
     """
-    meant = {key: value for key, value in job.items() if key not in _HOW}
-    meant["suffix"] = Path(job["output"]).suffix.lower()
-    digest = hashlib.sha256(json.dumps([VERSION, FILES, meant], sort_keys=True).encode())
-    for key in ("model", "high", "cage"):
-        if job.get(key) is not None:
-            for data in _parts(Path(job[key]), bool(job.get("outside"))):
-                digest.update(key.encode() + hashlib.sha256(data).digest())
-    return digest.hexdigest()
-
-
-def _parts(path: Path, allow_outside: bool) -> list[bytes]:
-    """Paths of a file and, for a .gltf, of its links."""
-    data = [read_bytes(path, f"mesh {str(path)!r}")]
-    if path.suffix.lower() in SUFFIXES:
-        file = read_gltf(path, allow_outside)
-        holders = [*file.items("buffers"), *file.items("images")]
-        data += [file.resource(one) for one in holders if isinstance(one.get("uri"), str)]
-    return data
-
-
-def is_done(job: Job, content: str) -> bool:
-    """True if the job's files exist, complete and with this content."""
+    check_job(job)
     output = Path(job["output"])
-    record = read_record(output)
-    return (
-        record is not None
-        and record.get("hash") == content
-        and bool(files := files_of(record))
-        and all(_is_whole(output.with_name(one["file"]), one.get("sha256")) for one in files)
-    )
+    about = {"hash": content or content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
+    if has_parts(job):
+        return _bake_gltf(job, about, progress)
+    mesh = load_mesh(job["model"], unit=job.get("unit", "m"), allow_outside=bool(job.get("outside")))
+    if job.get("unwrap"):
+        mesh = dataclasses.replace(mesh, uv=None)
+    result = bake_one(job, mesh, progress=progress)
+    if isinstance(result, VertexThickness):
+        record = save_vertices(result, output, about=about)
+    else:
+        record = save_map(result, output, **_storing(job), about=about)
+    return record, {(0, 0): result}
 
 
-def _is_whole(path: Path, sha256: object) -> bool:
-    return path.is_file() and file_hash(path) == sha256
-
-
-Results = dict[tuple[int, int], Any]
+def _storing(job: Job) -> dict[str, bool]:
+    return {key: bool(job.get(key)) for key in ("normalize", "invert")}
 
 
 def bake_one(
@@ -216,3 +242,132 @@ def bake_one(
     if job.get("resume"):
         given["checkpoint"] = Path(f"{job['output']}{part}.resume.npz")
     return bake_thickness(mesh, **given)
+
+
+def _bake_gltf(job: Job, about: Record, progress: Progress | None) -> tuple[Record, Results]:
+    """Bake each primitive of a glTF file that light enters, into a copy of the file, or into maps of their own.
+
+    In the file thickness is in the mesh's own space, as glTF has it; in maps it is in metres of the scene.
+    """
+    metres = metres_per_unit(job.get("unit", "m"))
+    output, vertices, inside = Path(job["output"]), bool(job.get("vertices")), stays_gltf(job)
+    size = job.get("settings", {}).get("size", 1024)
+    builder = GlbBuilder(read_gltf(job["model"], bool(job.get("outside"))))
+    new = bool(job.get("unwrap"))
+    targets = find_targets(builder, metres, size=size, needs_uv=not vertices, new_uv=new, plain_uv=not inside)
+    if job.get("high") is not None and len(targets) > 1:
+        raise InputError(f"high mesh {job['high']!r}", f"{len(targets)} objects get thickness", "bake them one by one")
+    if lost := left_out(builder.file(), targets):
+        about = {**about, "left_out": lost}
+    if not inside:
+        matrices = first_transforms(builder.file())
+        targets = [target.moved(matrices.get(target.key[0], np.eye(4)), metres) for target in targets]
+    results = _bake_targets(job, targets, progress)
+    if vertices:
+        return write_vertices(builder, output, results, metres=metres, about=about), results
+    if not inside:
+        return _save_maps(builder, job, results, targets, about), results
+    medium = None if job.get("medium") is None else Medium(absorption=job["medium"])
+    keys = {target.key: target for target in targets}
+    record = write_maps(builder, output, results, targets=keys, metres=metres, medium=medium, about=about)
+    return record, results
+
+
+def _bake_targets(job: Job, targets: list[Target], progress: Progress | None) -> Results:
+    results: Results = {}
+    rays_before = 0
+    for number, target in enumerate(targets):
+        tell = None
+        if progress is not None:
+
+            def tell(share: float, rays: int, number: int = number, before: int = rays_before) -> None:
+                progress((number + share) / len(targets), before + rays)
+
+        part = f".{number}" if len(targets) > 1 else ""
+        result = bake_one(job, target.mesh, target.medium, tell, part, target.around)
+        rays_before += result.report.rays
+        results[target.key] = result
+    return results
+
+
+def _save_maps(
+    builder: GlbBuilder, job: Job, results: Mapping[PrimitiveKey, ThicknessMap], targets: list[Target], about: Record
+) -> Record:
+    """Write the maps of a file as separate images, each in its own UVs, and their record beside them.
+
+    Of one map ``thickness.exr`` is the file; of several it is ``thickness-NAME.exr`` for each, NAME being that of its
+    material (and of its mesh where that is not enough), each with its record. ``thickness.exr.json`` is the record of
+    all. Where UVs were made, the mesh that has them is beside the map, as ``thickness.exr.uv.glb``.
+    """
+    file, output = builder.file(), Path(job["output"])
+    told: list[Record] = []
+    paths = _paths(file, output, list(results)) if len(results) > 1 else dict.fromkeys(results, output)
+    with OutputFiles() as files:
+        if any(target.made_uv for target in targets):
+            about = {**about, "uv_file": add_uv_file(files, file, output)}
+        for target, (key, result) in zip(targets, results.items(), strict=True):
+            one: Record = {**about, "place": list(key), "tex_coord": target.tex_coord}
+            told.append(add_map(files, result, paths[key], **_storing(job), about=one))
+        if len(told) == 1:
+            return told[0]
+        return add_record(files, output, {**about, **shared(told), "maps": told})
+
+
+def _paths(file: GltfFile, output: Path, keys: list[PrimitiveKey]) -> dict[PrimitiveKey, Path]:
+    """Path of each of several maps; names differ by more than case."""
+    materials = dict.fromkeys(keys, "")
+    for mesh, primitive in keys:
+        index = file.item("meshes", mesh)["primitives"][primitive].get("material")
+        if index is not None:
+            materials[mesh, primitive] = str(file.item("materials", index).get("name") or f"material {index}")
+    count = Counter(materials.values())
+    taken: set[str] = set()
+    paths = {}
+    for key, material in materials.items():
+        name = material if material and count[material] == 1 else f"{material} {primitive_name(file, key)}"
+        kept = "".join(character if character.isalnum() or character in _SAFE else " " for character in name)
+        name = "_".join(kept.split())[:_LONGEST].strip("._-") or "map"
+        number = 2
+        while (free := name if name.casefold() not in taken else f"{name}_{number}").casefold() in taken:
+            number += 1
+        taken.add(free.casefold())
+        paths[key] = output.with_name(f"{output.stem}-{free}{output.suffix}")
+    return paths
+
+
+def content_hash(job: Job) -> str:
+    """SHA-256 of everything that the result depends on: the bytes of the meshes, the settings, and the version.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read.
+    """
+    meant = {key: value for key, value in job.items() if key not in _HOW}
+    meant["suffix"] = Path(job["output"]).suffix.lower()
+    digest = hashlib.sha256(json.dumps([VERSION, FILES, meant], sort_keys=True).encode())
+    for key in ("model", "high", "cage"):
+        if job.get(key) is not None:
+            path = Path(job[key])
+            parts = [read_bytes(path, f"mesh {str(path)!r}")]
+            if path.suffix.lower() in SUFFIXES:
+                file = read_gltf(path, bool(job.get("outside")))
+                holders = [*file.items("buffers"), *file.items("images")]
+                parts += [file.resource(one) for one in holders if isinstance(one.get("uri"), str)]
+            for data in parts:
+                digest.update(key.encode() + hashlib.sha256(data).digest())
+    return digest.hexdigest()
+
+
+def is_done(job: Job, content: str) -> bool:
+    """True if the job's files exist, complete and with this content."""
+    output = Path(job["output"])
+    record = read_record(output)
+    return (
+        record is not None
+        and record.get("hash") == content
+        and bool(files := files_of(record))
+        and all(
+            (path := output.with_name(one["file"])).is_file() and file_hash(path) == one.get("sha256") for one in files
+        )
+    )

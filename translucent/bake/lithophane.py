@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.bake.check_picture import labeled, look
+from translucent.bake.check import labeled, look
 from translucent.errors import InputError
 from translucent.files.paths import require_output, write_atomically
 from translucent.formulas.color import luminance

@@ -1,4 +1,19 @@
-"""Record of a bake, written beside it as JSON: ``thickness.exr`` has ``thickness.exr.json``."""
+"""Records of bakes and the encoding of their values: ``thickness.exr`` has ``thickness.exr.json`` beside it.
+
+Values are stored so that value = offset + scale * stored; for thickness, value is in metres:
+
+=============  ===========  =======================  =====================================
+file           requested    stored                   value = offset + scale * stored
+=============  ===========  =======================  =====================================
+float          metric       t                        t = 0 + 1 * stored
+float          normalize    t / max                  t = 0 + max * stored
+float          invert       1 - t / max              t = max - max * stored
+16-bit gray    metric,      round(65535 t / max)     t = 0 + (max / 65535) * stored
+               normalize
+16-bit gray    invert       65535 - the same         t = max - (max / 65535) * stored
+glTF, G        (none)       round(255 t / max)       t = 0 + (max / 255) * stored
+=============  ===========  =======================  =====================================
+"""
 
 from __future__ import annotations
 
@@ -6,97 +21,92 @@ import hashlib
 import json
 import platform
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from translucent.bake.baked import BakedMap, BakedVertices
-from translucent.bake.encoding import Encoding
+from translucent.arrays import Array
+from translucent.errors import InputError
 from translucent.files.paths import OutputFiles, fill_text
 from translucent.files.reading import json_value, read_text
+from translucent.geometry.mesh import Mesh
 from translucent.version import VERSION
 
 Record = dict[str, Any]
 
-#: Definitions of the values of each mode; the equations are in ``docs/baking.md``.
-DEFINITIONS = {
-    "normal": "distance from the surface to the exit along the inward normal",
-    "cone": "mean distance from the surface to the exit over the directions of a cone around the inward normal",
-    "transmittance": "the distance at which the medium lets through as much as the mean over the cone",
-    "inscribed": "diameter of the largest sphere inside that touches the surface there",
-    "local": "share of the directions of a cone around the inward normal that go farther than the maximum distance",
-}
 
+@dataclass(frozen=True)
+class Encoding:
+    """Encoding of values in a file, and its inverse.
 
-def unit_of(mode: str) -> str:
-    """Unit of the values of a mode: ``"m"``, or ``"1"`` for the dimensionless one."""
-    return "1" if mode == "local" else "m"
+    Parameters
+    ----------
+    scale, offset : float
+        value = offset + scale * stored.
+    levels : int
+        Largest whole number that the file stores; 0 for floats, which are stored as they are.
+    unit : str
+        Of the values: ``"m"``, or ``"1"`` for those without a unit.
+    """
 
+    scale: float = 1.0
+    offset: float = 0.0
+    levels: int = 0
+    unit: str = "m"
 
-def sidecar_of(path: Path) -> Path:
-    """Path of the record of a file."""
-    return path.with_name(f"{path.name}.json")
+    @classmethod
+    def of(
+        cls, values: npt.ArrayLike, levels: int = 0, *, normalize: bool = False, invert: bool = False, unit: str = "m"
+    ) -> Encoding:
+        """Encoding for these values; `invert` also normalizes, so that thin parts are 1 and the thickest 0.
 
+        Raises
+        ------
+        InputError
+            If the largest value must divide the others, and is 0.
+        """
+        if not (levels or normalize or invert):
+            return cls(unit=unit)
+        largest = float(np.max(values, initial=0.0))
+        if largest == 0:
+            if normalize or invert:
+                raise InputError("values as shares of the largest", "it is 0", "leave --normalize and --invert out")
+            largest = 1.0  # what does not matter where all are 0, and yet must not divide by 0
+        scale = largest / (levels or 1)
+        return cls(-scale, largest, levels, unit) if invert else cls(scale, 0.0, levels, unit)
 
-def plain(value: Any) -> Any:
-    """Convert a value for JSON: NumPy's numbers become Python's, infinity and NaN null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not np.isfinite(value) else value
+    @property
+    def quantum(self) -> float:
+        """Quantization step of the values; 0 for floats."""
+        return abs(self.scale) if self.levels else 0.0
 
+    def encode(self, values: npt.ArrayLike) -> npt.NDArray[Any]:
+        """Encode values as float32, uint8 or uint16."""
+        with np.errstate(under="ignore"):
+            stored = (np.asarray(values, dtype=np.float64) - self.offset) / self.scale
+            if not self.levels:
+                return stored.astype(np.float32)
+        whole = np.clip(np.rint(stored), 0, self.levels)
+        return whole.astype(np.uint8 if self.levels < 256 else np.uint16)
 
-def describe(result: BakedMap | BakedVertices, encoding: Encoding) -> Record:
-    """Description of a bake: definition, unit, range, encoding, settings, report and mesh."""
-    values, settings = np.asarray(result.values), result.settings
-    coverage = getattr(result, "coverage", None)
-    seen = values[coverage] if coverage is not None else values
-    known: Record = {
-        "kind": "vertex thickness" if coverage is None else "thickness map",
-        "mode": settings.mode,
-        "definition": DEFINITIONS[settings.mode],
-        "unit": unit_of(settings.mode),
-        "range": _range(seen),
-        "encoding": encoding.summary(),
-        "settings": plain(settings.summary()),
-        "report": plain(result.report.summary()),
-        "mesh": {"name": result.mesh.name, "vertices": len(result.mesh.vertices), "faces": len(result.mesh.faces)},
-    }
-    if coverage is not None:
-        known["size"] = [values.shape[1], values.shape[0]]
-        known["covered_texels"] = int(np.count_nonzero(coverage))
-    if hasattr(result, "escaped"):
-        known["escaped"] = float(result.escaped)
-    return known
+    def decode(self, stored: npt.ArrayLike) -> Array:
+        """Decode values to float64."""
+        return self.offset + self.scale * np.asarray(stored, dtype=np.float64)
 
-
-def shared(parts: list[Record]) -> Record:
-    """Common entries of all parts of one bake, for the head of their record."""
-    return {key: parts[0][key] for key in ("kind", "mode", "definition", "unit", "settings")}
-
-
-def _range(values: Any) -> Record | None:
-    if not values.size:
-        return None
-    return {"min": float(values.min()), "median": float(np.median(values)), "max": float(values.max())}
-
-
-def provenance() -> dict[str, str]:
-    """Versions of everything that the numbers depend on."""
-    from translucent.geometry.embree import embree_versions
-
-    return {
-        "translucent": VERSION,
-        "numpy": np.__version__,
-        **embree_versions(),
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-    }
+    def summary(self) -> Record:
+        """Formula as values that JSON can hold."""
+        return {
+            "formula": "value = offset + scale * stored",
+            "scale": self.scale,
+            "offset": self.offset,
+            "unit": self.unit,
+            "bits": 32 if not self.levels else self.levels.bit_length(),
+            "quantum": self.quantum,
+        }
 
 
 def write_record(path: Path, record: Record) -> Record:
@@ -110,15 +120,39 @@ def write_record(path: Path, record: Record) -> Record:
 
 def add_record(files: OutputFiles, path: Path, record: Record) -> Record:
     """Write a record where that of the file at `path` belongs, together with other files; returns the record."""
-    full = {**record, "provenance": provenance()}
+    from translucent.geometry.embree import embree_versions
+
+    versions = {"translucent": VERSION, "numpy": np.__version__, **embree_versions()}
+    machine = {"python": platform.python_version(), "machine": platform.machine()}
+    full = {**record, "provenance": versions | machine}
     text = json.dumps(full, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     files.write(sidecar_of(path), partial(fill_text, text=text))
     return full
 
 
+def read_record(path: Path) -> Record | None:
+    """Read the record of a file, if it exists and is valid."""
+    try:
+        found = json_value(read_text(sidecar_of(path), f"record of {str(path)!r}"))
+    except ValueError:
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def sidecar_of(path: Path) -> Path:
+    """Path of the record of a file."""
+    return path.with_name(f"{path.name}.json")
+
+
 def fingerprint(path: Path, filled: Path | None = None) -> Record:
     """Name and hash of a file, as records have them, which may still be under another name."""
     return {"file": path.name, "sha256": file_hash(filled or path)}
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def parts_of(record: Record) -> list[Record]:
@@ -134,16 +168,17 @@ def files_of(record: Record) -> list[Record]:
     return [part for part in parts if isinstance(part, dict) and isinstance(part.get("file"), str)]
 
 
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+def mesh_record(mesh: Mesh) -> Record:
+    """Name and size of a mesh, as records have them."""
+    return {"name": mesh.name, "vertices": len(mesh.vertices), "faces": len(mesh.faces)}
 
 
-def read_record(path: Path) -> Record | None:
-    """Read the record of a file, if it exists and is valid."""
-    try:
-        found = json_value(read_text(sidecar_of(path), f"record of {str(path)!r}"))
-    except ValueError:
-        return None
-    return found if isinstance(found, dict) else None
+def plain(value: Any) -> Any:
+    """Convert a value for JSON: NumPy's numbers become Python's, infinity and NaN null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -15,6 +15,15 @@ Mode = Literal["normal", "cone", "transmittance", "inscribed", "local"]
 Weighting = Literal["cosine", "uniform"]
 Gaps = Literal["first-exit", "total"]
 
+#: Definitions of the values of each mode; the equations are in ``docs/baking.md``.
+DEFINITIONS: dict[Mode, str] = {
+    "normal": "distance from the surface to the exit along the inward normal",
+    "cone": "mean distance from the surface to the exit over the directions of a cone around the inward normal",
+    "transmittance": "the distance at which the medium lets through as much as the mean over the cone",
+    "inscribed": "diameter of the largest sphere inside that touches the surface there",
+    "local": "share of the directions of a cone around the inward normal that go farther than the maximum distance",
+}
+
 #: Largest size of a map, in texels along a side.
 MAX_SIZE = 16384
 
@@ -132,6 +141,11 @@ class BakeSettings:
             raise InputError(
                 "mode 'transmittance'", "a medium that takes no light away", "give one with absorption or scattering"
             )
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values: ``"m"``, or ``"1"`` for the dimensionless mode "local"."""
+        return "1" if self.mode == "local" else "m"
 
     def summary(self) -> dict[str, object]:
         """Settings as values that JSON can hold; the medium by its extinction in 1/m."""

@@ -1,17 +1,127 @@
-"""Strips of a map: surface points of their texels, and their thickness. Strips are independent of one another."""
+"""Strips of a map, baked in threads and put together on a canvas with a checkpoint.
+
+Strips are independent of one another: surface points of their texels, on the mesh itself or projected from it to a
+mesh with the details, and the thickness there. A bake can be interrupted at any time, and go on from its checkpoint.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import hashlib
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
+from contextvars import copy_context
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Floats, Mask
-from translucent.bake.high_low import Projection
+from translucent.bake.atlas import Atlas, Unwrapped
 from translucent.bake.measure import Measure
-from translucent.bake.surface import Surface
-from translucent.bake.texels import Atlas
+from translucent.bake.settings import BakeSettings
+from translucent.bake.surface import Points, Surface, blend
+from translucent.errors import InputError
+from translucent.files.paths import write_atomically
+from translucent.files.unpacking import read_arrays
+from translucent.geometry.mesh import Mesh
+from translucent.version import VERSION
+
+#: Default distance on either side of the low mesh within which the high one is searched, as a share of the diagonal.
+SEARCH = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """Projection of points of a low-poly mesh to a high-poly one, along its smooth normals or from a cage.
+
+    Attributes
+    ----------
+    low, high : Surface
+    cage : (m, 3, 3) float64 or None
+        Corners of the cage's faces in metres, one for each face of `low`.
+    distance : float
+        In metres, to either side, where there is no cage.
+    """
+
+    low: Surface
+    high: Surface
+    cage: Array | None
+    distance: float
+
+    @classmethod
+    def of(
+        cls, low: Surface, unwrapped: Unwrapped, high: Surface, given: Mesh, cage: Mesh | None, distance: float | None
+    ) -> Projection:
+        """For a `given` mesh that was `unwrapped`.
+
+        Raises
+        ------
+        InputError
+            If the cage has not the vertices and faces of the given mesh.
+        """
+        corners = None
+        if cage is not None:
+            if len(cage.vertices) != len(given.vertices) or len(cage.faces) != len(given.faces):
+                raise InputError(
+                    f"cage {cage.name!r}",
+                    f"{len(cage.vertices)} vertices and {len(cage.faces)} faces, but mesh {given.name!r} has "
+                    f"{len(given.vertices)} and {len(given.faces)}",
+                    "make the cage by moving the mesh's vertices outwards",
+                )
+            corners = cage.vertices[unwrapped.vertex][unwrapped.mesh.faces[low.faces]]
+        return cls(low, high, corners, SEARCH * given.diagonal if distance is None else distance)
+
+    def points(self, points: Points, barycentric: Array) -> tuple[Points, npt.NDArray[np.bool_]]:
+        """Points on the high mesh for those of the low one, and (k,) where one was found; only these are returned.
+
+        Parameters
+        ----------
+        points : Points
+            Of the low mesh (k).
+        barycentric : (k, 3) float64
+            Where they are on their faces.
+        """
+        middle = points.exact * self.low.radius + self.low.embree.center
+        if self.cage is None:
+            begin = middle + self.distance * points.normal
+            along, reach = -points.normal, np.full(len(points), 2.0 * self.distance)
+        else:
+            begin = blend(self.cage[points.face], barycentric)
+            along = middle - begin
+            length = np.sqrt((along**2).sum(axis=1))
+            along = along / np.where(length > 0, length, 1.0)[:, None]
+            reach = 2.0 * length
+        return self._meet(begin, along, reach)
+
+    def _meet(self, begin: Array, along: Array, reach: Array) -> tuple[Points, npt.NDArray[np.bool_]]:
+        """First points of the high mesh on rays in metres, from outside and within `reach`."""
+        high = self.high
+        origin = (begin - high.embree.center) / high.radius
+        face, _ = high.embree.first_hits(origin, along)
+        plane = high.planes[np.maximum(face, 0)]
+        normal = plane[:, :3]
+        cosine = (normal * along).sum(axis=1)
+        facing = (face >= 0) & (cosine < 0)
+        distance = (plane[:, 3] - (normal * origin).sum(axis=1)) / np.where(facing, cosine, 1.0)
+        found = facing & (distance >= 0) & (distance * high.radius <= reach)
+        face, point = face[found], (origin + distance[:, None] * along)[found]
+        return high.points(face, _barycentric(high.corners[face], point)), found
+
+
+def _barycentric(corners: Array, point: Array) -> Array:
+    """(k, 3): weights of points on the planes of triangles, moved into them where rounding has led them out."""
+    a, b, c = corners.transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    areas = [np.cross(q - p, point - p) for p, q in ((b, c), (c, a), (a, b))]
+    weights = np.stack([np.maximum((area * normal).sum(axis=1), 0.0) for area in areas], axis=1)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
 
 #: Texels (before supersampling) in a strip, about: one strip is what a thread takes at a time.
 STRIP_TEXELS = 1 << 14
@@ -120,3 +230,174 @@ def _gathered(
         mean = np.bincount(texel, weights=values, minlength=count) / divisor
         error = np.sqrt(np.bincount(texel, weights=errors * errors, minlength=count)) / divisor
         return mean.astype(np.float32), error.astype(np.float32), samples > 0
+
+
+#: Seconds between writes of a checkpoint, and how many times longer than the last write they are at least.
+EVERY, REST = 5.0, 20.0
+
+
+@dataclass(eq=False)
+class Canvas:
+    """Canvas of a map: strips put together.
+
+    Parameters
+    ----------
+    size : int
+        Texels a side.
+    faces : int
+        Of the mesh.
+    strips : int
+    """
+
+    size: int
+    faces: int
+    strips: int
+    done: npt.NDArray[np.bool_] = field(init=False)
+    values: npt.NDArray[np.float32] = field(init=False)
+    errors: npt.NDArray[np.float32] = field(init=False)
+    coverage: npt.NDArray[np.bool_] = field(init=False)
+    valued: npt.NDArray[np.bool_] = field(init=False)
+    owners: npt.NDArray[np.bool_] = field(init=False)
+    counts: npt.NDArray[np.int64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        shape = (self.size, self.size)
+        self.values, self.errors = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+        self.coverage, self.valued = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        self.done, self.owners = np.zeros(self.strips, dtype=bool), np.zeros(self.faces, dtype=bool)
+        self.counts = np.zeros(len(COUNTS), dtype=np.int64)
+
+    def put(self, number: int, row: int, strip: Strip) -> None:
+        """Add strip `number`, which begins at `row`."""
+        rows = slice(row, row + len(strip.values))
+        self.values[rows], self.errors[rows] = strip.values, strip.errors
+        self.coverage[rows], self.valued[rows] = strip.coverage, strip.valued
+        self.owners |= strip.owners
+        self.counts += strip.counts
+        self.done[number] = True
+
+    def count(self, name: str) -> int:
+        """Value of one of `COUNTS`."""
+        return int(self.counts[COUNTS.index(name)])
+
+
+class Checkpoint:
+    """Checkpoint file with the finished strips of a bake.
+
+    Parameters
+    ----------
+    path : Path
+    key : str
+        What the bake depends on; a file with another key is of another bake.
+    """
+
+    _ARRAYS = ("done", "values", "errors", "coverage", "valued", "owners", "counts")
+
+    def __init__(self, path: Path, key: str) -> None:
+        self._path, self._key = path, key
+        self._next = time.monotonic() + EVERY
+
+    def read(self, canvas: Canvas) -> None:
+        """Fill `canvas` from the file, if there is one.
+
+        Raises
+        ------
+        InputError
+            If the file is no checkpoint of this bake.
+        """
+        if not self._path.is_file():
+            return
+        asked = f"checkpoint {str(self._path)!r}"
+        found = read_arrays(self._path, asked, ("key", *self._ARRAYS), "remove it")
+        if str(found.pop("key")) != self._key:
+            raise InputError(asked, "it is of another mesh or other settings", "remove it, or bake as before")
+        for name, array in found.items():
+            own = getattr(canvas, name)
+            if (array.shape, array.dtype) != (own.shape, own.dtype):
+                raise InputError(asked, f"{name} of shape {array.shape}, not {own.shape}", "remove it")
+            setattr(canvas, name, array)
+
+    def keep(self, canvas: Canvas) -> None:
+        """Write `canvas` if the last write was long enough ago."""
+        if time.monotonic() >= self._next:
+            self.write(canvas)
+
+    def write(self, canvas: Canvas) -> None:
+        """Write `canvas` atomically; raises `RenderError` if that fails."""
+        started = time.monotonic()
+        arrays = {name: getattr(canvas, name) for name in self._ARRAYS}
+
+        def save(path: Path) -> None:
+            with path.open("wb") as file:
+                np.savez(file, key=np.array(self._key), **arrays)
+
+        write_atomically(self._path, save)
+        ended = time.monotonic()
+        self._next = ended + max(EVERY, REST * (ended - started))
+
+    def remove(self) -> None:
+        """Delete the file, since the bake is done."""
+        self._path.unlink(missing_ok=True)
+
+
+def bake_key(settings: BakeSettings, *meshes: Mesh | None) -> str:
+    """Hash of everything that determines the result of a bake."""
+    digest = hashlib.sha256(f"{VERSION} {sorted(settings.summary().items())}".encode())
+    for mesh in meshes:
+        for array in () if mesh is None else (mesh.vertices, mesh.faces, mesh.uv):
+            digest.update(b"-" if array is None else array.tobytes())
+            digest.update(b"|")
+        digest.update(b"#")
+    return digest.hexdigest()
+
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+#: Callback with the number of texels or corners done, their total, and the number of rays traced.
+Progress = Callable[[int, int, int], None]
+
+#: Number of queued pieces of work for each thread; their results wait for their turn.
+AHEAD = 4
+
+
+def in_order(
+    task: Callable[[Item], Result], items: Iterable[Item], threads: int, stop: threading.Event
+) -> Generator[Result, None, None]:
+    """Results of a task for each item, in their order, as they come.
+
+    Whatever ends the iteration early sets `stop`, which the task is to heed, and waits for the threads.
+    """
+    # How NumPy treats floating-point errors belongs to the context; the caller's choice holds in all threads.
+    context = copy_context()
+    waiting: deque[Future[Result]] = deque()
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for item in items:
+            waiting.append(pool.submit(context.copy().run, task, item))
+            if len(waiting) >= AHEAD * threads:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    except BaseException:
+        stop.set()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def bake_strips(
+    strips: Strips, canvas: Canvas, threads: int, progress: Progress | None, checkpoint: Checkpoint | None
+) -> None:
+    """Bake the strips that `canvas` lacks."""
+    missing = [number for number in range(canvas.strips) if not canvas.done[number]]
+    begins = [number * strips.rows for number in missing]
+    # Closed whatever is raised here, an interruption by the user as well: that ends the threads.
+    with closing(in_order(strips.bake, begins, threads, strips.measure.stop)) as baked:
+        for number, begin, strip in zip(missing, begins, baked, strict=True):
+            canvas.put(number, begin, strip)
+            if checkpoint is not None:
+                checkpoint.keep(canvas)
+            if progress is not None:
+                texels = min(int(canvas.done.sum()) * strips.rows, canvas.size) * canvas.size
+                progress(texels, canvas.size**2, canvas.count("traced"))

@@ -1,4 +1,4 @@
-"""``translucent bake``: thickness of meshes into maps, glTF files or vertices."""
+"""``translucent bake``: thickness of meshes, or light that leaves them after scattering, into maps or vertices."""
 
 from __future__ import annotations
 
@@ -12,12 +12,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
-from translucent.commands.bake_options import FORMATS, bake_options, read_job
-from translucent.commands.bake_scatter import SCATTER, bake_scatter, refuse_scatter_options
-from translucent.commands.common import common_options, overwrite_option
 from translucent.commands.console import echo, is_terminal
 from translucent.commands.model import mesh_file
+from translucent.commands.options import (
+    F,
+    common_options,
+    medium_options,
+    outside_option,
+    overwrite_option,
+    read_any_medium,
+    read_medium,
+    read_roughness,
+    refuse_overwriting,
+    scattering_medium_options,
+    unit_option,
+)
 from translucent.errors import InputError, RenderError, TranslucentError, printable
 from translucent.extras import require_package
 
@@ -27,6 +38,270 @@ if TYPE_CHECKING:
 
     from translucent.bake.jobs import Job, Progress, Results
     from translucent.bake.record import Record
+    from translucent.bake.scatter_job import ScatterCheck, ScatterJob
+
+
+#: Name of the mode.
+SCATTER = "scatter"
+
+#: Texels along each side of a map, if nothing else is asked for: what diffuses is smooth.
+SIZE = 256
+
+_MEDIUM = ("color", "distance", "preset_name", "clamp", "scattering_color", "mean_free_path")
+
+#: Parameters of the verb that have a meaning for scattered light, and those that have one for it alone.
+_TAKEN = {
+    "models", "output", "check", "as_json", "mode", "size", "padding", "unwrap", "vertices", "unit", "allow_outside",
+    "resolution", *_MEDIUM,
+}  # fmt: skip
+_ITS_OWN = ("resolution", "scattering_color", "mean_free_path")
+
+
+def refuse_scatter_options() -> None:
+    """Raise `InputError` if an option is given that only scattered light has, for thickness."""
+    for name in _given():
+        if name in _ITS_OWN:
+            raise InputError(
+                _scatter_option(name), "thickness has no use for it", f"add --mode {SCATTER}, or leave it out"
+            )
+
+
+def bake_scatter(
+    models: tuple[str, ...], output: Path | None, given: dict[str, Any], check: bool, as_json: bool
+) -> None:
+    """Bake scattered light of one model, as the options say."""
+    from translucent.bake.scatter_job import run_scatter_job
+
+    for name in _given():
+        if name not in _TAKEN:
+            raise InputError(_scatter_option(name), f"--mode {SCATTER} has no use for it", "leave it out")
+    if output is None or len(models) != 1:
+        raise InputError(f"--mode {SCATTER}", f"{len(models)} models" if output else "no -o", "give one MODEL and -o")
+    job = _read_scatter_job(models[0], output, given)
+    record, results = run_scatter_job(job)
+    checks = _scatter_check(output, results) if check else {}
+    told = {"output": str(output), "record": record, **checks}
+    if as_json:
+        echo(json.dumps(told))
+        return
+    for line in (*_scatter_lines(job, record), *checks.get("lines", [])):
+        echo(line)
+
+
+def _read_scatter_job(model: str, output: Path, given: dict[str, Any]) -> ScatterJob:
+    from translucent.bake.scatter_job import ScatterJob
+
+    medium = read_any_medium(*(given[name] for name in _MEDIUM))
+    if medium is None:
+        raise InputError(
+            f"--mode {SCATTER}", "no medium", "add --preset wax, or --scattering-color '#f2e0b8' --mean-free-path 2mm"
+        )
+    if given["vertices"] and output.suffix.lower() != ".glb":
+        raise InputError("--vertices", f"suffix {output.suffix!r}", "write a .glb, which has them anyway")
+    file = mesh_file(model, given["unit"])
+    refuse_overwriting(output, file)
+    return ScatterJob(
+        model=Path(file),
+        output=output,
+        medium=medium,
+        roughness=read_roughness(None, given["preset_name"]) or 0.0,
+        size=given["size"] if "size" in _given() else SIZE,
+        padding=given["padding"],
+        resolution=given["resolution"],
+        unit=given["unit"],
+        unwrap=given["unwrap"],
+        outside=given["allow_outside"],
+    )
+
+
+def _scatter_lines(job: ScatterJob, record: dict[str, Any]) -> list[str]:
+    parts = record.get("primitives") or [record]
+    size = "x".join(map(str, record["size"])) + ", " if "size" in record else ""
+    found = [f"{job.output}: {size}scatter, nine coefficients for each channel"]
+    for part in parts:
+        mean = ", ".join(f"{value:.3g}" for value in part["mean_in_uniform_light"])
+        found.append(f"{part['mesh']['name']}: {part['cells']} cells; gives back {mean} of uniform light on average")
+        found += part["warnings"]
+    if "uv_file" in record:
+        found.append(f"{job.output.with_name(record['uv_file']['file'])}: the model with the UVs made for this map")
+    return found + [f"left out, {line}" for line in record.get("left_out", [])]
+
+
+def _scatter_check(output: Path, results: Any) -> dict[str, Any]:
+    from translucent.bake.scatter_job import check_scatter_output, lines, summary, write_scatter_picture
+
+    checks: dict[str, ScatterCheck] = check_scatter_output(output, results)
+    path = Path(f"{output}.check.png")
+    write_scatter_picture(checks, path)
+    told = [line for name, one in checks.items() for line in (f"check of {name!r}:", *lines(one))]
+    return {
+        "check": {name: summary(one) for name, one in checks.items()},
+        "check_picture": str(path),
+        "lines": [*told, f"{path}: baked, diffused in pictures, difference"],
+    }
+
+
+def _given() -> list[str]:
+    """Parameters of the verb that were given, and do not merely have a default."""
+    context = click.get_current_context()
+    return [name for name in context.params if context.get_parameter_source(name) == ParameterSource.COMMANDLINE]
+
+
+def _scatter_option(name: str) -> str:
+    named = {"suffix": "format", "preset_name": "preset", "allow_outside": "allow-outside"}
+    return f"--{named.get(name, name).replace('_', '-')}"
+
+
+MODES = ("normal", "cone", "transmittance", "inscribed", "local", SCATTER)
+FORMATS = ("exr", "png", "npy", "npz", "glb", "ply")
+
+_FLAGS = ("vertices", "unwrap", "normalize", "invert", "resume")
+_LENGTHS = ("max_distance", "tolerance", "high_distance")
+_SETTINGS = (
+    "mode",
+    "size",
+    "rays",
+    "spread",
+    "weighting",
+    "gaps",
+    "ignore_back_faces",
+    "supersample",
+    "padding",
+    "seed",
+)
+
+
+def _length(name: str, help: str) -> Any:
+    return click.option(name, metavar="D|%", help=f"{help} As 2cm, or as a share of the diagonal: 10%.")
+
+
+_OPTIONS = [
+    click.option(
+        "--mode",
+        type=click.Choice(MODES),
+        default="cone",
+        show_default=True,
+        help="What thickness means; or scatter: no thickness, but the light that a body gives back after scattering.",
+    ),
+    click.option(
+        "--size",
+        default=1024,
+        show_default=True,
+        metavar="N",
+        help=f"Texels along each side of the map; of --mode scatter, {SIZE}.",
+    ),
+    click.option(
+        "--resolution",
+        default=32,
+        show_default=True,
+        metavar="N",
+        help="Of --mode scatter: the body has about N^3 / 4 cells, 8 to 128.",
+    ),
+    click.option("--rays", default=64, show_default=True, metavar="N", help="Rays per point of the surface."),
+    click.option("--spread", default=180.0, show_default=True, metavar="DEG", help="Full angle of the cone."),
+    click.option(
+        "--weighting",
+        type=click.Choice(["cosine", "uniform"]),
+        default="cosine",
+        show_default=True,
+        help="How directions of the cone count.",
+    ),
+    click.option(
+        "--gaps",
+        type=click.Choice(["first-exit", "total"]),
+        default="first-exit",
+        show_default=True,
+        help="Where a ray leaves and enters again: up to the first exit, or all that is inside.",
+    ),
+    _length("--max-distance", "No ray goes farther. Default: no limit."),
+    click.option("--ignore-back-faces", is_flag=True, help="Rays end only at faces that they leave through."),
+    click.option("--supersample", default=1, show_default=True, metavar="N", help="N x N points per texel."),
+    click.option("--padding", default=16, show_default=True, metavar="N", help="Texels around each chart of the UVs."),
+    click.option("--seed", default=0, show_default=True, metavar="N", help="Of the directions."),
+    _length("--tolerance", "More rays where the standard error is above it."),
+    click.option("--tile", type=int, metavar="N", help="Bake this UDIM tile, such as 1001. Default: UVs repeat."),
+    click.option("--high", metavar="MESH", help="Mesh with the details, for a map on a coarser MODEL."),
+    click.option("--cage", metavar="MESH", help="Of --high: MODEL, moved outwards, where the search begins."),
+    _length("--high-distance", "Of --high: how far its surface may be from that of MODEL."),
+    unit_option,
+    outside_option,
+    medium_options,
+    scattering_medium_options,
+    click.option("--unwrap", is_flag=True, help="Make new UVs, even if MODEL has some."),
+    click.option("--vertices", is_flag=True, help="Thickness per vertex, into a .ply, .glb or .npy file."),
+    click.option("--normalize", is_flag=True, help="Store shares of the largest value instead of metres."),
+    click.option("--invert", is_flag=True, help="Store 1 - t / max, the translucency that some engines want."),
+    click.option("--max-escaped", metavar="%", help="Of --out-dir: more rays without an exit are suspect. [5%]"),
+    click.option("--resume", is_flag=True, help="Keep finished parts beside the output, and go on from there."),
+]
+
+
+def bake_options(command: F) -> F:
+    """All options that say how to bake."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def read_job(model: str, output: Path, given: dict[str, Any]) -> Job:
+    """Job of a model, from the options.
+
+    Raises
+    ------
+    InputError
+        If a value is wrong.
+    """
+    unit = given["unit"]
+    if given["high"] is None:
+        for name in ("cage", "high_distance"):
+            if given[name] is not None:
+                raise InputError(f"{_option(name)} {given[name]}", "no --high", "add --high MESH, or leave it out")
+    settings = {name: given[name] for name in _SETTINGS}
+    settings |= {name: _read_length(name, given[name], unit) for name in _LENGTHS if given[name] is not None}
+    if given["tile"] is not None:
+        settings["tile"] = given["tile"]
+    medium = read_medium(given["color"], given["distance"], given["preset_name"], given["clamp"])
+    job = {
+        "model": mesh_file(model, unit),
+        "output": str(output),
+        "unit": unit,
+        "settings": settings,
+        "medium": None if medium is None else medium.extinction.tolist(),
+    }
+    job |= {name: mesh_file(given[name], unit) for name in ("high", "cage") if given[name] is not None}
+    refuse_overwriting(output, job["model"], job.get("high"), job.get("cage"))
+    if given["allow_outside"]:
+        job["outside"] = True
+    if given["max_escaped"] is not None:
+        job["max_escaped"] = _read_share("max_escaped", given["max_escaped"])
+    return job | {name: True for name in _FLAGS if given[name]}
+
+
+def _read_share(name: str, text: str) -> float:
+    try:
+        share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        share = -1.0
+    if not 0 <= share <= 1:
+        raise InputError(f"{_option(name)} {text!r}", "not a share", "write for example 5%")
+    return share
+
+
+def _read_length(name: str, text: str, unit: str) -> float | str:
+    """Length in metres, or a share as given, which depends on the mesh."""
+    from translucent.units import parse_length
+
+    if text.strip().endswith("%"):
+        return text.strip()
+    try:
+        return parse_length(text, unit)
+    except InputError as error:
+        raise InputError(f"{_option(name)} {text!r}", str(error)) from None
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
 
 #: Steps of a progress bar.
 STEPS = 1000
@@ -89,8 +364,8 @@ def bake(
 
 
 def _bake_one(job: Job, check: bool, as_json: bool) -> None:
-    from translucent.bake.bake_file import bake_file
     from translucent.bake.batch import told_of
+    from translucent.bake.jobs import bake_file
 
     if check and job.get("vertices"):
         raise InputError("--check", "it looks at maps", "leave --vertices out")
@@ -165,8 +440,7 @@ def _size_line(file: str, record: Record, found: Record, unit: str) -> str:
 
 def _check(job: Job, record: Record, results: Results) -> dict[str, Any]:
     """Compare what was written with the truth; the picture goes beside it."""
-    from translucent.bake.check_files import check_output
-    from translucent.bake.check_picture import write_picture
+    from translucent.bake.check import check_output, write_picture
 
     checks = check_output(job, record, results)
     path = Path(f"{job['output']}.check.png")

@@ -6,8 +6,8 @@ import json
 
 import click
 
-from translucent.commands.common import common_options
 from translucent.commands.console import echo
+from translucent.commands.options import common_options
 from translucent.errors import TranslucentError
 
 

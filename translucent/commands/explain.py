@@ -7,32 +7,30 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import (
+from translucent.commands.console import echo
+from translucent.commands.model import is_scene_file, medium_lines, read_scene
+from translucent.commands.options import (
+    caustics_option,
     common_options,
     draft_option,
     interface_options,
     medium_options,
     outside_option,
+    paths_option,
     read_any_medium,
+    read_caustics,
     read_interfaces,
+    read_method,
     read_roughness,
     read_scattering,
+    read_shadows,
     scattering_medium_options,
     scattering_options,
+    shadow_options,
     stage_option,
     unit_option,
-)
-from translucent.commands.console import echo
-from translucent.commands.method_options import (
-    caustics_option,
-    paths_option,
-    read_caustics,
-    read_method,
-    read_shadows,
-    shadow_options,
     with_environment_shadows,
 )
-from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
     from translucent.geometry.mesh import Mesh

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import click
 
-from translucent.commands.common import (
+from translucent.commands.console import echo
+from translucent.commands.options import (
     common_options,
     medium_options,
     overwrite_option,
     read_medium,
     refuse_overwriting,
 )
-from translucent.commands.console import echo
 from translucent.errors import InputError
 
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import (
+from translucent.commands.console import echo
+from translucent.commands.options import (
     common_options,
     draft_option,
     medium_options,
@@ -18,13 +19,11 @@ from translucent.commands.common import (
     refuse_overwriting,
     triple_text,
 )
-from translucent.commands.console import echo
 from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
-    from translucent.bake.audit.finding import MaterialCheck
-    from translucent.gltf.materials import GltfMaterial
-    from translucent.gltf.scattering import Draft
+    from translucent.bake.audit.rules import MaterialCheck
+    from translucent.gltf.materials import Draft, GltfMaterial
 
 
 @click.group(epilog="Example: translucent material show model.glb")
@@ -158,8 +157,7 @@ def check(model: str, fix: bool, output: Path | None, size: int, rays: int, allo
     --fix bakes thickness maps, sets metallicFactor of what transmits to 0 and removes doubleSided of volumes. Meshes,
     units and attenuations are told, and not changed.
     """
-    from translucent.bake.audit.check import check_materials
-    from translucent.bake.audit.fix import fix_materials
+    from translucent.bake.audit.check import check_materials, fix_materials
 
     if fix != (output is not None):
         given, missing = ("--fix", "-o OUTPUT is missing") if fix else (f"-o {output}", "--fix is missing")

@@ -8,39 +8,37 @@ from pathlib import Path
 
 import click
 
-from translucent.commands.common import (
-    common_options,
-    interface_options,
-    look_options,
-    medium_options,
-    outside_option,
-    overwrite_option,
-    read_any_medium,
-    read_environment,
-    read_interfaces,
-    read_roughness,
-    read_scattering,
-    read_size,
-    refuse_overwriting,
-    scattering_medium_options,
-    scattering_options,
-    stage_option,
-    unit_option,
-)
 from translucent.commands.console import echo
-from translucent.commands.method_options import (
-    method_option,
-    read_method,
-    read_shadows,
-    shadow_options,
-    with_environment_shadows,
-)
 from translucent.commands.model import (
     CameraOptions,
     camera_options,
     medium_lines,
     read_scene,
     require_translucent,
+)
+from translucent.commands.options import (
+    common_options,
+    interface_options,
+    look_options,
+    medium_options,
+    method_option,
+    outside_option,
+    overwrite_option,
+    read_any_medium,
+    read_environment,
+    read_interfaces,
+    read_method,
+    read_roughness,
+    read_scattering,
+    read_shadows,
+    read_size,
+    refuse_overwriting,
+    scattering_medium_options,
+    scattering_options,
+    shadow_options,
+    stage_option,
+    unit_option,
+    with_environment_shadows,
 )
 from translucent.errors import RenderError
 from translucent.units import parse_length

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from translucent.commands.common import common_options, triple_text
 from translucent.commands.console import echo, takes_colors
+from translucent.commands.options import common_options, triple_text
 from translucent.errors import InputError
 
 if TYPE_CHECKING:

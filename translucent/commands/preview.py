@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from translucent.commands.common import STAGE_NAMES, common_options, outside_option, read_size, unit_option
 from translucent.commands.console import echo
+from translucent.commands.options import STAGE_NAMES, common_options, outside_option, read_size, unit_option
 from translucent.errors import InputError, RenderError, TranslucentError, message_of
 
 

@@ -1,58 +1,324 @@
-"""``translucent render``: pictures of a mesh or of a scene."""
+"""``translucent render``: pictures of a mesh or of a scene, in one file, or from all around.
+
+Black pictures, by a wrong unit of a file or a medium too dense for it, and white ones are explained in warnings.
+"""
 
 from __future__ import annotations
 
 import json
+import math
+import warnings
+from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
+import numpy as np
 
-from translucent.commands.common import (
+from translucent.commands.console import Progress, echo
+from translucent.commands.model import (
+    CameraOptions,
+    FileLook,
+    ObjectCommand,
+    camera_options,
+    is_own,
+    medium_lines,
+    read_objects,
+    read_scene,
+    require_translucent,
+)
+from translucent.commands.options import (
+    caustics_option,
     common_options,
     draft_option,
     interface_options,
     look_options,
     medium_options,
+    method_option,
     outside_option,
     overwrite_option,
+    paths_option,
     read_any_medium,
+    read_caustics,
     read_environment,
     read_interfaces,
+    read_method,
     read_roughness,
     read_scattering,
+    read_shadows,
     read_size,
     refuse_overwriting,
     scattering_medium_options,
     scattering_options,
+    shadow_options,
     stage_option,
     unit_option,
-)
-from translucent.commands.console import echo
-from translucent.commands.darkness import warn_if_black, warn_if_white
-from translucent.commands.method_options import (
-    caustics_option,
-    method_option,
-    paths_option,
-    read_caustics,
-    read_method,
-    read_shadows,
-    shadow_options,
     with_environment_shadows,
 )
-from translucent.commands.model import (
-    CameraOptions,
-    FileLook,
-    camera_options,
-    is_own,
-    medium_lines,
-    read_scene,
-    require_translucent,
-)
-from translucent.commands.objects import ObjectCommand, read_objects
-from translucent.commands.pictures import Pictures, picture_options
-from translucent.commands.progress import Progress
 from translucent.errors import InputError
+from translucent.units import METRES_PER_UNIT, metres_per_unit
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from translucent.frames.frame import Frame
+    from translucent.frames.tiled import Tile
+    from translucent.media.medium import Medium
+    from translucent.renderer import Renderer
+    from translucent.scene.scene import Scene
+
+
+#: Below these shares of light, passed straight or scattered back, a picture shows little but black.
+NEARLY_BLACK, HARDLY_LIT = 0.02, 0.05
+
+#: Radiance from which on a picture is white, with what rounding adds, and the share of such pixels that hides a shape.
+WHITE, BURNT_OUT = 1.02, 0.3
+
+#: Range of the share of light that passes in a picture that shows its medium.
+SHOWS_MEDIUM = (0.05, 0.97)
+
+#: Metres across, from which on a model is rarely one of a thing that light shines through, and what such are usually.
+LARGE, USUAL = 0.5, (0.01, 1.0)
+
+#: Units of files, and their names.
+_FILE_UNITS = {"mm": "millimetres", "cm": "centimetres", "in": "inches"}
+
+
+def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -> None:
+    """Warn if hardly any light passes or is scattered back, with the likely reason.
+
+    Parameters
+    ----------
+    scene : Scene
+    frame : Frame
+        Of it.
+    unit : str
+        That the file was taken to be in.
+    own : bool
+        The model comes with the toolkit, so that its unit is known.
+    """
+    seen = frame.coverage & frame.valid
+    if not seen.any():
+        return
+    from translucent.planning.darkness import given_back
+
+    passed = float(frame.transmittance[seen].mean())
+    if passed >= NEARLY_BLACK or any(given_back(scene, medium) >= HARDLY_LIT for medium in _media(scene)):
+        return
+    depth = frame.optical_depth[seen].astype(np.float64)
+    low, high = (
+        np.min([body.bounds[0] for body in scene.bodies], 0),
+        np.max([body.bounds[1] for body in scene.bodies], 0),
+    )
+    thickness = float(np.median(frame.thickness[seen]))
+    # Of the channel that gets farthest.
+    clearest = float(np.median(depth, axis=0).min())
+    tenth = thickness * math.log(10.0) / clearest if clearest > 0 else math.inf
+    echo(
+        f"warning: only {passed:.2%} of the light passes: the model is {_extent(high - low)} and {_length(thickness)} "
+        f"thick at the median, and this medium leaves a tenth of the light after {_length(tenth)}; "
+        + (_other_unit(high - low, depth, unit, own) or _clearer(clearest)),
+        err=True,
+    )
+
+
+def warn_if_white(frame: Frame, exposure: float, tone: str) -> None:
+    """Warn if much of what media cover is beyond the white of a picture that clamps, with what shows it."""
+    seen = frame.coverage & frame.valid
+    if tone != "none" or not seen.any():
+        return
+    bright = frame.radiance[seen].astype(np.float64).min(axis=-1) * 2.0**exposure
+    if (share := float((bright > WHITE).mean())) < BURNT_OUT:
+        return
+    darker = exposure - math.ceil(math.log2(float(np.quantile(bright, 0.95))))
+    echo(
+        f"warning: {share:.0%} of what media cover is brighter than white, and shown as white; "
+        f"--tone neutral keeps its shape, and --exposure {darker:g} its brightness",
+        err=True,
+    )
+
+
+def _other_unit(size: np.ndarray, depth: np.ndarray, unit: str, own: bool) -> str:
+    """Unit in which the model would have a usual size, and the medium would show; empty if there is none."""
+    if own or size.max() < LARGE:
+        return ""
+    for name, words in _FILE_UNITS.items():
+        scale = METRES_PER_UNIT[name] / metres_per_unit(unit)
+        with np.errstate(under="ignore"):
+            passes = float(np.exp(-scale * depth).mean())
+        usual = scale < 1 and USUAL[0] <= scale * size.max() <= USUAL[1]
+        if usual and SHOWS_MEDIUM[0] <= passes <= SHOWS_MEDIUM[1]:
+            return f"is the file in {words}? With --unit {name} it is {_extent(scale * size)}, and {passes:.0%} passes"
+    return ""
+
+
+def _clearer(depth: float) -> str:
+    """Factor by which the medium would have to be clearer, for the optical depth of its clearest channel."""
+    times = float(f"{depth / math.log(5.0):.2g}")
+    return f"in a medium {times:.3g} times as clear (a color at a --distance so much longer), a fifth would pass"
+
+
+def _media(scene: Scene) -> list[Medium]:
+    """Media in which multiple scattering matters."""
+    return [
+        body.medium for body in scene.bodies if body.medium is not None and body.has_interface and body.medium.scatters
+    ]
+
+
+def _extent(size: np.ndarray) -> str:
+    unit, scale = _unit(float(size.max()))
+    return f"{' x '.join(f'{value / scale:.3g}' for value in size)} {unit}"
+
+
+def _length(metres: float) -> str:
+    unit, scale = _unit(metres)
+    return f"{metres / scale:.3g} {unit}"
+
+
+def _unit(metres: float) -> tuple[str, float]:
+    """Unit in which a length is read best."""
+    return next(
+        ((name, METRES_PER_UNIT[name]) for name in ("m", "cm", "mm") if metres >= METRES_PER_UNIT[name]), ("um", 1e-6)
+    )
+
+
+#: Pixels from which on a picture is rendered in tiles.
+TILED = 1 << 23
+
+#: Width and height up to which OpenGL draws a picture at once, and pixels of the largest picture.
+MOST_SIDE, MOST_PIXELS = 1 << 14, 1 << 30
+
+#: Pictures per second of a turntable for which none are given.
+FPS = 24.0
+
+#: Bytes of memory that each pixel of a picture takes that is not rendered in tiles, at least: its arrays, read back.
+_PIXEL_BYTES = 100
+
+#: Width and height within which a large picture is looked at as a whole.
+SMALL = 512
+
+
+class Pictures(NamedTuple):
+    """The options that say what is written, as they were given."""
+
+    output: Path
+    exposure: float
+    tone: str
+    turntable: int | None
+    fps: float | None
+    aov: Path | None
+
+    @property
+    def _rate(self) -> float:
+        return FPS if self.fps is None else self.fps
+
+    def tiled(self, size: tuple[int, int]) -> bool:
+        """True if a picture of this size is so large that it is rendered and written in tiles."""
+        large = size[0] * size[1] > TILED or max(size) > MOST_SIDE
+        return large and self.turntable is None and self.output.suffix.lower() != ".npz"
+
+    def check(self, size: tuple[int, int]) -> None:
+        """Raise before any work is done if pictures of this size could not be written."""
+        from translucent.files.paths import require_folder
+        from translucent.frames.animation import check_animation
+        from translucent.frames.frame import check_exposure
+        from translucent.frames.writing import check_output
+
+        check_exposure(self.exposure)
+        self._check_size(size)
+        if self.aov is not None and self.tiled(size):
+            found = f"{size[0]}x{size[1]} pixels, which are written in tiles"
+            raise InputError(f"--aov {str(self.aov)!r}", found, "write an .exr, which holds these quantities")
+        if self.aov is not None:
+            require_folder(self.aov, f"--aov {str(self.aov)!r}")
+        if self.turntable is None:
+            if self.fps is not None:
+                raise InputError(f"--fps {self.fps:g}", "only --turntable takes it", "add --turntable, or leave it out")
+            check_output(self.output)
+            return
+        check_animation(self.output, self._rate)
+        if self.aov is not None:
+            raise InputError(f"--turntable {self.turntable}", "--aov is given, too", "render one picture for it")
+
+    def _check_size(self, size: tuple[int, int]) -> None:
+        """Raise if nobody could wait for pictures of this size, or memory could not hold them."""
+        from translucent.files.reading import require_memory
+
+        asked, pixels = f"--size {size[0]}x{size[1]}", size[0] * size[1]
+        if pixels > MOST_PIXELS:
+            found = f"{pixels / 1e6:.0f} million pixels, and {MOST_PIXELS / 1e6:.0f} million are the most"
+            raise InputError(asked, found, "give a smaller size, at most about 32768x32768")
+        if not self.tiled(size):
+            do = "give a smaller size" if self.turntable else "give a smaller size, or write an .exr or .png, in tiles"
+            found = f"{pixels / 1e6:.0f} million pixels at once"
+            require_memory(asked, found, _PIXEL_BYTES * pixels, do)
+
+    def write(self, scene: Scene, draw: Callable[[Scene], Frame]) -> Frame:
+        """Draw and write all of them; returns the first frame."""
+        if self.turntable is not None:
+            return self._write_turntable(scene, draw, self.turntable)
+        frame = draw(scene)
+        frame.save(self.output, self.exposure, self.tone)
+        if self.aov is not None:
+            frame.save_aovs(self.aov)
+        return frame
+
+    def write_tiles(self, scene: Scene, renderer: Renderer, options: dict[str, Any]) -> tuple[Frame, dict[str, Any]]:
+        """Draw and write a large picture; returns a small frame of it, and the statistics of all its pixels."""
+        from translucent.frames.tiled import write_tiles
+        from translucent.tiles import Totals, render_tiles
+
+        totals, (width, height) = Totals(), options["size"]
+
+        def counted() -> Iterator[Tile]:
+            for tile in render_tiles(renderer, scene, **options):
+                totals.add(tile.frame)
+                yield tile
+
+        write_tiles(self.output, (width, height), counted(), self.exposure, self.tone)
+        scale = SMALL / max(width, height)
+        small = max(round(scale * width), 1), max(round(scale * height), 1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # they have been told
+            frame = renderer.render(scene, **{**options, "size": small, "samples": 1})
+        return frame, totals.summary((width, height))
+
+    def _write_turntable(self, scene: Scene, draw: Callable[[Scene], Frame], count: int) -> Frame:
+        from translucent.frames.animation import write_animation
+        from translucent.scene.turntable import turntable
+
+        views = turntable(scene, count)
+        first = draw(next(views))
+
+        def pictures() -> Iterator[npt.NDArray[np.uint8]]:
+            for frame in chain([first], map(draw, views)):
+                yield frame.to_srgb8(self.exposure, self.tone)
+
+        write_animation(self.output, pictures(), self._rate)
+        return first
+
+
+def picture_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options that choose what is written besides one picture."""
+    command = click.option(
+        "--aov",
+        type=click.Path(path_type=Path, file_okay=False),
+        metavar="DIR",
+        help="Also write pictures of thickness, transmittance and validity into this folder.",
+    )(command)
+    command = click.option(
+        "--fps", type=float, metavar="N", help=f"Pictures per second of a --turntable. Default: {FPS:g}."
+    )(command)
+    return click.option(
+        "--turntable",
+        type=click.IntRange(2, 3600),
+        metavar="N",
+        help="N pictures from all around, into a .webp, .gif, .mp4, or a folder of numbered .png files.",
+    )(command)
+
 
 #: Samples of all pixels up to which shaders take longer to compile than pictures to draw with a software rasterizer.
 FEW_SAMPLES = 1 << 18

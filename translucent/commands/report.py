@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from translucent.commands.common import (
+from translucent.commands.console import echo, is_terminal
+from translucent.commands.model import read_scene, require_translucent
+from translucent.commands.options import (
     common_options,
     medium_options,
     outside_option,
@@ -22,8 +24,6 @@ from translucent.commands.common import (
     read_size,
     unit_option,
 )
-from translucent.commands.console import echo, is_terminal
-from translucent.commands.model import read_scene, require_translucent
 from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:

@@ -20,9 +20,8 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
 from translucent.gltf.accessors import Accessors
-from translucent.gltf.fields import label, refused
+from translucent.gltf.fields import LeftOut, label, refused
 from translucent.gltf.file import GltfFile, Json
-from translucent.gltf.left_out import LeftOut
 
 _KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 _MODES = ("LINEAR", "STEP", "CUBICSPLINE")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from translucent.arrays import Array
@@ -77,3 +79,79 @@ def numbers(file: GltfFile, where: str, holder: Json, key: str, default: tuple[f
     if not isinstance(values, list) or len(values) != len(default):
         raise refused(file, f"{where}: {key} is {values!r}, not {len(default)} numbers")
     return np.array([number(file, where, {key: value}, key) for value in values])
+
+
+Triple = tuple[float, float, float]
+
+
+class Fields:
+    """Reader of the checked values of one JSON object; errors go into `problems`."""
+
+    def __init__(self, owner: object, where: str, problems: list[str]) -> None:
+        self.problems = problems
+        if not isinstance(owner, dict):
+            problems.append(f"{where} is {owner!r}, not an object")
+        self.values: Json = owner if isinstance(owner, dict) else {}
+
+    def number(self, key: str, default: float, low: float, high: float = math.inf, *, above: bool = False) -> float:
+        """A number in `low`..`high`; excluding `low` itself with `above`."""
+        value = self.values.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            self.problems.append(f"{key} is {value!r}, not a number")
+            return default
+        if not low <= value <= high or (above and value == low):
+            allowed = f"above {low:g}" if above else f"{low:g} or more" if math.isinf(high) else f"in {low:g}..{high:g}"
+            self.problems.append(f"{key} {value:g} is not {allowed}")
+            return default
+        return float(value)
+
+    def triple(self, key: str, default: Triple) -> Triple:
+        """Three numbers in 0..1."""
+        value = self.values.get(key, list(default))
+        if not isinstance(value, list) or len(value) != 3:
+            self.problems.append(f"{key} is {value!r}, not three numbers")
+            return default
+        channels = Fields({f"{key}[{i}]": channel for i, channel in enumerate(value)}, key, self.problems)
+        red, green, blue = (channels.number(f"{key}[{i}]", default[i], 0.0, 1.0) for i in range(3))
+        return red, green, blue
+
+    def pair(self, key: str, default: tuple[float, float]) -> tuple[float, float]:
+        """Two numbers."""
+        value = self.values.get(key, list(default))
+        if not isinstance(value, list) or len(value) != 2:
+            self.problems.append(f"{key} is {value!r}, not two numbers")
+            return default
+        parts = Fields({f"{key}[{i}]": part for i, part in enumerate(value)}, key, self.problems)
+        return parts.number(f"{key}[0]", default[0], -math.inf), parts.number(f"{key}[1]", default[1], -math.inf)
+
+    def whole(self, key: str, default: int) -> int:
+        """A nonnegative integer."""
+        value = self.values.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+            self.problems.append(f"{key} is {value!r}, not a whole number of 0 or more")
+            return default
+        return value
+
+
+#: Largest number of names in a line.
+FIRST = 3
+
+
+class LeftOut:
+    """Record of features left out: one line per kind, with the names of the objects concerned."""
+
+    def __init__(self) -> None:
+        self._names: dict[str, dict[str, None]] = {}
+
+    def add(self, what: str, name: str) -> None:
+        """Record a loss; the same one again counts once."""
+        self._names.setdefault(what, {})[name] = None
+
+    def lines(self) -> tuple[str, ...]:
+        """Lines of text such as ``base color textures ('Label', 'Table', 'Wall' and 2 more)``."""
+        return tuple(f"{what} ({_listed(list(names))})" for what, names in self._names.items())
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - FIRST} more" if len(names) > FIRST else ""
+    return ", ".join(names[:FIRST]) + more

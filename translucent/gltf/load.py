@@ -1,4 +1,4 @@
-"""Loading of a scene from a glTF file."""
+"""Loading of a glTF file: as a scene, or whole as one mesh."""
 
 from __future__ import annotations
 
@@ -11,20 +11,27 @@ import numpy as np
 
 from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
-from translucent.geometry.mesh import MAX_COORDINATE
+from translucent.files.reading import require_room
+from translucent.geometry.mesh import MAX_COORDINATE, Mesh, Triangles, joined
+from translucent.gltf.accessors import Accessors, raw_mesh
 from translucent.gltf.animations import posed
-from translucent.gltf.cameras import scene_camera
-from translucent.gltf.fields import label, refused
+from translucent.gltf.fields import LeftOut, label, refused
 from translucent.gltf.file import GltfFile, read_gltf
-from translucent.gltf.left_out import LeftOut
-from translucent.gltf.lights import LIGHTS, scene_lights
-from translucent.gltf.materials import CLEARCOAT, DISPERSION, EMISSIVE_STRENGTH, IOR, IRIDESCENCE, TRANSMISSION, VOLUME
-from translucent.gltf.objects import scene_objects
-from translucent.gltf.scattering import DIFFUSE_TRANSMISSION, DRAFTS
-from translucent.gltf.scene_media import node_transforms
-from translucent.gltf.surfaces import UNLIT
+from translucent.gltf.lights import LIGHTS, scene_camera, scene_lights
+from translucent.gltf.materials import (
+    CLEARCOAT,
+    DIFFUSE_TRANSMISSION,
+    DISPERSION,
+    DRAFTS,
+    EMISSIVE_STRENGTH,
+    IOR,
+    IRIDESCENCE,
+    TRANSMISSION,
+    VOLUME,
+)
+from translucent.gltf.nodes import VARIANTS, node_transforms, primitives, variant_names
+from translucent.gltf.objects import UNLIT, scene_objects
 from translucent.gltf.textures import TEXTURE_TRANSFORM
-from translucent.gltf.variants import VARIANTS, variant_names
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import LIGHT_TABLE, framing
@@ -112,7 +119,7 @@ def load_scene(
     GltfScene
         One object per node and primitive. Nodes that share a mesh share it here, too; a mesh has its node's name, and a
         shared one its own. Meshes are welded and wound as by `load_mesh`. What materials make of objects says
-        `translucent.gltf.surfaces`. The environment, which glTF does not have, is `Environment.studio`, or that of
+        `translucent.gltf.objects`. The environment, which glTF does not have, is `Environment.studio`, or that of
         `showcase` in a file without materials.
         `left_out` lists what the scene does not hold, and a `TranslucentWarning` tells it.
 
@@ -205,3 +212,43 @@ def _scene_nodes(file: GltfFile, left_out: LeftOut) -> Iterator[int]:
         seen.add(index)
         yield index
         pending += node.get("children", [])[::-1]
+
+
+def read_whole(path: Path, allow_outside: bool = False) -> Triangles:
+    """Read vertices, faces and, if all parts have them, texture coordinates of the default scene, in the file's unit.
+
+    Raises
+    ------
+    InputError
+        If the file is broken, compressed or without triangles.
+    """
+    file = read_gltf(path, allow_outside)
+    left_out = LeftOut()  # of looks, which a mesh has none of
+    check_extensions(file, left_out)
+    accessors, size = Accessors(file), 0
+    meshes: dict[int, list[Mesh | None]] = {}
+    parts: list[Triangles] = []
+    with np.errstate(under="ignore"):
+        for node, matrix in scene_transforms(file, left_out).items():
+            index = file.items("nodes")[node].get("mesh")
+            if index is None or not matrix[:3, :3].any():
+                continue
+            entry = file.item("meshes", index)
+            if index not in meshes:
+                listed = primitives(file, entry)
+                meshes[index] = [raw_mesh(accessors, primitive, f"mesh {index}") for primitive in listed]
+            for mesh in filter(None, meshes[index]):
+                size += 4 * (mesh.vertices.nbytes + mesh.faces.nbytes)  # until they are one mesh
+                require_room(f"glTF {str(path)!r}", "its parts in all places", size, file.stored, "split the file")
+                parts.append(_placed(mesh, matrix))
+    if not parts:
+        raise refused(file, "it has no faces", "give a triangle mesh, not points or lines")
+    return joined(parts, f"glTF {str(path)!r}")
+
+
+def _placed(mesh: Mesh, matrix: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Triangles:
+    """Place a part in the world; a mirrored one is rewound so that its outside stays outside."""
+    if (matrix == np.eye(4)).all():
+        return mesh.vertices, mesh.faces, mesh.uv
+    faces = mesh.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else mesh.faces
+    return mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces, mesh.uv

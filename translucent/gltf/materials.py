@@ -21,7 +21,7 @@ KHR_materials_emissive_...    emissive: factor times strength, linear, of the su
 Formula: sigma_t = -ln(attenuation_color) / attenuation_distance; T(x) = attenuation_color^(x / attenuation_distance).
 The extension's text calls the distance "the average distance that light travels before interacting with a particle";
 by its formula that is so only for a color of 1/e. Here the formula rules: it is where white light has the color.
-A node's scale acts on the thickness and not on the distance; `translucent.gltf.scene_media` does that.
+A node's scale acts on the thickness and not on the distance; `translucent.gltf.nodes` does that.
 
 Source: Khronos, glTF 2.0, and the ratified texts of the extensions above.
 
@@ -30,26 +30,146 @@ A film whose thickness varies by a texture has the mean of its least and its gre
 Not carried into a `Medium`: emission of the surface, dispersion, films, clear coats, base color, roughness, textures of
 transmission. Not known to ratified glTF: scattering, anisotropy and emission of the volume. A medium that scatters is
 written as its extinction, so that what passes straight on is the same; `translucent.gltf.write` says so in a warning.
-Drafts of extensions that know scattering: `translucent.gltf.scattering`.
+
+Drafts of extensions for media that scatter are read and written where they are requested:
+
+========================  ================================================================  =====================
+extension                 field here                                                        default
+========================  ================================================================  =====================
+KHR_materials_scatter     strength: scatterStrengthFactor, 0..1                             0
+                          color: multiscatterColorFactor, linear, 0..1                      (1, 1, 1)
+                          anisotropy: scatterAnisotropy, -1 < g < 1                         0
+KHR_materials_volume_     color: multiscatterColorFactor, or multiscatterColor or           (0, 0, 0)
+scatter                   scatterAlbedo of older texts
+                          anisotropy: scatterAnisotropy                                     0
+========================  ================================================================  =====================
+
+Both count only with a volume. The attenuation of KHR_materials_volume is then the extinction, sigma_t = -ln(c) / d, and
+sigma_s = a sigma_t with the albedo a of single scattering (Kulla & Conty 2017, see `translucent.media.albedo`):
+
+- KHR_materials_scatter: a is that of the color strength * color and of the anisotropy g.
+- KHR_materials_volume_scatter: a is that of the color for g = 0, whatever the anisotropy.
+
+Source of the drafts: Khronos, glTF pull request 2579, KHR_materials_scatter, commit 0addbb0 of 2026-07-02 (its schema
+still calls the strength scatterFactor); pull request 2453, KHR_materials_volume_scatter, commit 4608553 of 2025-07-16.
+Neither is ratified: names, defaults and formulas may change.
+
+Not read of them: textures of color and strength, and the thin-walled mode of KHR_materials_scatter.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+from translucent.arrays import Array
 from translucent.errors import InputError
-from translucent.gltf.checked import Fields, Triple
+from translucent.gltf.fields import Fields, Triple
 from translucent.gltf.file import GltfFile, Json, read_gltf
-from translucent.gltf.scattering import DIFFUSE_TRANSMISSION, DraftScattering, read_draft
-from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform
+from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform, stated_texture
+from translucent.media.albedo import hulst_albedo, hulst_color
 from translucent.media.conversion import html_strip
 from translucent.media.medium import BLACKEST, Medium, extinction_at
+
+SCATTER = "KHR_materials_scatter"
+VOLUME_SCATTER = "KHR_materials_volume_scatter"
+DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
+
+#: Short names of the drafts that can be written.
+Draft = Literal["scatter", "volume-scatter"]
+DRAFTS: dict[Draft, str] = {"scatter": SCATTER, "volume-scatter": VOLUME_SCATTER}
+
+#: Spellings of a field, the present one first.
+_STRENGTHS = ("scatterStrengthFactor", "scatterFactor")
+_COLORS = ("multiscatterColorFactor", "multiscatterColor", "scatterAlbedo")
+
+
+@dataclass(frozen=True)
+class DraftScattering:
+    """Scattering of a material, as a draft extension states it.
+
+    Attributes
+    ----------
+    extension : str
+    color : (3,)
+        Linear color of a thick body after many events: the multi-scatter albedo.
+    anisotropy : float
+        Henyey-Greenstein g.
+    strength : float
+        Share of the color that counts.
+    """
+
+    extension: str
+    color: Triple
+    anisotropy: float = 0.0
+    strength: float = 1.0
+
+    @property
+    def albedo(self) -> Array:
+        """(3,): albedo of single scattering."""
+        g = self.anisotropy if self.extension == SCATTER else 0.0
+        return hulst_albedo(self.strength * np.asarray(self.color), g)
+
+    def medium(self, extinction: Array, ior: float) -> Medium:
+        """Medium with this extinction (3,) in 1/m, of which a part scatters."""
+        share = self.albedo
+        return Medium((1.0 - share) * extinction, share * extinction, anisotropy=self.anisotropy, ior=ior)
+
+
+def read_draft(extensions: Json, problems: list[str], told: list[str]) -> DraftScattering | None:
+    """Scattering that a material's extensions state; the newer draft wins. None if there is none.
+
+    Parameters
+    ----------
+    extensions : dict
+    problems : list of str
+        Gets values of a wrong type or beyond their range.
+    told : list of str
+        Gets what is not read.
+    """
+    name = next((one for one in (SCATTER, VOLUME_SCATTER) if one in extensions), None)
+    if name is None:
+        return None
+    fields = Fields(extensions[name], name, problems)
+    told += [f"{name} has {key}, which is not read" for key in fields.values if key.endswith("Texture")]
+    anisotropy = fields.number("scatterAnisotropy", 0.0, -1.0, 1.0)
+    if abs(anisotropy) == 1.0:
+        problems.append(f"scatterAnisotropy {anisotropy:g} is not between -1 and 1")
+        anisotropy = 0.0
+    color = fields.triple(_spelling(fields, _COLORS), (1.0, 1.0, 1.0) if name == SCATTER else (0.0, 0.0, 0.0))
+    strength = 1.0 if name == VOLUME_SCATTER else fields.number(_spelling(fields, _STRENGTHS), 0.0, 0.0, 1.0)
+    if name == SCATTER and not any(key in fields.values for key in _STRENGTHS):
+        told.append(f"{name} has no scatterStrengthFactor, which is 0 by default: nothing scatters")
+    return DraftScattering(name, color, anisotropy, strength)
+
+
+def draft_extension(medium: Medium, draft: Draft) -> Json:
+    """Extension, by its name, that states how a medium scatters; empty for one that does not."""
+    if not medium.scatters:
+        return {}
+    extinction, scattering = medium.extinction, np.asarray(medium.scattering)
+    albedo = np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0).clip(0.0, 1.0)
+    color = hulst_color(albedo, medium.anisotropy if draft == "scatter" else 0.0)
+    stated: Json = {"multiscatterColorFactor": color.tolist(), "scatterAnisotropy": medium.anisotropy}
+    return {DRAFTS[draft]: ({"scatterStrengthFactor": 1} if draft == "scatter" else {}) | stated}
+
+
+def check_draft(draft: Draft | None) -> None:
+    """Raise `InputError` unless this is the name of a draft, or None."""
+    if draft is not None and draft not in get_args(Draft):
+        raise InputError(f"draft_extensions {draft!r}", "not known", f"use {' or '.join(map(repr, DRAFTS))}, or None")
+
+
+def _spelling(fields: Fields, names: Sequence[str]) -> str:
+    """The first of several names that is stated, or the first of all."""
+    return next((name for name in names if name in fields.values), names[0])
+
 
 TRANSMISSION = "KHR_materials_transmission"
 VOLUME = "KHR_materials_volume"
@@ -93,7 +213,7 @@ class GltfMaterial:
     thickness_texture : int, optional
         Index in the file's list of textures.
     thickness_transform : TextureTransform
-        Which UVs it is read at; see `translucent.gltf.scene_media.thickness_at`.
+        Which UVs it is read at; see `translucent.gltf.nodes.thickness_at`.
     warnings : tuple of str
         What is allowed, and yet not as it should be.
     """
@@ -182,7 +302,7 @@ def read_materials(path: str | Path, *, draft_extensions: bool = False) -> list[
     ----------
     path : path
     draft_extensions : bool
-        Whether to read extensions that are drafts, too; see `translucent.gltf.scattering`.
+        Whether to read extensions that are drafts, too; see `translucent.gltf.materials`.
 
     Raises
     ------
@@ -224,7 +344,7 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
     scale = strength.number("emissiveStrength", 1.0, 0.0)
     red, green, blue = Fields(entry, "material", problems).triple("emissiveFactor", (0.0, 0.0, 0.0))
     index_of_refraction = ior.number("ior", DEFAULT_IOR, 0.0)
-    texture, transform = volume.texture("thicknessTexture", len(file.items("textures")))
+    texture, transform = stated_texture(volume, "thicknessTexture", len(file.items("textures")))
     if 0 < index_of_refraction < 1:
         problems.append(f"ior {index_of_refraction:g} is not 0, and not 1 or more")
     found = GltfMaterial(

@@ -1,27 +1,301 @@
-"""Objects of a glTF scene: the primitives that its nodes place, with their materials."""
+"""Objects of a glTF scene: the primitives that its nodes place, as bodies, thin walls, or opaque objects.
+
+=================================================  ==================================================================
+material                                           object
+=================================================  ==================================================================
+transmissionFactor > 0 and thicknessFactor > 0     body: the medium of attenuationColor at attenuationDistance, and
+                                                   the ior; its thickness is the true one of the mesh, along each
+                                                   ray, and thicknessFactor and thicknessTexture are not needed. Its
+                                                   surface is tinted by baseColorFactor, once
+diffuseTransmissionFactor > 0 and a volume         body, too: what is not transmitted is paint that light passes
+transmissionFactor > 0, no volume or thickness 0   thin wall: a sheet without an inside, which light crosses once per
+                                                   face, tinted by baseColorFactor. It is infinitely thin by the
+                                                   specification; here a pane that hardly adds to the thickness
+everything else                                    opaque: metal, or a coat over paint, that may glow, may have holes,
+                                                   and may let light of the other side through. A volume alone, or
+                                                   with transmissionFactor 0, lets no light in
+KHR_materials_unlit                                opaque: has its base color everywhere, and mirrors nothing
+alphaMode BLEND, with an alpha below 1 somewhere   layer: a sheet that shows what the opaque object would, with alpha as
+                                                   its share, over what is behind it with the rest (the specification's
+                                                   ``over``), whatever the angle. Layers are painted object by object,
+                                                   far ones first, as viewers do. What lies behind a body is dimmed by
+                                                   all that its ray crosses, and seen straight, not bent
+=================================================  ==================================================================
+
+The tint of a wall is that of a straight view. A slanted view has it deeper, as in a pane with the wall's ior: at most
+by the 1.34th power with the ior of 1.5 that materials have by default. A wall that transmits only a share of the light
+has its tint whatever the view, like its paint.
+
+alphaMode MASK makes holes in opaque objects and walls; a body with holes would have no inside, and is drawn closed.
+Colors of vertices multiply the base color, and a mesh with them and without a material is matt. Emission adds its
+radiance where a ray first enters a body, and occlusion dims the light of the environment.
+
+Of all that, textures are read as far as `translucent.gltf.textures` does; normals are those of the mesh, smooth but at
+creases, and not the file's. What of a material has no meaning here is told by `LeftOut`.
+Source: glTF 2.0, section 3.9, and the extensions KHR_materials_transmission (infinitely thin), _volume, _ior,
+_dispersion, _diffuse_transmission, _iridescence, _clearcoat, _emissive_strength and _unlit.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.geometry.mesh import MIN_DIAGONAL, Mesh
-from translucent.gltf.accessors import Accessors
-from translucent.gltf.fields import label, refused
+from translucent.gltf.accessors import Accessors, primitive_mesh
+from translucent.gltf.fields import LeftOut, extension, label, number, refused, section, share, shares
 from translucent.gltf.file import GltfFile, Json
-from translucent.gltf.geometry import primitive_mesh
-from translucent.gltf.left_out import LeftOut
-from translucent.gltf.scene_media import primitives
-from translucent.gltf.surfaces import VERTEX_COLORED, Finish, finish_reader
-from translucent.gltf.variants import material_index, variant_index
-from translucent.media.medium import Medium
-from translucent.scene.scene import Object
-from translucent.scene.surface import TEXTURE_FIELDS, Surface
+from translucent.gltf.materials import (
+    CLEARCOAT,
+    DEFAULT_IOR,
+    DIFFUSE_TRANSMISSION,
+    IRIDESCENCE,
+    TRANSMISSION,
+    GltfMaterial,
+    materials_of,
+)
+from translucent.gltf.nodes import material_index, primitives, variant_index
+from translucent.gltf.textures import Textures
+from translucent.media.medium import MAX_IOR, Medium, extinction_at
+from translucent.scene.scene import OPAQUE_COLOR, Object
+from translucent.scene.surface import MAX_DISPERSION, MAX_FILM, TEXTURE_FIELDS, Surface
+from translucent.scene.texture import Texture
+
+UNLIT = "KHR_materials_unlit"
+
+#: Textures of extensions that are not read, and their names in messages.
+UNREAD_TEXTURES = {
+    CLEARCOAT: (("clearcoatTexture", "clearcoatRoughnessTexture", "clearcoatNormalTexture"), "textures of clear coats"),
+    IRIDESCENCE: (("iridescenceTexture", "iridescenceThicknessTexture"), "textures of iridescence"),
+    DIFFUSE_TRANSMISSION: (
+        ("diffuseTransmissionTexture", "diffuseTransmissionColorTexture"),
+        "textures of diffuse transmission",
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Finish:
+    """Finish of an object: its surface, its medium, and whether it is a thin wall.
+
+    Attributes
+    ----------
+    color : (3,)
+        baseColorFactor, linear: what an opaque object reflects, and by which a wall tints.
+    medium : Medium or None
+        What fills a body.
+    wall_ior : float or None
+        Index of refraction of a thin wall; None if it is none.
+    surface : Surface or None
+        What its interface does to light; None for an object without a material.
+    hidden : bool
+        Whether its alpha makes it one hole.
+    blends : bool
+        Whether alpha is a share that is painted over what is behind.
+    opacity : float
+        That of baseColorFactor.
+    unlit : bool
+        Whether nothing lights it.
+    name : str
+        Of the material, as messages call it.
+    """
+
+    color: npt.ArrayLike = OPAQUE_COLOR
+    medium: Medium | None = None
+    wall_ior: float | None = None
+    surface: Surface | None = None
+    hidden: bool = False
+    blends: bool = False
+    opacity: float = 1.0
+    unlit: bool = False
+    name: str = "none"
+
+    @property
+    def translucent(self) -> bool:
+        """True if light passes the object."""
+        return self.medium is not None or self.wall_ior is not None
+
+    def wall_medium(self, thickness: float) -> Medium:
+        """Medium that gives a sheet of this thickness in metres the tint of the wall."""
+        tints = self.surface is None or (np.asarray(self.surface.color) == 1).all()
+        color = self.color if tints else np.ones(3)
+        return Medium(absorption=extinction_at(color, thickness), ior=self.wall_ior or DEFAULT_IOR)
+
+
+#: Finish of a mesh with vertex colors and no material: matte.
+VERTEX_COLORED = Finish((1.0, 1.0, 1.0), surface=Surface(roughness=1.0, ior=1.0))
+
+
+def finish_reader(
+    file: GltfFile, metres: float, left_out: LeftOut, draft_extensions: bool = False
+) -> Callable[[int | None], Finish]:
+    """Function from the index of a material to its finish, each read once; None is the index of no material.
+
+    Parameters
+    ----------
+    file : GltfFile
+    metres : float
+        Per unit of the file, in which attenuation distances are.
+    left_out : LeftOut
+        Gets what the objects do not hold.
+    draft_extensions : bool
+        Whether extensions that are drafts count.
+    """
+    materials, entries = materials_of(file, draft_extensions=draft_extensions), file.items("materials")
+    textures = Textures(file, left_out)
+
+    @cache
+    def read(index: int | None) -> Finish:
+        if index is None:
+            return Finish()
+        name = label(entries, index)
+        return _Reader(file, name, materials[index], entries[index], textures, left_out).finish(metres)
+
+    return read
+
+
+class _Reader:
+    """Reader of one material of a file."""
+
+    def __init__(
+        self, file: GltfFile, name: str, material: GltfMaterial, entry: Json, textures: Textures, left_out: LeftOut
+    ) -> None:
+        self.file, self.name, self.material, self.entry = file, name, material, entry
+        self.textures, self.left_out = textures, left_out
+        self.where = f"material {name}"
+        self.base = section(file, self.where, entry, "pbrMetallicRoughness")
+        self.base_color = shares(file, self.where, self.base, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
+
+    def finish(self, metres: float) -> Finish:
+        """Finish of its objects; `metres` are per unit of the file."""
+        found = self._finish(metres)
+        opacity, mode = float(self.base_color[3]), self._alpha_mode()
+        if found.surface is not None and not found.unlit:
+            for name, (keys, what) in UNREAD_TEXTURES.items():
+                if any(key in self._extension(name) for key in keys):
+                    self.left_out.add(what, self.name)
+        return dataclasses.replace(
+            found, hidden=self._hidden(), blends=mode == "BLEND", opacity=opacity, name=self.name
+        )
+
+    def _finish(self, metres: float) -> Finish:
+        """Finish of its objects, without the effect of alpha."""
+        color, diffuse = self.base_color[:3], self._extension(DIFFUSE_TRANSMISSION)
+        passes = share(self.file, self.where, diffuse, "diffuseTransmissionFactor", 0.0) > 0
+        medium, transmission = self.material.medium(), self.material.transmission
+        if UNLIT in section(self.file, self.where, self.entry, "extensions"):
+            return Finish(color, surface=self._unlit(), unlit=True)
+        if medium is not None and (transmission > 0 or passes):
+            absorption, scattering = np.asarray(medium.absorption), np.asarray(medium.scattering)
+            medium = dataclasses.replace(medium, absorption=absorption / metres, scattering=scattering / metres)
+            return Finish(color, medium, surface=self._translucent(color))
+        if transmission > 0:
+            whole = transmission == 1 and "transmissionTexture" not in self._extension(TRANSMISSION)
+            surface = self._translucent(np.ones(3) if whole else color)
+            return Finish(color, wall_ior=self.material.ior or DEFAULT_IOR, surface=surface)
+        return Finish(color, surface=self._opaque())
+
+    def _opaque(self) -> Surface:
+        return dataclasses.replace(
+            self._with_sides(self._common()),
+            color=self.base_color[:3],
+            ior=self.material.ior or DEFAULT_IOR,
+        )
+
+    def _unlit(self) -> Surface:
+        texture, color = self._color_texture(), self.base_color[:3]
+        black = Surface(
+            color=(0, 0, 0),
+            ior=1.0,
+            emissive=color,
+            emissive_texture=texture,
+            color_texture=texture,
+            alpha_cutoff=self._cutoff(),
+        )
+        return self._with_sides(black)
+
+    def _translucent(self, color: Array) -> Surface:
+        if (dispersion := self.material.dispersion) > MAX_DISPERSION:
+            self.left_out.add(f"dispersion above {MAX_DISPERSION:g}", self.name)
+        return dataclasses.replace(
+            self._common(),
+            color=color,
+            transmission=self.material.transmission,
+            transmission_texture=self.textures.read(self.name, self._extension(TRANSMISSION), "transmissionTexture"),
+            dispersion=min(dispersion, MAX_DISPERSION),
+        )
+
+    def _common(self) -> Surface:
+        """Surface parameters common to all kinds of objects."""
+        file, where, diffuse = self.file, self.where, self._extension(DIFFUSE_TRANSMISSION)
+        steep = number(file, where, section(file, where, self.entry, "normalTexture"), "scale", 1.0)
+        return Surface(
+            roughness=share(file, where, self.base, "roughnessFactor", 1.0),
+            iridescence=self.material.iridescence,
+            iridescence_ior=min(self.material.iridescence_ior, MAX_IOR),
+            iridescence_thickness=min(self.material.iridescence_thickness, MAX_FILM),
+            clearcoat=self.material.clearcoat,
+            clearcoat_roughness=self.material.clearcoat_roughness,
+            metallic=share(file, where, self.base, "metallicFactor", 1.0),
+            diffuse_transmission=share(file, where, diffuse, "diffuseTransmissionFactor", 0.0),
+            diffuse_transmission_color=shares(file, where, diffuse, "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0)),
+            alpha_cutoff=self._cutoff(),
+            emissive=self.material.emissive,
+            emissive_texture=self.textures.read(self.name, self.entry, "emissiveTexture", srgb=True),
+            occlusion_texture=self._occlusion(),
+            color_texture=self._color_texture(),
+            roughness_texture=self.textures.read(self.name, self.base, "metallicRoughnessTexture"),
+            normal_texture=self.textures.read(self.name, self.entry, "normalTexture", normal_scale=steep),
+        )
+
+    def _color_texture(self) -> Texture | None:
+        return self.textures.read(self.name, self.base, "baseColorTexture", srgb=True)
+
+    def _with_sides(self, surface: Surface) -> Surface:
+        """Surface of an opaque object with its visible sides."""
+        double_sided = self.entry.get("doubleSided", False)
+        if not isinstance(double_sided, bool):
+            raise refused(self.file, f"{self.where}: doubleSided is {double_sided!r}, not true or false")
+        return dataclasses.replace(surface, double_sided=double_sided)
+
+    def _occlusion(self) -> Texture | None:
+        info = section(self.file, self.where, self.entry, "occlusionTexture")
+        strength = share(self.file, self.where, info, "strength", 1.0)
+        return self.textures.read(self.name, self.entry, "occlusionTexture", strength=strength)
+
+    def _alpha_mode(self) -> str:
+        mode = self.entry.get("alphaMode", "OPAQUE")
+        if mode not in ("OPAQUE", "MASK", "BLEND"):
+            raise refused(self.file, f"{self.where}: alphaMode {mode!r} is none of glTF 2.0")
+        return str(mode)
+
+    def _cutoff(self) -> float:
+        """Alpha of texture and vertices below which there is a hole: the rest of alpha is a factor."""
+        if self._alpha_mode() != "MASK":
+            return 0.0
+        return min(self._alpha_cutoff() / max(float(self.base_color[3]), 1e-9), 1.0)
+
+    def _alpha_cutoff(self) -> float:
+        cutoff = number(self.file, self.where, self.entry, "alphaCutoff", 0.5)
+        if cutoff < 0:
+            raise refused(self.file, f"{self.where}: alphaCutoff {cutoff:g} is below 0", "mend the file")
+        return cutoff
+
+    def _hidden(self) -> bool:
+        """True if alpha is below the cutoff everywhere."""
+        return self.entry.get("alphaMode") == "MASK" and bool(self.base_color[3] < self._alpha_cutoff())
+
+    def _extension(self, name: str) -> Json:
+        return extension(self.file, self.where, self.entry, name)
+
 
 #: Thickness of a thin wall as a share of the scene's diagonal: too little to see, enough to count as covered.
 WALL_SHARE = 1e-5

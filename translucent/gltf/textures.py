@@ -1,11 +1,14 @@
-"""Lookup of glTF textures: the set of UVs, their transform (KHR_texture_transform), and the sampler's wrapping.
+"""Textures of glTF materials: the set of UVs, their transform, the sampler's wrapping, and their pictures.
 
-Formula: u' = offset_u + c scale_u u + s scale_v v, v' = offset_v - s scale_u u + c scale_v v, with c and s the cosine
-and sine of the rotation. It is counter-clockwise in the UVs of glTF, whose v points down, as the words and the example
-of the extension have it; its GLSL listing turns the other way, which is known to be a mistake.
+Formula of KHR_texture_transform: u' = offset_u + c scale_u u + s scale_v v, v' = offset_v - s scale_u u + c scale_v v,
+with c and s the cosine and sine of the rotation. It is counter-clockwise in the UVs of glTF, whose v points down, as
+the words and the example of the extension have it; its GLSL listing turns the other way, a known mistake.
 
-Source: Khronos, KHR_texture_transform; glTF 2.0, section 3.8.4 (samplers).
-Not read: mip levels; between texels, values are interpolated linearly unless the sampler says nearest.
+Read are PNG and JPEG, from buffer views, data URIs and files beside; all over TEXCOORD_0. A picture that is missing or
+broken is left out, and the factors of the material stand alone. Not read: mip levels; between texels, values are
+interpolated linearly unless the sampler says nearest.
+
+Source: Khronos, KHR_texture_transform; glTF 2.0, sections 3.8 (textures and samplers) and 3.9 (materials).
 """
 
 from __future__ import annotations
@@ -15,13 +18,19 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
 from translucent.arrays import Array
-from translucent.gltf.file import Json
+from translucent.errors import UnreadableError
+from translucent.files.unpacking import open_picture
+from translucent.formulas.color import srgb_to_linear
+from translucent.gltf.fields import Fields, LeftOut, extension, label, number, numbers, refused, section, whole
+from translucent.gltf.file import GltfFile, Json
+from translucent.scene.texture import Texture, Wrap
 
 TEXTURE_TRANSFORM = "KHR_texture_transform"
 
-_NEAREST, _REPEAT, _CLAMP, _MIRROR = 9728, 10497, 33071, 33648
+NEAREST, _REPEAT, _CLAMP, _MIRROR = 9728, 10497, 33071, 33648
 
 
 @dataclass(frozen=True)
@@ -50,11 +59,30 @@ class TextureTransform:
         return np.stack([c * u + s * v + self.offset[0], c * v - s * u + self.offset[1]], axis=-1)
 
 
+def stated_texture(fields: Fields, key: str, count: int) -> tuple[int | None, TextureTransform]:
+    """Index of a texture among so many, and its transform, as a material states them; None if it states none."""
+    if key not in fields.values:
+        return None, TextureTransform()
+    info = Fields(fields.values[key], key, fields.problems)
+    index = info.values.get("index")
+    if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < count:
+        fields.problems.append(f"{key} index {index!r} is not one of {count} textures")
+        return None, TextureTransform()
+    extensions = Fields(info.values.get("extensions", {}), f"{key} extensions", fields.problems).values
+    stated = Fields(extensions.get(TEXTURE_TRANSFORM, {}), TEXTURE_TRANSFORM, fields.problems)
+    return index, TextureTransform(
+        stated.pair("offset", (0.0, 0.0)),
+        stated.number("rotation", 0.0, -math.inf),
+        stated.pair("scale", (1.0, 1.0)),
+        stated.whole("texCoord", info.whole("texCoord", 0)),
+    )
+
+
 def sample(image: Array, coordinates: Array, sampler: Json) -> Array:
     """Sample an image (h, w) at coordinates (..., 2) of a texture with this sampler."""
     height, width = image.shape
     x, y = coordinates[..., 0] * width - 0.5, coordinates[..., 1] * height - 0.5
-    if sampler.get("magFilter") == _NEAREST:
+    if sampler.get("magFilter") == NEAREST:
         x, y = np.floor(x + 0.5), np.floor(y + 0.5)
     left, top = np.floor(x), np.floor(y)
     columns = [_wrapped(left + i, width, sampler.get("wrapS", _REPEAT)) for i in (0, 1)]
@@ -71,3 +99,181 @@ def _wrapped(index: Array, size: int, mode: object) -> npt.NDArray[np.intp]:
         folded = index % (2 * size)
         return np.where(folded < size, folded, 2 * size - 1 - folded).astype(np.intp)
     return (index % size).astype(np.intp)
+
+
+Bytes = npt.NDArray[np.uint8]
+Pixels = npt.NDArray[np.float32]
+
+#: Largest side of a picture in pixels; larger ones are made smaller.
+MAX_SIDE = 4096
+
+#: Largest number of characters of a link in a message; a longer one is named by its index.
+_LONGEST_NAME = 60
+
+_WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
+
+
+class Textures:
+    """Textures of a file; those that are alike are one value.
+
+    Parameters
+    ----------
+    file : GltfFile
+    left_out : LeftOut
+        Gets what the textures do not hold.
+    """
+
+    def __init__(self, file: GltfFile, left_out: LeftOut) -> None:
+        self._file = file
+        self._left_out = left_out
+        self._pictures: dict[int, Bytes | None] = {}
+        self._made: dict[tuple[object, ...], Texture] = {}
+
+    def read(
+        self, name: str, holder: Json, key: str, *, srgb: bool = False, normal_scale: float = 1.0, strength: float = 1.0
+    ) -> Texture | None:
+        """Texture of `holder` under `key`; None if it is absent or cannot be read.
+
+        Parameters
+        ----------
+        name : str
+            Of the material, as messages call it.
+        holder : dict
+        key : str
+        srgb : bool
+            Whether the picture's colors are encoded by sRGB.
+        normal_scale : float
+            Of a normal map, by which the normals' x and y are multiplied.
+        strength : float
+            Share of the picture, 0 to 1, that is mixed into white.
+
+        Raises
+        ------
+        InputError
+            If it points at nothing, its picture is too large, or a value is wrong.
+        """
+        if key not in holder:
+            return None
+        where = f"{key} of material {name}"
+        info = section(self._file, where, holder, key)
+        entry = self._file.item("textures", info.get("index"))
+        transform = self._transform(where, info)
+        if transform.tex_coord != 0:
+            self._left_out.add(f"textures over TEXCOORD_{transform.tex_coord}", name)
+            return None
+        if "source" not in entry:
+            self._left_out.add("textures that are neither PNG nor JPEG", name)
+            return None
+        sampler = self._file.item("samplers", entry["sampler"]) if "sampler" in entry else {}
+        if sampler.get("magFilter") == NEAREST:
+            self._left_out.add("nearest-neighbor filters of textures, drawn smooth", name)
+        wraps = tuple(self._wrap(where, sampler, axis) for axis in ("wrapS", "wrapT"))
+        made = (entry["source"], srgb, normal_scale, strength, wraps, transform)
+        if (picture := self._picture(entry["source"], name)) is None:
+            return None
+        if made not in self._made:
+            pixels = _diluted(_scaled_normals(_linear(picture, srgb=srgb), normal_scale), strength)
+            self._made[made] = _texture(pixels, wraps, transform)
+        return self._made[made]
+
+    def _transform(self, where: str, info: Json) -> TextureTransform:
+        stated = extension(self._file, where, info, TEXTURE_TRANSFORM)
+        offset, scale = (
+            numbers(self._file, where, stated, key, (default, default))
+            for key, default in (("offset", 0), ("scale", 1))
+        )
+        rotation = number(self._file, where, stated, "rotation", 0.0)
+        tex_coord = whole(self._file, where, stated, "texCoord", whole(self._file, where, info, "texCoord", 0))
+        return TextureTransform((offset[0], offset[1]), rotation, (scale[0], scale[1]), tex_coord)
+
+    def _wrap(self, where: str, sampler: Json, axis: str) -> str:
+        code = sampler.get(axis, 10497)
+        if not isinstance(code, int) or code not in _WRAPS:
+            raise refused(self._file, f"{where}: {axis} {code!r} is none of glTF 2.0")
+        return _WRAPS[code]
+
+    def _picture(self, index: int, name: str) -> Bytes | None:
+        """(h, w, 4): a picture as it is encoded, made smaller if it is large; each is read once. None if unreadable."""
+        entry = self._file.item("images", index)
+        if index not in self._pictures:
+            try:
+                data = self._file.resource(entry)
+            except UnreadableError:
+                if "uri" not in entry:
+                    raise  # the buffer is missing, with all else that it holds
+                self._pictures[index] = None
+            else:
+                self._pictures[index] = self._read(data, index, name)
+        if self._pictures[index] is None:
+            images, uri = self._file.items("images"), entry.get("uri")
+            linked = isinstance(uri, str) and len(uri) <= _LONGEST_NAME and not uri.startswith("data:")
+            picture = repr(uri) if linked else f"image {label(images, index)}"
+            self._left_out.add("textures that are missing or broken", f"{picture} of material {name}")
+        return self._pictures[index]
+
+    def _read(self, data: bytes, index: int, name: str) -> Bytes | None:
+        where = f"image {label(self._file.items('images'), index)} of material {name}"
+        if (image := self._decoded(where, data)) is None:
+            return None
+        if max(image.size) > MAX_SIDE:
+            self._left_out.add(f"pixels of textures beyond {MAX_SIDE} along a side", name)
+            image.thumbnail((MAX_SIDE, MAX_SIDE), Image.Resampling.BOX)
+        return np.asarray(image)
+
+    def _decoded(self, where: str, data: bytes) -> Image.Image | None:
+        """Decoded picture; None if it is broken or of an unknown format."""
+        try:
+            opened = open_picture(data, f"glTF {str(self._file.path)!r}: {where}", ("PNG", "JPEG"), per_pixel=12)
+        except UnreadableError:
+            return None
+        try:
+            if opened.mode.startswith("I"):  # 16 bits of gray, which `convert` would clip
+                return Image.fromarray((np.asarray(opened) // 257).astype(np.uint8)).convert("RGBA")
+            return opened.convert("RGBA")
+        except Exception:  # noqa: BLE001 - each of Pillow's decoders raises its own kinds; it is told as left out
+            return None
+
+
+def _linear(picture: Bytes, *, srgb: bool) -> Pixels:
+    """(h, w, 4): linear values; opacity is never encoded."""
+    levels = np.arange(256) / 255
+    decoded = (srgb_to_linear(levels) if srgb else levels).astype(np.float32)
+    pixels = decoded[picture]
+    pixels[..., 3] = levels.astype(np.float32)[picture[..., 3]]
+    return pixels
+
+
+def _scaled_normals(pixels: Pixels, scale: float) -> Pixels:
+    """Normal map with slopes scaled by a factor and renormalized."""
+    if scale == 1.0:
+        return pixels
+    largest = max(abs(scale), 1.0)  # only directions count
+    normals = (2.0 * pixels[..., :3] - 1.0) * (scale / largest, scale / largest, 1.0 / largest)
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    unit = normals / np.where(length > 0, length, 1.0)
+    return np.concatenate([0.5 + 0.5 * unit, pixels[..., 3:]], axis=-1).clip(0.0, 1.0).astype(np.float32)
+
+
+def _diluted(pixels: Pixels, strength: float) -> Pixels:
+    """Mix a picture with white."""
+    return pixels if strength == 1.0 else (1.0 + strength * (pixels - 1.0)).astype(np.float32)
+
+
+def _texture(pixels: Pixels, wraps: tuple[str, ...], transform: TextureTransform) -> Texture:
+    """Texture from a picture, with v converted from downwards to upwards."""
+    turn, (scale_u, scale_v), (offset_u, offset_v) = transform.rotation, transform.scale, transform.offset
+    c, s = math.cos(turn), math.sin(turn)
+    scale, offset = np.array([scale_u, scale_v]), np.array([offset_u + s * scale_v, 1.0 - offset_v - c * scale_v])
+    if "mirror" in wraps:
+        pixels, scale, offset = _with_mirror_images(pixels, wraps), 0.5 * scale, 0.5 * offset
+    across: Wrap = "clamp" if wraps[0] == "clamp" else "repeat"
+    down: Wrap = "clamp" if wraps[1] == "clamp" else "repeat"
+    return Texture(pixels, scale, offset, math.degrees(turn), (across, down))
+
+
+def _with_mirror_images(pixels: Pixels, wraps: tuple[str, ...]) -> Pixels:
+    """Picture with its mirror images appended, so that repeating it acts as mirrored wrapping."""
+    right = {"mirror": pixels[:, ::-1], "repeat": pixels, "clamp": np.repeat(pixels[:, -1:], pixels.shape[1], axis=1)}
+    wide = np.concatenate([pixels, right[wraps[0]]], axis=1)
+    above = {"mirror": wide[::-1], "repeat": wide, "clamp": np.repeat(wide[:1], len(wide), axis=0)}
+    return np.concatenate([above[wraps[1]], wide], axis=0)

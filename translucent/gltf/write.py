@@ -18,11 +18,22 @@ from pathlib import Path
 from typing import Any
 
 from translucent.errors import InputError, TranslucentWarning
-from translucent.gltf.file import GltfFile, Json, read_gltf
-from translucent.gltf.materials import DEFAULT_IOR, EXCLUDED, IOR, TRANSMISSION, VOLUME, materials_of
-from translucent.gltf.scattering import DIFFUSE_TRANSMISSION, DRAFTS, SCATTER, Draft, check_draft, draft_extension
-from translucent.gltf.scene_media import primitives
-from translucent.gltf.write_file import check_gltf_output, write_gltf
+from translucent.gltf.file import GltfFile, Json, check_gltf_output, read_gltf, write_gltf
+from translucent.gltf.materials import (
+    DEFAULT_IOR,
+    DIFFUSE_TRANSMISSION,
+    DRAFTS,
+    EXCLUDED,
+    IOR,
+    SCATTER,
+    TRANSMISSION,
+    VOLUME,
+    Draft,
+    check_draft,
+    draft_extension,
+    materials_of,
+)
+from translucent.gltf.nodes import primitives
 from translucent.media.medium import Medium, color_at
 
 

@@ -1,83 +1,51 @@
-"""Conversion of media to and from other systems: one file per target, each with its formula, its source and what it
-loses.
+"""Media written for other systems, and read from their files, each with its formula, its source and what it loses.
 
 `TARGETS` names the systems that `text_block` writes for; `load_medium` reads files of those that have files. Numbers of
-the others: `translucent.materials.blender`, `unity` and `unreal`. Each text that is written can be saved and read back,
-but for CSS; what each target cannot carry is lost. Reading and writing whole glTF files:
+the others: `translucent.materials.blender` and `translucent.materials.engines`. Each text that is written can be saved
+and read back, but for CSS; what each target cannot carry is lost. Reading and writing whole glTF files:
 `translucent.gltf.materials` and `translucent.gltf.write`.
+
+A new target is a `ExportTarget` beside its formulas, and a line in `TARGETS`.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
+import math
 from pathlib import Path
+from xml.etree.ElementTree import ParseError
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.files.reading import json_value, read_text
-from translucent.gltf.file import GltfFile
-from translucent.gltf.materials import materials_of
-from translucent.materials.blender import blender_snippet, read_blender
-from translucent.materials.css import css_text
-from translucent.materials.godot import godot_text, read_godot
-from translucent.materials.json_text import read_json, write_json
-from translucent.materials.openpbr import read_openpbr, write_openpbr
-from translucent.materials.standard_surface import read_standard_surface, write_standard_surface
-from translucent.materials.threejs import read_threejs, threejs_text
-from translucent.materials.unity import read_unity, unity_text
-from translucent.materials.unreal import read_unreal, unreal_text
-from translucent.materials.usd import read_usda, usda_text
+from translucent.files.reading import read_text
+from translucent.materials.blender import BLENDER
+from translucent.materials.engines import CSS, GODOT, THREEJS, UNITY, UNREAL
+from translucent.materials.json_text import GLTF, JSON
+from translucent.materials.materialx import OPENPBR_TARGET, STANDARD_SURFACE_TARGET
+from translucent.materials.target import ExportTarget
+from translucent.materials.usd import USD
 from translucent.media.medium import Medium
 
-__all__ = ["TARGETS", "TITLES", "load_medium", "text_block"]
+__all__ = ["TARGETS", "load_medium", "load_roughness", "text_block"]
+
+#: Systems that a medium can be written for, by name.
+TARGETS: dict[str, ExportTarget] = {
+    "gltf": GLTF,
+    "openpbr": OPENPBR_TARGET,
+    "standard_surface": STANDARD_SURFACE_TARGET,
+    "blender": BLENDER,
+    "threejs": THREEJS,
+    "godot": GODOT,
+    "unreal": UNREAL,
+    "unity": UNITY,
+    "usd": USD,
+    "css": CSS,
+    "json": JSON,
+}
 
 #: Largest difference between a given color and that of the medium, from a channel that was raised from black.
 _SAME_COLOR = 1e-3
-
-
-def _gltf_text(medium: Medium, distance: float, roughness: float) -> str:
-    from translucent.gltf.write import volume_extensions
-
-    extensions = volume_extensions(medium, distance, thickness=distance, ior=medium.ior)
-    # Without these, a material is a rough metal.
-    surface = {"metallicFactor": 0.0, "roughnessFactor": roughness}
-    return json.dumps({"pbrMetallicRoughness": surface, "extensions": extensions}, indent=2) + "\n"
-
-
-_WRITERS: dict[str, Callable[[Medium, float, float], str]] = {
-    "gltf": _gltf_text,
-    "openpbr": lambda medium, distance, roughness: write_openpbr(medium, distance, roughness=roughness),
-    "standard_surface": lambda medium, distance, rough: write_standard_surface(medium, distance, roughness=rough),
-    "blender": lambda medium, _, roughness: blender_snippet(medium, roughness),
-    "threejs": threejs_text,
-    "godot": godot_text,
-    "unreal": unreal_text,
-    "unity": unity_text,
-    "usd": lambda medium, distance, roughness: usda_text(medium, distance, roughness=roughness),
-    "css": lambda medium, distance, _: css_text(medium, medium.transmittance(distance), distance),
-    "json": lambda medium, *_: write_json(medium),
-}
-
-#: Names of the systems that a medium can be written for.
-TARGETS: tuple[str, ...] = tuple(_WRITERS)
-
-#: What they are called.
-TITLES = {
-    "gltf": "glTF",
-    "openpbr": "OpenPBR",
-    "standard_surface": "Standard Surface",
-    "blender": "Blender",
-    "threejs": "three.js",
-    "godot": "Godot",
-    "unreal": "Unreal",
-    "unity": "Unity",
-    "usd": "USD",
-    "css": "CSS",
-    "json": "JSON",
-}
 
 
 def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: float, roughness: float = 0.0) -> str:
@@ -107,8 +75,8 @@ def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: floa
         If the target is unknown, the distance is not positive and finite, the color is not that of the medium, or the
         roughness is outside its range.
     """
-    writer = _WRITERS.get(target.lower().replace("-", "_").replace(" ", "_").replace(".", ""))
-    if writer is None:
+    wanted = TARGETS.get(target.lower().replace("-", "_").replace(" ", "_").replace(".", ""))
+    if wanted is None:
         raise InputError(f"target {target!r}", "not a known target", f"use one of {', '.join(TARGETS)}")
     if not 0 < distance < np.inf:
         raise InputError(f"distance {distance!r}", "not above 0 and finite", "give it in metres, for example 0.02")
@@ -121,37 +89,7 @@ def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: floa
             f"the medium has {tuple(own.round(4).tolist())} there",
             "give medium.transmittance(distance)",
         )
-    return writer(medium, float(distance), float(roughness)).rstrip("\n")
-
-
-def _read_materialx(text: str, unit: str) -> Medium:
-    return read_openpbr(text, unit) if "<open_pbr_surface" in text else read_standard_surface(text, unit)
-
-
-def _read_json(text: str) -> Medium:
-    """Read our own JSON, or a glTF material as `text_block` writes it."""
-    try:
-        entry = json_value(text)
-    except ValueError:
-        return read_json(text)  # which says what is wrong
-    if not (isinstance(entry, dict) and "extensions" in entry):
-        return read_json(text)
-    (found,) = materials_of(GltfFile(Path("material.gltf"), {"asset": {"version": "2.0"}, "materials": [entry]}))
-    if (medium := found.medium()) is None:
-        raise InputError("glTF material", "it has no volume", "give one with KHR_materials_volume")
-    return medium
-
-
-_READERS: dict[str, Callable[[str, str], Medium]] = {
-    ".mtlx": _read_materialx,
-    ".usda": lambda text, _: read_usda(text),
-    ".json": lambda text, _: _read_json(text),
-    ".py": lambda text, _: read_blender(text),
-    ".js": lambda text, _: read_threejs(text),
-    ".gdshader": lambda text, _: read_godot(text),
-    ".cs": lambda text, _: read_unity(text),
-    ".txt": lambda text, _: read_unreal(text),
-}
+    return wanted.write(medium, float(distance), float(roughness)).rstrip("\n")
 
 
 def load_medium(path: str | Path, unit: str = "m") -> Medium:
@@ -172,12 +110,38 @@ def load_medium(path: str | Path, unit: str = "m") -> Medium:
     InputError
         If there is no such file, or it holds no such material.
     """
-    what, reader = f"material {str(path)!r}", _READERS.get(Path(path).suffix.lower())
-    if reader is None:
-        do = f"give a {', '.join(_READERS)} file; of glTF, translucent material show tells the colors"
+    what, reader = f"material {str(path)!r}", _target_of(path)
+    if reader is None or reader.read is None:
+        suffixes = dict.fromkeys(target.suffix for target in TARGETS.values() if target.suffix)
+        do = f"give a {', '.join(suffixes)} file; of glTF, translucent material show tells the colors"
         raise InputError(what, f"suffix {Path(path).suffix!r}", do)
     text = read_text(path, what)
     try:
-        return reader(text, unit)
+        return reader.read(text, unit)
     except InputError as error:
         raise InputError(what, str(error)) from None
+
+
+def load_roughness(path: str | Path) -> float:
+    """Roughness, 0 (polished) to 1, that a file states for the surface, after `load_medium` has read its medium.
+
+    Raises
+    ------
+    InputError
+        If it is not a number in 0 to 1.
+    """
+    what, reader, found = f"material {str(path)!r}", _target_of(path), math.nan
+    text = read_text(path, what)
+    try:
+        if reader is not None and reader.roughness is not None:
+            found = reader.roughness(text)
+    except (ValueError, TypeError, AttributeError, ParseError):
+        found = math.nan
+    if not 0 <= found <= 1:
+        raise InputError(what, "its roughness is not a number in 0 to 1", "correct it")
+    return found
+
+
+def _target_of(path: str | Path) -> ExportTarget | None:
+    suffix = Path(path).suffix.lower()
+    return next((target for target in TARGETS.values() if suffix and target.suffix == suffix), None)

@@ -30,7 +30,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
-from translucent.materials.snippet import stated
+from translucent.materials.target import ExportTarget, roughness_behind, stated
 from translucent.media.medium import Medium
 
 #: Largest number of bounces in Cycles.
@@ -137,7 +137,7 @@ def blender_snippet(medium: Medium, roughness: float = 0.0, name: str = "translu
     return "\n".join(lines) + "\n"
 
 
-def read_blender(text: str) -> Medium:
+def read_blender(text: str, _: str = "m") -> Medium:
     """Read the medium of such a snippet, which is not run; raises `InputError` if it is none."""
 
     def socket(node: str, name: str, count: int = 1, default: float | None = None) -> Array:
@@ -155,3 +155,12 @@ def read_blender(text: str) -> Medium:
 
 def _rgba(color: Array) -> str:
     return f"({', '.join(repr(channel) for channel in [*color.tolist(), 1.0])})"
+
+
+BLENDER = ExportTarget(
+    "Blender",
+    lambda medium, _, roughness: blender_snippet(medium, roughness),
+    ".py",
+    read_blender,
+    roughness_behind('surface.inputs["Roughness"].default_value'),
+)

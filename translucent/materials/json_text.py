@@ -1,17 +1,25 @@
-"""Complete media as JSON, including what no other format holds. Written and read without loss.
+"""Media as JSON: complete ones, including what no other format holds, and glTF materials.
 
-Fields are those of `Medium`, in 1/m and linear Rec.709. Source: the toolkit's own vocabulary.
+Complete media are written and read without loss. Their fields are those of `Medium`, in 1/m and linear Rec.709. Source:
+the toolkit's own vocabulary. A glTF material is one entry of a file's ``materials``; reading and writing whole files:
+`translucent.gltf.materials` and `translucent.gltf.write`.
 """
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from translucent.errors import InputError
 from translucent.files.reading import json_value
 from translucent.formulas.phase import parse_phase
+from translucent.gltf.file import GltfFile
+from translucent.gltf.materials import materials_of
+from translucent.gltf.write import volume_extensions
+from translucent.materials.target import ExportTarget
 from translucent.media.medium import Medium
 
 _TRIPLES = ("absorption", "scattering", "emission")
@@ -50,3 +58,37 @@ def read_json(text: str) -> Medium:
     if _PHASE in values:
         values[_PHASE] = parse_phase(str(values[_PHASE]))
     return Medium(**values)
+
+
+def _gltf_text(medium: Medium, distance: float, roughness: float) -> str:
+    extensions = volume_extensions(medium, distance, thickness=distance, ior=medium.ior)
+    # Without these, a material is a rough metal.
+    surface = {"metallicFactor": 0.0, "roughnessFactor": roughness}
+    return json.dumps({"pbrMetallicRoughness": surface, "extensions": extensions}, indent=2) + "\n"
+
+
+def _read(text: str, _: str) -> Medium:
+    if (entry := _gltf_entry(text)) is None:
+        return read_json(text)
+    (found,) = materials_of(GltfFile(Path("material.gltf"), {"asset": {"version": "2.0"}, "materials": [entry]}))
+    if (medium := found.medium()) is None:
+        raise InputError("glTF material", "it has no volume", "give one with KHR_materials_volume")
+    return medium
+
+
+def _roughness(text: str) -> float:
+    surface = (_gltf_entry(text) or {"pbrMetallicRoughness": {"roughnessFactor": 0.0}}).get("pbrMetallicRoughness", {})
+    return 0.0 if "metallicRoughnessTexture" in surface else float(surface.get("roughnessFactor", 1.0))
+
+
+def _gltf_entry(text: str) -> Any:
+    """A glTF material; None where the text is another, or broken."""
+    try:
+        entry = json_value(text)
+    except ValueError:
+        return None
+    return entry if isinstance(entry, dict) and "extensions" in entry else None
+
+
+GLTF = ExportTarget("glTF", _gltf_text, ".json", _read, _roughness)
+JSON = ExportTarget("JSON", lambda medium, *_: write_json(medium), ".json", _read, _roughness)

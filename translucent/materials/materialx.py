@@ -1,6 +1,7 @@
 """MaterialX documents with one surface shader and constant inputs: OpenPBR Surface and Autodesk Standard Surface.
 
-Both store a homogeneous medium alike; the modules `openpbr` and `standard_surface` name the inputs.
+Both store a homogeneous medium alike; a `SurfaceShader` names the inputs. A depth of 0 makes the color a tint of the
+surface: it is read as a medium without extinction.
 
 Formula, with T the transmission color, S the scatter color and lambda the depth:
 mu_t = -ln(T) / lambda, mu_s = S / lambda, mu_a = mu_t - mu_s; where a channel of mu_a is negative, all are raised by
@@ -32,6 +33,7 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.color import srgb_to_linear
+from translucent.materials.target import ExportTarget
 from translucent.media.medium import Medium, color_at, extinction_at
 from translucent.units import metres_per_unit
 
@@ -40,15 +42,17 @@ _SRGB = "srgb_texture"
 
 
 @dataclass(frozen=True)
-class Shader:
+class SurfaceShader:
     """Surface shader: its name, its inputs for transmission, and the last supported version.
 
     Attributes
     ----------
     node, title : str
         Its name in MaterialX, and for people.
-    weight, color, depth, scatter, anisotropy, ior : str
+    weight, color, depth, scatter, anisotropy, ior, roughness : str
         Names of the inputs.
+    default_roughness : float
+        Where a document states none.
     last_version : (int, int), optional
         Scatter colors of later versions are refused; None: no later one is known.
     """
@@ -57,6 +61,7 @@ class Shader:
     weight: str
     ior: str
     title: str
+    default_roughness: float
     color: str = "transmission_color"
     depth: str = "transmission_depth"
     scatter: str = "transmission_scatter"
@@ -75,15 +80,87 @@ class Shader:
             self.ior: 1.5,
         }
 
+    def write(
+        self,
+        medium: Medium,
+        distance: float | None = None,
+        name: str = "translucent",
+        unit: str = "m",
+        roughness: float = 0.0,
+    ) -> str:
+        """Write a MaterialX 1.39 document with such a surface around a medium.
+
+        Parameters
+        ----------
+        medium : Medium
+            Emission is lost.
+        distance : float, optional
+            Where the color is stated, in metres; None: where the densest channel lets 1/e pass.
+        name : str
+            Name of the material, letters, digits and underscores.
+        unit : str
+            Unit of the scene's lengths, for the depth.
+        roughness : float
+            Of the surface, 0 to 1.
+        """
+        root = ElementTree.Element("materialx", version="1.39", colorspace="lin_rec709")
+        surface = ElementTree.SubElement(root, self.node, name=f"{name}_surface", type="surfaceshader")
+        for key, value in transmission_inputs(self, medium, distance, unit, roughness).items():
+            scalar = isinstance(value, float)
+            text = f"{value!r}" if scalar else ", ".join(repr(channel) for channel in np.asarray(value).tolist())
+            ElementTree.SubElement(surface, "input", name=key, type="float" if scalar else "color3", value=text)
+        material = ElementTree.SubElement(root, "surfacematerial", name=name, type="material")
+        link = {"name": "surfaceshader", "type": "surfaceshader", "nodename": f"{name}_surface"}
+        ElementTree.SubElement(material, "input", link)
+        ElementTree.indent(root)
+        return f'<?xml version="1.0"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
+
+    def read(self, text: str, unit: str = "m") -> Medium:
+        """Read the medium of the first such surface in a MaterialX document, whose lengths are in `unit`.
+
+        Raises
+        ------
+        InputError
+            If the document is broken, has no such surface, or inputs are out of range or not constant; or if it is of a
+            version later than the last supported one and scatters.
+        """
+        what = f"{self.title} document"
+        if "<!DOCTYPE" in text or "<!ENTITY" in text:
+            raise InputError(
+                what, "it declares entities, which may unpack into anything", "export it without a DOCTYPE"
+            )
+        try:
+            root = ElementTree.fromstring(text)
+        except (ElementTree.ParseError, ValueError) as error:
+            raise InputError(what, f"its XML is broken ({error})", "export it again") from error
+        surface = next(root.iter(self.node), None)
+        if surface is None:
+            raise InputError(what, f"it has no <{self.node}>", "export that surface")
+        space = root.get("colorspace", "lin_rec709")
+        inputs = {element.get("name", ""): element for element in surface.iter("input")}
+        stated: dict[str, float | Array] = {}
+        for key, default in self.defaults().items():
+            if (element := inputs.get(key)) is None:
+                continue
+            if (value := element.get("value")) is None:
+                raise InputError(what, f"{key} comes from a node", "give it a constant value")
+            stated[key] = parse_value(what, key, value.split(","), default, element.get("colorspace", space))
+        version = surface.get("version", "")
+        stated_version = tuple(map(int, re.findall(r"\d{1,9}", version)[:2]))
+        newer = self.last_version is not None and stated_version > self.last_version
+        if newer and np.any(stated.get(self.scatter, 0.0)):
+            raise InputError(what, f"version {version}, whose scatter color means another thing", "export version 1.1")
+        return medium_of(self, stated, metres_per_unit(unit))
+
 
 def transmission_inputs(
-    shader: Shader, medium: Medium, distance: float | None = None, unit: str = "m", roughness: float = 0.0
+    shader: SurfaceShader, medium: Medium, distance: float | None = None, unit: str = "m", roughness: float = 0.0
 ) -> dict[str, float | Array]:
     """Values of a shader's inputs that hold this medium; depth 0 for one without extinction.
 
     Parameters
     ----------
-    shader : Shader
+    shader : SurfaceShader
     medium : Medium
     distance : float, optional
         Where the color is stated, in metres; see `color_at`. Shortened where the scatter color would exceed 1.
@@ -108,50 +185,7 @@ def transmission_inputs(
     }
 
 
-def write_shader(
-    shader: Shader, medium: Medium, distance: float | None, name: str, unit: str, roughness: float = 0.0
-) -> str:
-    """Write a MaterialX 1.39 document with one material."""
-    root = ElementTree.Element("materialx", version="1.39", colorspace="lin_rec709")
-    surface = ElementTree.SubElement(root, shader.node, name=f"{name}_surface", type="surfaceshader")
-    for key, value in transmission_inputs(shader, medium, distance, unit, roughness).items():
-        scalar = isinstance(value, float)
-        text = f"{value!r}" if scalar else ", ".join(repr(channel) for channel in np.asarray(value).tolist())
-        ElementTree.SubElement(surface, "input", name=key, type="float" if scalar else "color3", value=text)
-    material = ElementTree.SubElement(root, "surfacematerial", name=name, type="material")
-    ElementTree.SubElement(material, "input", name="surfaceshader", type="surfaceshader", nodename=f"{name}_surface")
-    ElementTree.indent(root)
-    return f'<?xml version="1.0"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
-
-
-def read_shader(shader: Shader, text: str, unit: str) -> Medium:
-    """Read the medium of the first such shader in a MaterialX document."""
-    what = f"{shader.title} document"
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise InputError(what, "it declares entities, which may unpack into anything", "export it without a DOCTYPE")
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as error:
-        raise InputError(what, f"its XML is broken ({error})", "export it again") from error
-    surface = next(root.iter(shader.node), None)
-    if surface is None:
-        raise InputError(what, f"it has no <{shader.node}>", "export that surface")
-    space = root.get("colorspace", "lin_rec709")
-    inputs = {element.get("name", ""): element for element in surface.iter("input")}
-    stated = {
-        key: _value(what, key, inputs[key], default, space)
-        for key, default in shader.defaults().items()
-        if key in inputs
-    }
-    version = surface.get("version", "")
-    stated_version = tuple(map(int, re.findall(r"\d{1,9}", version)[:2]))
-    newer = shader.last_version is not None and stated_version > shader.last_version
-    if newer and np.any(stated.get(shader.scatter, 0.0)):
-        raise InputError(what, f"version {version}, whose scatter color means another thing", "export version 1.1")
-    return medium_of(shader, stated, metres_per_unit(unit))
-
-
-def medium_of(shader: Shader, stated: Mapping[str, float | Array], metres: float) -> Medium:
+def medium_of(shader: SurfaceShader, stated: Mapping[str, float | Array], metres: float) -> Medium:
     """The medium of a shader's inputs, colors linear, whose lengths are in units of `metres`; see `Shader.defaults`."""
     what, values = f"{shader.title} surface", {**shader.defaults(), **stated}
     weight, depth, ior, anisotropy = (
@@ -172,14 +206,6 @@ def medium_of(shader: Shader, stated: Mapping[str, float | Array], metres: float
     return Medium(absorption=shifted, scattering=scattering, anisotropy=anisotropy, ior=ior)
 
 
-def _value(what: str, key: str, element: ElementTree.Element, default: float | Array, space: str) -> float | Array:
-    """Constant value of an input, of the type of its default; colors become linear."""
-    text = element.get("value")
-    if text is None:
-        raise InputError(what, f"{key} comes from a node", "give it a constant value")
-    return parse_value(what, key, text.split(","), default, element.get("colorspace", space))
-
-
 def parse_value(what: str, key: str, parts: list[str], default: float | Array, space: str) -> float | Array:
     """A number, or three in a color space made linear, from the texts of its parts."""
     scalar = isinstance(default, float)
@@ -195,3 +221,40 @@ def parse_value(what: str, key: str, parts: list[str], default: float | Array, s
     if space not in (*_LINEAR, _SRGB):
         raise InputError(what, f"color space {space!r}", "use lin_rec709 or srgb_texture")
     return srgb_to_linear(numbers) if space == _SRGB else numbers
+
+
+OPENPBR = SurfaceShader(
+    "open_pbr_surface",
+    title="OpenPBR",
+    weight="transmission_weight",
+    ior="specular_ior",
+    default_roughness=0.3,
+    last_version=(1, 1),
+)
+STANDARD_SURFACE = SurfaceShader(
+    "standard_surface", title="Standard Surface", weight="transmission", ior="specular_IOR", default_roughness=0.2
+)
+
+
+def _target(shader: SurfaceShader) -> ExportTarget:
+    return ExportTarget(
+        shader.title,
+        lambda medium, distance, roughness: shader.write(medium, distance, roughness=roughness),
+        ".mtlx",
+        lambda text, unit: (OPENPBR if "<open_pbr_surface" in text else STANDARD_SURFACE).read(text, unit),
+        _roughness,
+    )
+
+
+def _roughness(text: str) -> float:
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ValueError("entities may unpack into anything")
+    root = ElementTree.fromstring(text)
+    shader, surface = OPENPBR, root.find(f".//{OPENPBR.node}")
+    if surface is None:
+        shader, surface = STANDARD_SURFACE, root.find(f".//{STANDARD_SURFACE.node}")
+    found = None if surface is None else surface.find(f"./input[@name='{shader.roughness}']")
+    return shader.default_roughness if found is None else float(found.get("value", "0"))
+
+
+OPENPBR_TARGET, STANDARD_SURFACE_TARGET = _target(OPENPBR), _target(STANDARD_SURFACE)

@@ -2,7 +2,7 @@
 
 UsdPreviewSurface has neither transmission nor volume, so the material is a MaterialX network of one node,
 ``ND_open_pbr_surface_surfaceshader``; ``ND_standard_surface_surfaceshader`` is read, too. The inputs are those of
-`translucent.materials.openpbr`, with its formulas, source and losses; lengths are in the layer's ``metersPerUnit``,
+`translucent.materials.materialx`, with its formulas, source and losses; lengths are in the layer's ``metersPerUnit``,
 written as 1, and 0.01 where a layer states none.
 Source: OpenUSD, the .usda file format, UsdShade, UsdGeom (stage metrics).
 
@@ -25,12 +25,18 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.materials.materialx import Shader, medium_of, parse_value, transmission_inputs
-from translucent.materials.openpbr import SHADER
-from translucent.materials.standard_surface import SHADER as STANDARD_SURFACE
+from translucent.materials.materialx import (
+    OPENPBR,
+    STANDARD_SURFACE,
+    SurfaceShader,
+    medium_of,
+    parse_value,
+    transmission_inputs,
+)
+from translucent.materials.target import ExportTarget
 from translucent.media.medium import Medium
 
-_SHADERS = {f"ND_{shader.node}_surfaceshader": shader for shader in (SHADER, STANDARD_SURFACE)}
+_SHADERS = {f"ND_{shader.node}_surfaceshader": shader for shader in (OPENPBR, STANDARD_SURFACE)}
 _SPACES = {"lin_rec709_scene": "lin_rec709", "raw": "none", "srgb_rec709_scene": "srgb_texture"}
 _CENTIMETER = 0.01
 
@@ -49,7 +55,7 @@ _MAX_DEPTH = 100
 def usda_text(medium: Medium, distance: float | None = None, name: str = "translucent", roughness: float = 0.0) -> str:
     """Write a .usda layer with one material; the color is stated at `distance` in metres, see `color_at`."""
     lines = []
-    for key, value in transmission_inputs(SHADER, medium, distance, roughness=roughness).items():
+    for key, value in transmission_inputs(OPENPBR, medium, distance, roughness=roughness).items():
         if isinstance(value, float):
             lines.append(f"        float inputs:{key} = {value!r}")
         else:
@@ -88,7 +94,7 @@ class _Block:
     varying: set[str] = field(default_factory=set)
 
 
-def read_usda(text: str) -> Medium:
+def read_usda(text: str, _: str = "m") -> Medium:
     """Read the medium of the first OpenPBR or Standard Surface shader in a .usda layer.
 
     Raises
@@ -146,7 +152,7 @@ def _list(tokens: list[str], index: int) -> tuple[list[str], int]:
     return [token for token in tokens[index + 1 : end] if token != ","], end + 1
 
 
-def _stated(shader: Shader, block: _Block) -> Iterator[tuple[str, float | npt.NDArray[np.float64]]]:
+def _stated(shader: SurfaceShader, block: _Block) -> Iterator[tuple[str, float | npt.NDArray[np.float64]]]:
     what = f"{shader.title} shader of a USD layer"
     for key, default in shader.defaults().items():
         if key in block.varying:
@@ -154,3 +160,19 @@ def _stated(shader: Shader, block: _Block) -> Iterator[tuple[str, float | npt.ND
         if key in block.inputs:
             parts, space = block.inputs[key]
             yield key, parse_value(what, key, parts, default, _SPACES.get(space, space))
+
+
+def _roughness(text: str) -> float:
+    found = re.search(rf"inputs:{OPENPBR.roughness}(\.connect)?\s*=\s*([-+.\deE]*)", text)
+    if found is None:
+        return (OPENPBR if f"ND_{OPENPBR.node}" in text else STANDARD_SURFACE).default_roughness
+    return float(found[2] or 0.0)
+
+
+USD = ExportTarget(
+    "USD",
+    lambda medium, distance, roughness: usda_text(medium, distance, roughness=roughness),
+    ".usda",
+    read_usda,
+    _roughness,
+)

@@ -15,16 +15,15 @@ from typing import Any
 import numpy as np
 
 from translucent.arrays import Array, Integers
-from translucent.bake.directions import Directions
-from translucent.bake.gltf.bodies import Bodies, PrimitiveKey, primitive_name, read_primitive
-from translucent.bake.rays import OFFSET, Rays
+from translucent.bake.gltf_targets import Bodies, PrimitiveKey, primitive_name, read_primitive
+from translucent.bake.rays import OFFSET, Directions, Rays
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points, Surface
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.materials import GltfMaterial
-from translucent.gltf.scene_media import thickness_at
+from translucent.gltf.nodes import thickness_at
 
 #: Points of a body's surface, and rays into it from each.
 POINTS, RAYS = 1024, 8

@@ -14,7 +14,7 @@ from imgui_bundle import ImVec2, imgui, implot
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.color import linear_to_srgb, srgb_to_linear, to_hex
-from translucent.materials import TITLES, text_block
+from translucent.materials import TARGETS, text_block
 from translucent.media.colors import parse_color
 from translucent.media.conversion import summary
 from translucent.media.medium import Medium, color_at
@@ -411,9 +411,10 @@ def _numbers(state: WindowState, material: Material) -> None:
 
 def _copies(state: WindowState, material: Material) -> None:
     width = imgui.get_content_region_avail().x
-    for target, label in TITLES.items():
+    for target, system in TARGETS.items():
+        label = system.title
         size = imgui.calc_text_size(label).x + 2 * imgui.get_style().frame_padding.x
-        if target != next(iter(TITLES)):
+        if target != next(iter(TARGETS)):
             imgui.same_line()
             if imgui.get_cursor_pos_x() + size > width:
                 imgui.new_line()

@@ -1,19 +1,53 @@
-"""Numbers of texts that are pasted into an engine, read back. Nothing of a text is ever run.
+"""Export targets: systems that a medium is written for, and readers of the numbers in texts written for them.
 
-What is read is what the writers of this package wrote, also where somebody has changed a number since.
+Nothing of a text is ever run. What is read is what the writers of this package wrote, also where somebody has changed a
+number since.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from translucent.arrays import Array
 from translucent.errors import InputError
+from translucent.media.medium import Medium
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_NUMBERS = re.compile(_NUMBER)
+_NUMBERS = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class ExportTarget:
+    """System that a medium is written for, and whose files may be read.
+
+    Attributes
+    ----------
+    title : str
+    write : callable
+        Text for a medium, the distance in metres at which its color is stated, and the roughness of its surface, 0
+        (polished) to 1: the square root of the GGX alpha.
+    suffix : str
+        Of the files that are read; empty for none.
+    read : callable
+        Medium of the text of such a file, with lengths in a unit where it states none.
+    roughness : callable
+        Roughness that such a text states for the surface. Where it states none, the shader's own default; where a
+        texture or a node states it, 0.
+    """
+
+    title: str
+    write: Callable[[Medium, float, float], str]
+    suffix: str = ""
+    read: Callable[[str, str], Medium] | None = None
+    roughness: Callable[[str], float] | None = None
+
+
+def roughness_behind(start: str) -> Callable[[str], float]:
+    """Reader of the roughness that stands behind a text, 0 where that is missing."""
+    return lambda text: float(stated("surface", text, start, default=0.0)[0])
 
 
 def stated_color(what: str, text: str, start: str) -> Array:

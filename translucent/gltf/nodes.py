@@ -1,56 +1,31 @@
-"""Uses of glTF materials: nodes, their transforms, and the world-space thickness of a node's material.
+"""Nodes of a glTF file: their transforms, the primitives and variants of their meshes, and the stated thickness.
 
-Formula: the thickness factor (times the texture's G channel) is a length in the mesh's own space. Along a direction v,
-a unit vector **of that space**, it is |M v| times as long in the world, with M the node's matrix. Scaling a world
-direction by the lengths of M's columns instead, as several renderers do, is right only where the axes of mesh and
-world coincide. Source: KHR_materials_volume ("thickness in the coordinate space of the mesh"), glTF 2.0 section 3.5.
+The thickness factor of a material (times the texture's G channel) is a length in the mesh's own space. Along a
+direction v, a unit vector **of that space**, it is |M v| times as long in the world, with M the node's matrix. Scaling
+a world direction by the lengths of M's columns instead, as several renderers do, is right only where the axes of mesh
+and world coincide.
+
+Source: KHR_materials_volume ("thickness in the coordinate space of the mesh"), KHR_materials_variants, glTF 2.0
+section 3.5.
 
 Not read: animation, skins, morph targets, instancing extensions.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.errors import InputError
+from translucent.errors import InputError, close_names, did_you_mean
 from translucent.files.reading import shown
 from translucent.files.unpacking import open_picture
+from translucent.gltf.fields import extension, refused
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.materials import GltfMaterial
 from translucent.gltf.textures import sample
 
-
-@dataclass(frozen=True, eq=False)
-class MaterialUse:
-    """Use of a material by a node: the node's index and name, the material's index, and node to world (4x4)."""
-
-    node: int
-    name: str
-    material: int
-    transform: Array
-
-
-def material_uses(file: GltfFile) -> list[MaterialUse]:
-    """All uses of materials by the nodes of the file, each material once per node.
-
-    Raises
-    ------
-    InputError
-        If the nodes form no trees, or an index or a transform is wrong.
-    """
-    nodes, transforms = file.items("nodes"), node_transforms(file)
-    uses = []
-    for index, node in enumerate(nodes):
-        if "mesh" in node:
-            mesh = file.item("meshes", node["mesh"])
-            name = str(node.get("name", mesh.get("name", "")))
-            for material in sorted({p["material"] for p in primitives(file, mesh) if "material" in p}):
-                uses.append(MaterialUse(index, name, material, transforms[index]))
-    return uses
+VARIANTS = "KHR_materials_variants"
 
 
 def node_transforms(file: GltfFile) -> dict[int, Array]:
@@ -89,6 +64,59 @@ def primitives(file: GltfFile, mesh: Json) -> list[Json]:
     return found
 
 
+def variant_names(file: GltfFile) -> tuple[str, ...]:
+    """Names of the variants of a file, in its order; raises `InputError` if they are not a list of named objects."""
+    listed = extension(file, "the file", file.tree, VARIANTS).get("variants", [])
+    if not (isinstance(listed, list) and all(isinstance(one, dict) for one in listed)):
+        raise refused(file, f"{VARIANTS}: variants is not a list of objects")
+    return tuple(str(one.get("name", f"variant {i}")) for i, one in enumerate(listed))
+
+
+def variant_index(file: GltfFile, name: str | None) -> int | None:
+    """Index of a variant by its name; None for None, the file's own materials.
+
+    Raises
+    ------
+    InputError
+        If there is no such variant.
+    """
+    if name is None:
+        return None
+    names = variant_names(file)
+    if name in names:
+        return names.index(name)
+    asked = f"variant {name!r} of {str(file.path)!r}"
+    if not names:
+        raise InputError(asked, f"it has no variants ({VARIANTS})", "leave the variant out")
+    near = close_names(name, names)
+    do = f"use one of {', '.join(names)}"
+    raise InputError(asked, "no such variant", f"{did_you_mean(near)} {do}" if near else do)
+
+
+def material_index(file: GltfFile, primitive: Json, variant: int | None) -> int | None:
+    """Index of the material that a primitive has in a variant, if it has any.
+
+    Raises
+    ------
+    InputError
+        If its mappings are not a list of materials with lists of variants.
+    """
+    own: int | None = primitive.get("material")
+    if variant is None:
+        return own
+    mappings = extension(file, "a primitive", primitive, VARIANTS).get("mappings", [])
+    if not (isinstance(mappings, list) and all(isinstance(one, dict) for one in mappings)):
+        raise refused(file, f"{VARIANTS}: mappings is not a list of objects")
+    for mapping in mappings:
+        users = mapping.get("variants")
+        if not isinstance(users, list):
+            raise refused(file, f"{VARIANTS}: a mapping has no list of variants")
+        if variant in users:
+            file.item("materials", mapping.get("material"))
+            return int(mapping["material"])
+    return own
+
+
 def _indices(file: GltfFile, node: Json) -> list[int]:
     found = node.get("children", [])
     if not isinstance(found, list):
@@ -120,39 +148,6 @@ def _local(file: GltfFile, index: int, node: Json) -> Array:
             f"glTF {str(file.path)!r}", f"node {index} has no valid transform", "export it again"
         ) from error
     return matrix
-
-
-def world_thickness(thickness: npt.ArrayLike, transform: npt.ArrayLike, direction: npt.ArrayLike) -> Array:
-    """World-space length of a thickness in mesh space, measured along a direction of the world.
-
-    Parameters
-    ----------
-    thickness : array_like
-        In mesh space: the factor, or the factor times the texture's G channel.
-    transform : array_like (4, 4) or (3, 3)
-        Mesh to world; column vectors. It may mirror.
-    direction : array_like (3,)
-        Direction in the world, of any length.
-
-    Returns
-    -------
-    array
-        thickness |v_world| / |v_mesh| in metres, with v_mesh the direction taken into mesh space.
-
-    Raises
-    ------
-    InputError
-        If the transform flattens the mesh, or the direction is zero.
-    """
-    matrix = np.asarray(transform, dtype=np.float64)[:3, :3]
-    world = np.asarray(direction, dtype=np.float64)
-    try:
-        local = np.linalg.solve(matrix, world)
-    except np.linalg.LinAlgError:
-        raise InputError("thickness in the world", "the transform flattens the mesh", "give a scale above 0") from None
-    if not (length := float(np.linalg.norm(local))) > 0:
-        raise InputError(f"direction {world.tolist()}", "it has no length", "give for example (0, 0, 1)")
-    return np.asarray(thickness, dtype=np.float64) * (float(np.linalg.norm(world)) / length)
 
 
 def thickness_map(file: GltfFile, material: GltfMaterial) -> Array | None:

@@ -1,1 +1,0 @@
-"""Baking of whole glTF files: selection of targets, and writing of maps and vertices back."""
