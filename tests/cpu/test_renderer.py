@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import signal
+import sys
+import threading
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import translucent as tl
 from tools.cpu_throughput import throughput
-from translucent.cpu import picture, shading
+from translucent.cpu import light_paths, picture, shading, traced
+from translucent.cpu import threads as pool
 from translucent.cpu.renderer import CpuRenderer
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import ARRAYS
@@ -129,6 +135,31 @@ def test_threads_and_pieces_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None
         frame = frame_of(scene, samples=4, threads=threads)
         for name in ARRAYS:
             np.testing.assert_array_equal(getattr(frame, name), getattr(alone, name), err_msg=name)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signal to one thread")
+@pytest.mark.parametrize(
+    ("where", "method"), [(light_paths._EmbreeObject, "_candidates"), (traced._Growth, "_correct")]
+)
+def test_ctrl_c_ends_the_threads_within_a_picture(monkeypatch: pytest.MonkeyPatch, where: type, method: str) -> None:
+    """Its step of the work is not begun again once the picture has been interrupted."""
+    real: Callable[..., Any] = getattr(where, method)
+    begun = []
+
+    def interrupted(*arguments: Any) -> Any:
+        if threading.current_thread() is threading.main_thread():
+            return real(*arguments)
+        begun.append(method)
+        if len(begun) == 1:
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+            assert pool._ended.get().wait(30.0)
+        return real(*arguments)
+
+    monkeypatch.setattr(where, method, interrupted)
+    scene = tl.showcase(BALL, replace(WINE, ior=1.5), SIZE)
+    with pytest.raises(KeyboardInterrupt):
+        frame_of(scene, threads=1)
+    assert begun == [method]
 
 
 @pytest.mark.parametrize("samples", [4, 16, 7])

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from translucent.arrays import Integers
+from translucent.cpu.threads import end_if_stopped
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.reference.hits import Hits, from_eye, sorted_hits
@@ -60,6 +61,7 @@ class _EmbreeObject(TracedObject):
 
     def hits(self, lines: Lines) -> Hits:
         """All surfaces on the lines; `Hits.pixel` is the number of the line."""
+        end_if_stopped()
         line, face = self._candidates(lines)
         hits = self.crossings(lines, [(line, face)])
         tried, met = (np.bincount(pixel, minlength=len(lines)) for pixel in (line, hits.pixel))

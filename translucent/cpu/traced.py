@@ -24,6 +24,7 @@ from translucent.cpu.legs import LegMedia
 from translucent.cpu.media_record import NOTHING, Items, Record, RecordedMedia, empty_records, enter, has, leave
 from translucent.cpu.meetings import Interfaces, Meetings, Places
 from translucent.cpu.surroundings import Surroundings
+from translucent.cpu.threads import end_if_stopped
 from translucent.cpu.vectors import dot, largest, unit
 from translucent.formulas.diffusion import HAZE_ROUGHNESS
 from translucent.formulas.interface import reflected_direction
@@ -199,6 +200,7 @@ class _Growth:
 
     def _step(self, beams: Beams, start: Array | None = None) -> Beams:
         """Follow beams to the next surfaces; what continues from there."""
+        end_if_stopped()
         face, distance = self.caster.nearest(beams.origins, beams.directions, beams.last, start)
         self._correct(beams, face, distance)
         place = -largest(-distance)
