@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import sys
 import time
 
 
@@ -20,8 +22,10 @@ def sleep_long(number: int) -> int:
     return number
 
 
-def tell_and_sleep(item: int) -> int:
-    """Print the process's id first."""
+def tell_and_hold(item: int) -> int:
+    """Print the process's id, and let no other thread of it run for a minute, as some C libraries do."""
     print(os.getpid(), flush=True)
-    time.sleep(600.0)
+    if sys.platform == "linux":  # elsewhere only a thread sees that the parent is gone
+        ctypes.PyDLL(None).sleep(60)
+    time.sleep(60.0)
     return item

@@ -297,9 +297,9 @@ def test_processes_end_when_the_work_is_given_up() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     code = (
-        "import sys, time; from tests.bake.tasks import tell_and_sleep\n"
+        "import sys, time; from tests.bake.tasks import tell_and_hold\n"
         "from translucent.bake.batch import in_processes\n"
-        "if __name__ == '__main__': list(in_processes(tell_and_sleep, [0, 1], 2, lambda item: -item))\n"
+        "if __name__ == '__main__': list(in_processes(tell_and_hold, [0, 1], 2, lambda item: -item))\n"
     )
     (tmp_path / "batch.py").write_text(code)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

@@ -61,6 +61,9 @@ def reuse_freed_memory_if_fixed() -> None:
 #: Seconds that a worker process has for cleaning up when the work is canceled.
 PATIENCE = 5.0
 
+#: Option of Linux's prctl: the signal that a process gets when its parent ends (linux/prctl.h).
+_PR_SET_PDEATHSIG = 1
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -152,19 +155,28 @@ def _begin() -> None:
     """Set up a worker process: the parent handles Ctrl-C, and ends the worker so that its files are removed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end)
-    threading.Thread(target=_follow_parent, daemon=True).start()
+    _end_with_parent()
     warnings.simplefilter("ignore")  # results tell their warnings
     reuse_freed_memory()
 
 
+def _end_with_parent() -> None:
+    """End this worker process at once when its parent is gone: reading its pipe would wait forever.
+
+    A file that is half written stays beside the whole one, as after any kill; the next process that writes it removes
+    that.
+    """
+    threading.Thread(target=_follow_parent, daemon=True).start()
+    if sys.platform == "linux":
+        # The thread waits for C code that does not share the interpreter, such as xatlas; the system does not.
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
 def _follow_parent() -> None:
-    """End this worker process when its parent is gone, as reading its pipe would wait forever."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()
-    os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(PATIENCE)
-    os._exit(143)  # what was running did not hear
+    os._exit(143)
 
 
 def _end(*_: Any) -> None:
