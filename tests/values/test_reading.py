@@ -28,7 +28,7 @@ from translucent.gltf.write import write_medium
 from translucent.materials import load_medium
 from translucent.materials.usd import read_usda
 from translucent.media.fitting import fit_wedge
-from translucent.media.pixel import pixel_color
+from translucent.media.pixel import pixel_color, read_encoded
 from translucent.media.preset import read_presets
 
 JADE = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02)
@@ -363,3 +363,68 @@ def test_what_was_a_file_and_has_become_a_pipe_is_not_waited_for(
     monkeypatch.setattr(reading, "require_file", lambda *_: None)
     with pytest.raises(tl.InputError, match="it is no file"):
         open_file(tmp_path / "pipe", "this")
+
+
+SIGNALING = np.full((2, 3, 4), 0x7F800001, dtype=np.uint32).view(np.float32)
+
+
+def _npy(values: np.ndarray, header: bytes = b"") -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, values)
+    data = stream.getvalue()
+    return data.replace(b"}" + b" " * len(header), b"}" + header) if header else data
+
+
+def _picture(kind: str, mode: str, **named: Any) -> bytes:
+    stream = io.BytesIO()
+    Image.linear_gradient("L").resize((16, 8)).convert(mode).save(stream, format=kind, **named)
+    return stream.getvalue()
+
+
+@pytest.mark.filterwarnings("error")  # those of NumPy, Pillow and Python
+def test_numbers_that_signal_are_refused_or_stay_none(tmp_path: Path) -> None:
+    for values in (SIGNALING, SIGNALING.astype(">f4"), np.full((2, 3, 4), 0x7C01, dtype=np.uint16).view(np.float16)):
+        (tmp_path / "a.npy").write_bytes(_npy(values))
+        with pytest.raises(tl.InputError, match="24 values not in 0 to"):
+            tl.DensityGrid.load(tmp_path / "a.npy")
+        (tmp_path / "a.npy").write_bytes(_npy(values[0]))
+        assert np.isnan(load_thickness_map(tmp_path / "a.npy")).all()
+    (tmp_path / "a.npy").write_bytes(_npy(np.full((2, 2, 2), "x")))
+    with pytest.raises(tl.InputError, match="its type is '<U1', not numbers"):
+        tl.DensityGrid.load(tmp_path / "a.npy")
+    (tmp_path / "a.npy").write_bytes(_npy(SIGNALING, header=b" if 1or 0 else 0"))
+    with pytest.raises(tl.InputError, match="not a NumPy array"):
+        tl.DensityGrid.load(tmp_path / "a.npy")
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("default::translucent.TranslucentWarning")
+def test_an_exr_is_read_or_refused_without_a_word_of_its_library(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    openexr = pytest.importorskip("OpenEXR", reason="the extra exr is not installed")
+    path = tmp_path / "a.exr"
+    channels = {name: np.resize(SIGNALING, (4, 8)) for name in "RGB"}
+    for values in channels.values():
+        values[0] = 0.5
+    openexr.File({"type": openexr.scanlineimage, "compression": openexr.NO_COMPRESSION}, channels).write(str(path))
+    with pytest.warns(tl.TranslucentWarning, match="24 of 32 pixels are not finite, taken as 0"):
+        tl.Environment.image(path)
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(tl.InputError, match=r"its pixels are damaged|not an OpenEXR file"):
+        tl.Environment.image(path)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.filterwarnings("error")
+def test_odd_pictures_are_read_without_a_word_of_pillow(tmp_path: Path) -> None:
+    (tmp_path / "a.png").write_bytes(_picture("PNG", "P", transparency=bytes(range(256))))
+    assert tl.Environment.image(tmp_path / "a.png").radiance is not None
+    assert read_encoded(tmp_path / "a.png", "a picture").shape == (8, 16, 3)
+    tiff = _picture("TIFF", "RGB")
+    count, where = struct.unpack("<H", tiff[tiff[4] : tiff[4] + 2])[0], tiff[4] + 2
+    tags = [tiff[where + 12 * i : where + 12 * i + 12] for i in range(count)]
+    unknown = struct.pack("<HHII", 65000, 2, 10**6, 10**6)  # a million characters beyond the end of the file
+    damaged = tiff[: tiff[4]] + b"".join([struct.pack("<H", count), *tags[:-1], unknown]) + tiff[where + 12 * count :]
+    (tmp_path / "a.tiff").write_bytes(damaged)
+    pixel_color(tmp_path / "a.tiff", 0, 0)

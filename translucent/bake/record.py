@@ -95,7 +95,8 @@ class Encoding:
 
     def decode(self, stored: npt.ArrayLike) -> Array:
         """Decode values to float64."""
-        return self.offset + self.scale * np.asarray(stored, dtype=np.float64)
+        with np.errstate(invalid="ignore", over="ignore", under="ignore"):  # what is no number stays none
+            return self.offset + self.scale * np.asarray(stored, dtype=np.float64)
 
     def summary(self) -> Record:
         """Formula as values that JSON can hold."""

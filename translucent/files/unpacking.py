@@ -8,7 +8,7 @@ import math
 import os
 import warnings
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -26,8 +26,10 @@ if TYPE_CHECKING:
 PICTURES = ("PNG", "JPEG", "BMP", "GIF", "TIFF", "WEBP", "TGA", "PPM")
 
 
-def read_array(stream: IO[bytes], size: int, asked: str, do: str = "write it with numpy.save") -> npt.NDArray[Any]:
-    """Read the numeric array of a .npy file.
+def read_array(
+    stream: IO[bytes], size: int, asked: str, do: str = "write it with numpy.save", kinds: str = "biuf"
+) -> npt.NDArray[Any]:
+    """Read the array of a .npy file.
 
     Parameters
     ----------
@@ -38,6 +40,8 @@ def read_array(stream: IO[bytes], size: int, asked: str, do: str = "write it wit
         What the error says was asked for.
     do : str
         What the user can do about it.
+    kinds : str
+        Kinds of types that it may have, as NumPy names them: numbers, unless asked otherwise.
 
     Raises
     ------
@@ -48,18 +52,22 @@ def read_array(stream: IO[bytes], size: int, asked: str, do: str = "write it wit
     try:
         version = form.read_magic(stream)
         read_header = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
-        shape, _, dtype = read_header(stream)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of Python's parser, about the header
+            shape, _, dtype = read_header(stream)
     except MemoryError:  # what Python's parser says of too many brackets
         raise InputError(asked, "not a NumPy array", do) from None
     except Exception as error:  # a header is Python, and what is broken in it raises whatever Python does
         raise InputError(asked, f"not a NumPy array ({shown(error)})", do) from error
-    if dtype.hasobject or dtype.kind not in "biufU" or not dtype.itemsize:
+    if dtype.hasobject or dtype.kind not in kinds or not dtype.itemsize:
         raise InputError(asked, f"its type is {str(dtype)!r}, not numbers", do)
     needed, held = math.prod(shape) * dtype.itemsize, size - stream.tell()
     if not 0 <= needed <= held:
         raise InputError(asked, f"it is cut short: {held} of {needed} bytes", do)
     stream.seek(0)
-    return np.lib.format.read_array(stream, allow_pickle=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return np.lib.format.read_array(stream, allow_pickle=False)
 
 
 def read_arrays(path: str | Path, asked: str, names: Iterable[str], do: str) -> dict[str, npt.NDArray[Any]]:
@@ -74,7 +82,7 @@ def read_arrays(path: str | Path, asked: str, names: Iterable[str], do: str) -> 
                     # What is said to be stored makes room for itself, too, whether it is there or not.
                     size, stored = max(member.file_size, member.compress_size), min(member.compress_size, whole)
                     require_room(asked, f"{name} would", size, stored, do)
-                    found[name] = read_array(io.BytesIO(archive.read(member)), member.file_size, asked, do)
+                    found[name] = read_array(io.BytesIO(archive.read(member)), member.file_size, asked, do, "biufU")
         except InputError:
             raise
         except Exception as error:  # of zipfile and of each kind of compression
@@ -82,6 +90,7 @@ def read_arrays(path: str | Path, asked: str, names: Iterable[str], do: str) -> 
     return found
 
 
+@contextlib.contextmanager
 def open_picture(
     data: bytes,
     asked: str,
@@ -89,8 +98,11 @@ def open_picture(
     *,
     per_pixel: int,
     do: str = "check the file",
-) -> ImageFile:
+) -> Iterator[ImageFile]:
     """Open a picture without decoding its pixels, after a check that there is memory for them.
+
+    Pillow's warnings are ignored until the end of the context, in which pixels are to be decoded: of odd metadata, of
+    palettes with transparency, and of many pixels, which are counted here.
 
     Parameters
     ----------
@@ -112,18 +124,19 @@ def open_picture(
     """
     from PIL import Image
 
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of many pixels, which are counted below, and of odd metadata
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module=r"PIL\.")
+        try:
             image = Image.open(io.BytesIO(data), formats=formats)
-    except Image.DecompressionBombError:
-        raise InputError(asked, "it has too many pixels", "make it smaller") from None
-    except Exception as error:  # each of Pillow's readers raises its own kinds
-        found = f"it is not an image that can be read: none of {', '.join(formats)}"
-        raise UnreadableError(asked, found, do) from error
-    width, height = image.size
-    require_room(asked, f"{width}x{height} pixels", per_pixel * width * height, len(data))
-    return image
+        except Image.DecompressionBombError:
+            raise InputError(asked, "it has too many pixels", "make it smaller") from None
+        except Exception as error:  # each of Pillow's readers raises its own kinds
+            found = f"it is not an image that can be read: none of {', '.join(formats)}"
+            raise UnreadableError(asked, found, do) from error
+        width, height = image.size
+        require_room(asked, f"{width}x{height} pixels", per_pixel * width * height, len(data))
+        with image:
+            yield image
 
 
 def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
@@ -138,19 +151,32 @@ def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, np
     with open_file(path, asked) as stream:
         stored = os.fstat(stream.fileno()).st_size
     try:
-        with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
+        with _silent(), OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
             sizes = [_exr_size(part.header) for part in file.parts]
         width, height, _ = sizes[0]
         require_room(asked, f"{width}x{height} pixels", sum(12 * w * h * n for w, h, n in sizes), stored)
-        # The library prints what is wrong with pixels, and leaves their part out.
-        with contextlib.redirect_stdout(io.StringIO()), OpenEXR.File(str(path), separate_channels=True) as file:
-            if not file.parts:
+        with _silent(), OpenEXR.File(str(path), separate_channels=True) as file:
+            if not file.parts:  # of damaged pixels the library leaves their part out
                 raise InputError(asked, "its pixels are damaged", "copy the file again")
             return dict(file.header()), {name: np.array(channel.pixels) for name, channel in file.channels().items()}
     except InputError:
         raise
     except Exception as error:  # of the library's C++
         raise InputError(asked, f"not an OpenEXR file ({shown(error)})", "check the file") from error
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """Drop what a library prints, in Python or in C: it names files as they are, with codes that terminals obey."""
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
+        with contextlib.suppress(OSError):  # of a process without standard error
+            kept = os.dup(2)
+            stack.callback(os.close, kept)
+            stack.callback(os.dup2, kept, 2)
+            with open(os.devnull, "wb") as nothing:
+                os.dup2(nothing.fileno(), 2)
+        yield
 
 
 def _exr_size(header: dict[str, Any]) -> tuple[int, int, int]:

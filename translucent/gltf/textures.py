@@ -21,7 +21,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from translucent.arrays import Array
-from translucent.errors import UnreadableError
+from translucent.errors import InputError, UnreadableError
 from translucent.files.unpacking import open_picture
 from translucent.formulas.color import srgb_to_linear
 from translucent.gltf.fields import Fields, LeftOut, extension, label, number, numbers, refused, section, whole
@@ -222,14 +222,16 @@ class Textures:
 
     def _decoded(self, where: str, data: bytes) -> Image.Image | None:
         """Decoded picture; None if it is broken or of an unknown format."""
+        asked = f"glTF {str(self._file.path)!r}: {where}"
         try:
-            opened = open_picture(data, f"glTF {str(self._file.path)!r}: {where}", ("PNG", "JPEG"), per_pixel=12)
+            with open_picture(data, asked, ("PNG", "JPEG"), per_pixel=12) as opened:
+                if opened.mode.startswith("I"):  # 16 bits of gray, which `convert` would clip
+                    return Image.fromarray((np.asarray(opened) // 257).astype(np.uint8)).convert("RGBA")
+                return opened.convert("RGBA")
         except UnreadableError:
             return None
-        try:
-            if opened.mode.startswith("I"):  # 16 bits of gray, which `convert` would clip
-                return Image.fromarray((np.asarray(opened) // 257).astype(np.uint8)).convert("RGBA")
-            return opened.convert("RGBA")
+        except InputError:
+            raise
         except Exception:  # noqa: BLE001 - each of Pillow's decoders raises its own kinds; it is told as left out
             return None
 

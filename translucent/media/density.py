@@ -49,7 +49,8 @@ class DensityGrid(Frozen):
 
     def __post_init__(self) -> None:
         try:
-            values = np.array(self.values, dtype=np.float64)
+            with np.errstate(invalid="ignore", over="ignore"):  # what is no number is refused below
+                values = np.array(self.values, dtype=np.float64)
         except (TypeError, ValueError):
             raise InputError("density grid", "not numbers", "give an array (nx, ny, nz)") from None
         if values.ndim != 3 or not values.size:

@@ -89,6 +89,8 @@ def _read(what: str, path: str | Path, do: str, per_pixel: int = 16) -> tuple[Im
                 kind = f"{image.mode} of 16 bits" if deep else image.mode
                 raise InputError(what, f"pixels of the kind {kind}", "save it as an 8-bit RGB image")
             shown, turn = ImageOps.exif_transpose(image), image.getexif().get(_ORIENTATION, 1)
+            if shown.mode == "P":  # with what Pillow warns of
+                shown = shown.convert("RGBA")
         return shown, _deep_channels(what, data, turn) if deep else []
     except InputError:
         raise

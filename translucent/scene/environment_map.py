@@ -163,7 +163,8 @@ def _usable(given: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float32], list[str]
     """
     pixels, any_right, counts = np.empty(given.shape, dtype=np.float32), False, np.zeros(3, dtype=np.int64)
     for rows in row_blocks(*given.shape[:2]):
-        values = given[rows].astype(np.float64)
+        with np.errstate(invalid="ignore"):  # of signaling NaNs
+            values = given[rows].astype(np.float64)
         unknown = ~np.isfinite(values)
         negative, high = (values < 0) & ~unknown, (values > MAX_RADIANCE) & ~unknown
         wrong = unknown | negative
