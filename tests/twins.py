@@ -11,7 +11,7 @@ from translucent.formulas import (
     color,
     diffusion,
     interface,
-    lights,
+    light,
     optics,
     phase,
     spherical_harmonics,
@@ -26,7 +26,7 @@ MODULES: dict[str, ModuleType] = {
     "optics": optics,
     "interface": interface,
     "thin_film": thin_film,
-    "lights": lights,
+    "light": light,
     "phase": phase,
     "two_stream": two_stream,
     "diffusion": diffusion,
@@ -181,7 +181,7 @@ def _cone_arguments() -> list[np.ndarray]:
         aside /= np.linalg.norm(aside)
         for angle in np.concatenate([np.linspace(0, 1.5, 40) * (outer or 1.0), np.linspace(0, np.pi, 9)]):
             travel.append(np.cos(angle) * axis + np.sin(angle) * aside)
-            cones.append(lights.light_cone(axis, inner, outer) if outer else lights.ALL_AROUND)
+            cones.append(light.light_cone(axis, inner, outer) if outer else light.ALL_AROUND)
     return [np.float32(travel), np.float32(cones)]
 
 
@@ -358,7 +358,7 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
     if name == "scattered_radiance":
         # Of both signs, too.
         allowed = allowed + 8 * eps * np.abs(arguments[0] * arguments[1]).sum(axis=1)
-    if name.endswith("_cosine"):
+    if name in ("henyey_greenstein_cosine", "draine_cosine", "phase_cosine"):
         allowed = allowed + 8 * eps / (2 * np.pi * _density(name, exact, arguments)) + 4 * eps
     if name == "cone_attenuation":
         # Each component of the chord is a difference of numbers as large as the length of the cone's vector; the offset

@@ -5,9 +5,7 @@
 #include <View>
 #include <Surfaces>
 #include <Environment>
-#include <Lights>
 #include "lib/environment.glsl"
-#include "lib/lights.glsl"
 #include "shade/in_picture.glsl"
 #include "shade/diffuse_light.glsl"
 #include "shade/shadows.glsl"
@@ -65,7 +63,7 @@ void main() {
 #endif
     vec3 reaching = all_light * environment_reaching(point, normal);
     for (int light = 0; light < light_count; ++light) {
-        vec3 sent = lamp_irradiance(light, from_eye, normal);
+        vec3 sent = light_irradiance_on(light, point, normal);
         if (sent == vec3(0.0)) { continue; }
         all_light += sent;
         reaching += sent * light_reaching(light, point, normal);

@@ -1,5 +1,7 @@
 // Light on a surface that reflects diffusely, before anything shadows it. LIGHT_MAP: the environment is an image. Needs
-// <constants>, <Environment>, <Lights>, lib/environment.glsl and lib/lights.glsl. Normals are unit vectors.
+// <constants>, <Environment> and lib/environment.glsl. Normals are unit vectors.
+
+#include "shade/lights.glsl"
 
 #if LIGHT_MAP
 uniform sampler2D light_irradiance;
@@ -15,12 +17,8 @@ vec3 environment_irradiance(vec3 normal) {
 #endif
 }
 
-// From one light; position: of the surface, from the eye.
-vec3 lamp_irradiance(int light, vec3 position, vec3 normal) {
-    vec4 at = light_position[light];
-    vec3 towards = at.xyz - at.w * position;
-    float distance_m = max(length(towards), 1e-18);
-    float facing = max(dot(towards / distance_m, normal), 0.0);
-    facing *= cone_attenuation(-towards / distance_m, light_cone[light]);
-    return light_power[light].rgb * (at.w == 0.0 ? facing : facing / distance_m / distance_m);
+// From one light; point: of the surface, from the center of the media.
+vec3 light_irradiance_on(int light, vec3 point, vec3 normal) {
+    LightSample arriving = light_at(light, point);
+    return max(dot(arriving.towards, normal), 0.0) * arriving.irradiance;
 }

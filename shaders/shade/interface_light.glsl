@@ -1,15 +1,15 @@
 // Light that interfaces of bodies reflect, and give back from paint and from many scattering events. Needs <constants>,
-// <View>, <Lights>, <Surfaces>, <SurfaceRow> and environment_light.glsl. SINGLE_SCATTERING: light of lights that is
+// <View>, <Surfaces>, <SurfaceRow> and environment_light.glsl. SINGLE_SCATTERING: light of lights that is
 // scattered once is found elsewhere. THIN_FILM, CLEAR_COAT: some body has one. Who includes it has light_passed, as in transport/light_passed.glsl.
 
 #include "lib/interface.glsl"
-#include "lib/lights.glsl"
 #include "lib/optics.glsl"
 #if THIN_FILM
 #include "lib/thin_film.glsl"
 #endif
 #include "lib/two_stream.glsl"
 #include "shade/highlight.glsl"
+#include "shade/lights.glsl"
 #include "shade/shadows.glsl"
 
 uniform sampler2D reflectance_table; // scale and bias of the reflectance at normal incidence
@@ -86,26 +86,13 @@ float refraction_roughness(float roughness, float ior) {
     return roughness * sqrt(min(abs(ior - 1.0) * 0.70710678, 1.0));
 }
 
-vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
-    vec4 position = light_position[light];
-    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
-    vec3 towards = position.xyz - position.w * from_eye;
-    float distance_m = max(length(towards), 1e-18);
-    irradiance = light_power[light].rgb / (position.w == 0.0 ? 1.0 : distance_m * distance_m);
-    towards /= distance_m;
-    irradiance *= cone_attenuation(-towards, light_cone[light]);
-    return towards;
-}
-
 vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m);
 
-// Share of a light that reaches an interface: what nothing opaque blocks, and nothing dims.
-vec3 share_reaching(int light, vec3 point, vec3 normal, vec3 towards) {
+// Irradiance of a light on an interface that faces it, as far as nothing opaque blocks it, and bodies let it pass.
+vec3 irradiance_reaching(int light, LightSample arriving, vec3 point, vec3 normal) {
     float unblocked = light_unblocked(light, point, normal);
     if (unblocked == 0.0) { return vec3(0.0); }
-    vec4 position = light_position[light];
-    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
-    return unblocked * light_passed(point, normal, towards, position.w == 0.0 ? NOTHING : distance(position.xyz, from_eye));
+    return unblocked * light_passed(point, normal, arriving.towards, arriving.distance_m) * arriving.irradiance;
 }
 
 // Microfacets that mirror the lights, as far as these reach them.
@@ -113,15 +100,14 @@ vec3 highlights(vec3 point, vec3 normal, vec3 ray, Finish finish, float alpha) {
     vec3 sum = vec3(0.0);
     float cos_view = max(-dot(normal, ray), 1e-3);
     for (int light = 0; light < light_count; ++light) {
-        vec3 irradiance;
-        vec3 towards = towards_light(light, point, irradiance);
-        float cos_light = dot(normal, towards);
+        LightSample arriving = light_at(light, point);
+        float cos_light = dot(normal, arriving.towards);
         if (cos_light <= 0.0) { continue; }
-        vec3 half_way = normalize(towards - ray);
-        vec3 mirrored = mirrored_by_facets(finish, max(dot(half_way, towards), 0.0))
+        vec3 half_way = normalize(arriving.towards - ray);
+        vec3 mirrored = mirrored_by_facets(finish, max(dot(half_way, arriving.towards), 0.0))
             * ggx_distribution(min(dot(half_way, normal), 1.0), alpha) * ggx_visibility(cos_light, cos_view, alpha);
         mirrored *= cos_light;
-        if (max(mirrored.r, max(mirrored.g, mirrored.b)) > FAINTEST_HIGHLIGHT) { sum += mirrored * share_reaching(light, point, normal, towards) * irradiance; }
+        if (max(mirrored.r, max(mirrored.g, mirrored.b)) > FAINTEST_HIGHLIGHT) { sum += mirrored * irradiance_reaching(light, arriving, point, normal); }
     }
     return sum;
 }
@@ -152,11 +138,10 @@ struct TwoSides {
 TwoSides irradiance_on(vec3 point, vec3 normal, float unoccluded) {
     TwoSides sum = TwoSides(unoccluded * environment_irradiance(normal), unoccluded * environment_irradiance(-normal));
     for (int light = 0; light < light_count; ++light) {
-        vec3 irradiance;
-        vec3 towards = towards_light(light, point, irradiance);
-        float facing = dot(normal, towards);
-        if (facing == 0.0 || irradiance == vec3(0.0)) { continue; }
-        irradiance *= abs(facing) * share_reaching(light, point, facing > 0.0 ? normal : -normal, towards);
+        LightSample arriving = light_at(light, point);
+        float facing = dot(normal, arriving.towards);
+        if (facing == 0.0 || arriving.irradiance == vec3(0.0)) { continue; }
+        vec3 irradiance = abs(facing) * irradiance_reaching(light, arriving, point, facing > 0.0 ? normal : -normal);
         sum.front += facing > 0.0 ? irradiance : vec3(0.0);
         sum.back += facing > 0.0 ? vec3(0.0) : irradiance;
     }

@@ -6,7 +6,6 @@
 #include <View>
 #include <Body>
 #include <Environment>
-#include <Lights>
 #include "lib/ray.glsl"
 #include "shade/opaque_surface.glsl"
 #if OPAQUE
@@ -58,7 +57,7 @@ void main() {
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
     float share = layer_opacity * finish.opacity;
-    vec4 shown = vec4(share * min(opaque_radiance_of(finish, normal, ray, from_eye, from_center), vec3(NOTHING)), share);
+    vec4 shown = vec4(share * min(opaque_radiance_of(finish, normal, ray, from_center), vec3(NOTHING)), share);
 #if BODIES
     if (axial_depth > texelFetch(fronts, ivec2(gl_FragCoord.xy), 0).r + touching) {
         behind = shown;

@@ -10,10 +10,9 @@
 #include <Body>
 #endif
 #include <Environment>
-#include <Lights>
 #include "lib/environment.glsl"
-#include "lib/lights.glsl"
 #include "lib/ray.glsl"
+#include "shade/lights.glsl"
 #include "shade/shadows.glsl"
 #if SURFACE
 #include "shade/opaque_surface.glsl"
@@ -43,7 +42,7 @@ layout(location = 1) out vec4 radiance;
 vec3 diffuse_radiance(vec3 normal) {
     vec3 irradiance = environment_irradiance(normal) * environment_reaching(from_center, normal);
     for (int light = 0; light < light_count; ++light) {
-        vec3 sent = lamp_irradiance(light, from_eye, normal);
+        vec3 sent = light_irradiance_on(light, from_center, normal);
         if (sent != vec3(0.0)) { irradiance += sent * light_reaching(light, from_center, normal); }
     }
     return color.rgb / PI * irradiance;
@@ -69,7 +68,7 @@ void main() {
     vec3 normal = gl_FrontFacing ? finish.normal : -finish.normal;
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
-    vec3 light = opaque_radiance_of(finish, normal, ray, from_eye, from_center);
+    vec3 light = opaque_radiance_of(finish, normal, ray, from_center);
 #else
     vec3 normal = normalize(world_normal);
     vec3 light = diffuse_radiance(dot(normal, ray) > 0.0 ? -normal : normal);

@@ -1,15 +1,15 @@
 // What an opaque surface sends to the eye: a metal, or a coat over paint, or between the two (glTF 2.0, Appendix B), lit by the
 // environment (split sum, Karis 2013) and by lights, as far as they reach it. Energy that a rough surface loses between its
-// microfacets is given back by a factor (Turquin 2019). Needs <constants>, <Lights> and a texture `reflectance_table`.
+// microfacets is given back by a factor (Turquin 2019). Needs <constants> and a texture `reflectance_table`.
 // THIN_FILM, CLEAR_COAT: its surface may have one (KHR_materials_iridescence, KHR_materials_clearcoat).
 
 #include "lib/interface.glsl"
-#include "lib/lights.glsl"
 #if THIN_FILM
 #include "lib/thin_film.glsl"
 #endif
 #include "shade/environment_light.glsl"
 #include "shade/highlight.glsl"
+#include "shade/lights.glsl"
 #include "shade/shadows.glsl"
 
 struct OpaqueFinish {
@@ -73,8 +73,8 @@ Layer clearcoat_layer(vec2 clearcoat, float cos_view) {
 }
 #endif
 
-// ray: unit, from the eye; normal: to the eye's side; position: from the eye; point: from the center of the media.
-vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 position, vec3 point) {
+// ray: unit, from the eye; normal: to the eye's side; point: from the center of the media.
+vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 point) {
     float ior = finish.ior;
     float cos_view = clamp(-dot(normal, ray), 1e-3, 1.0);
     vec2 table = textureLod(reflectance_table, reflectance_coordinate(cos_view, finish.roughness), 0.0).rg;
@@ -106,12 +106,8 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 positio
 #endif
     float alpha = highlight_alpha(finish.roughness, finish.variance);
     for (int light = 0; light < light_count; ++light) {
-        vec4 at = light_position[light];
-        vec3 way = at.xyz - at.w * position;
-        float distance_m = max(length(way), 1e-18);
-        vec3 towards = way / distance_m;
-        vec3 irradiance = at.w == 0.0 ? light_power[light].rgb : light_power[light].rgb / distance_m / distance_m;
-        irradiance *= cone_attenuation(-towards, light_cone[light]);
+        LightSample arriving = light_at(light, point);
+        vec3 towards = arriving.towards, irradiance = arriving.irradiance;
         float cos_light = dot(normal, towards);
         if (cos_light > 0.0 || finish.passed_share > 0.0) { irradiance *= light_reaching(light, point, normal); }
         if (cos_light <= 0.0) {

@@ -1,4 +1,4 @@
-// The surface of an opaque object at a fragment, with its textures. Needs <constants> and <Lights>.
+// The surface of an opaque object at a fragment, with its textures. Needs <constants>.
 
 #include "shade/surface_textures.glsl"
 

@@ -4,7 +4,6 @@
 #include <View>
 #include <Body>
 #include <Environment>
-#include <Lights>
 #include "lib/ray.glsl"
 #if SURFACE
 #include "shade/shadows.glsl"

@@ -6,7 +6,6 @@
 #include <constants>
 #include <View>
 #include <Environment>
-#include <Lights>
 #include <Surfaces>
 #include <SurfaceRow>
 #include "lib/interface.glsl"

@@ -67,7 +67,7 @@ vec3 scattered_at_microfacets(vec3 way, float ior, float alpha, vec3 to_light, i
         vec4 shares = random_shares(draws);
         if (leaves_surface(side * way, alpha, shares.x, height)) { return way; }
         float relative = side > 0.0 ? ior : 1.0 / ior;
-#if LAMPS
+#if LIGHTS
         seen += turned_to(side * to_light, side * way, height, relative, alpha);
 #endif
         vec3 facet = side * visible_facet(-side * way, alpha, shares.yz);

@@ -13,5 +13,5 @@ vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
         , vec2(body.clearcoat, body.clearcoat_roughness)
 #endif
     );
-    return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz, point);
+    return opaque_radiance_of(finish, normal, direction, point);
 }

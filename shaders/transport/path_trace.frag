@@ -7,13 +7,13 @@
 #include <constants>
 #include <View>
 #include <Environment>
-#include <Lights>
 #include <Surfaces>
 #include <TracedBody>
 #include "lib/interface.glsl"
 #include "lib/optics.glsl"
 #include "lib/phase.glsl"
 #include "lib/ray.glsl"
+#include "shade/lights.glsl"
 #include "shade/background.glsl"
 #include "shade/environment_light.glsl"
 #include "shade/environment_beyond.glsl"
@@ -25,7 +25,7 @@ uniform sampler2D reflectance_table;
 #include "transport/record.glsl"
 #include "transport/place.glsl"
 #include "transport/microfacets.glsl"
-#include "transport/lamps.glsl"
+#include "transport/straight_light.glsl"
 #include "transport/light_passed.glsl"
 
 uniform ivec2 tile_origin;   // of the texels in the picture, from its top left corner
@@ -73,13 +73,13 @@ vec3 environment_seen(Path path, vec2 pixel) {
 // Irradiance on paint, as far as lights reach it.
 vec3 unblocked_irradiance(vec3 point, vec3 normal) {
     vec3 sum = environment_irradiance(normal);
-#if LAMPS
+#if LIGHTS
     for (int light = 0; light < light_count; ++light) {
-        Lamp lamp = lamp_at(light, point);
-        float facing = dot(normal, lamp.towards);
+        LightSample arriving = light_at(light, point);
+        float facing = dot(normal, arriving.towards);
         float unblocked = facing > 0.0 ? light_unblocked(light, point, normal) : 0.0;
         if (unblocked == 0.0) { continue; }
-        sum += facing * unblocked * lamp.irradiance * light_passed(point, normal, lamp.towards, lamp.distance_m);
+        sum += facing * unblocked * arriving.irradiance * light_passed(point, normal, arriving.towards, arriving.distance_m);
     }
 #endif
     return sum;
@@ -162,18 +162,18 @@ void begin_path(inout Path path, vec2 pixel, ivec2 texel) {
 #endif
 }
 
-// Turns a path where media scatter it, and adds the light of a lamp there.
+// Turns a path where media scatter it, and adds that of one of the lights there.
 void scatter(inout Path path, Filling filling, int dominant, inout Draws draws) {
     path.flags |= FLAG_BENT | FLAG_REFLECTED;
     path.skipped = 0.0;
     vec4 shares = random_shares(draws);
-#if LAMPS
+#if LIGHTS
     int number = min(int(shares.x * float(light_count)), light_count - 1);
     shares.x = fract(shares.x * float(light_count));
-    Lamp lamp = lamp_at(number, path.origin);
-    vec3 phase = phase_of(path.record, dominant, filling.scattering, dot(lamp.towards, path.direction));
-    vec3 arriving = straight_share(path.origin, 0.0, path.record, lamp.towards, lamp.distance_m, CHANNEL);
-    path.light += path.share * phase * arriving * lamp.irradiance * float(light_count);
+    LightSample arriving = light_at(number, path.origin);
+    vec3 phase = phase_of(path.record, dominant, filling.scattering, dot(arriving.towards, path.direction));
+    vec3 through = straight_transmittance(path.origin, 0.0, path.record, arriving.towards, arriving.distance_m, CHANNEL);
+    path.light += path.share * phase * through * arriving.irradiance * float(light_count);
 #endif
     vec4 phase_function = chosen_phase(path.record, dominant, filling.scattering, path.share, shares.x);
     vec3 before = path.direction;
@@ -220,24 +220,24 @@ void meet(inout Path path, Place place, TracedBody body, int before, int after, 
         mat3 frame = frame_around(normal);
         vec3 to_light = vec3(0.0);
         float seen;
-#if LAMPS
+#if LIGHTS
         int number = min(int(shares.y * float(light_count)), light_count - 1);
-        Lamp lamp = lamp_at(number, point);
-        to_light = lamp.towards * frame;
+        LightSample arriving = light_at(number, point);
+        to_light = arriving.towards * frame;
 #endif
         way = scattered_at_microfacets(path.direction * frame, ior, alpha, to_light, draws, seen);
         path.lost = way == vec3(0.0);
         passes = way.z < 0.0;
         way = frame * way;
-#if LAMPS
+#if LIGHTS
         // Light that comes from the other side of the face than of the smooth surface does not exist.
         float side = to_light.z < 0.0 ? -1.0 : 1.0;
-        if (seen > 0.0 && side * dot(lamp.towards, place.face_normal) > 0.0) {
+        if (seen > 0.0 && side * dot(arriving.towards, place.face_normal) > 0.0) {
             float offset = SURFACE_OFFSET * surface_reach;
-            float skipped = offset / max(abs(dot(place.face_normal, lamp.towards)), 1e-2);
-            vec3 arriving = straight_share(point + side * offset * place.face_normal, skipped,
-                side > 0.0 ? path.record : place.record, lamp.towards, lamp.distance_m - skipped, CHANNEL);
-            path.light += path.share * (side > 0.0 ? vec3(1.0) : passing) * arriving * lamp.irradiance * seen * float(light_count);
+            float skipped = offset / max(abs(dot(place.face_normal, arriving.towards)), 1e-2);
+            vec3 through = straight_transmittance(point + side * offset * place.face_normal, skipped,
+                side > 0.0 ? path.record : place.record, arriving.towards, arriving.distance_m - skipped, CHANNEL);
+            path.light += path.share * (side > 0.0 ? vec3(1.0) : passing) * through * arriving.irradiance * seen * float(light_count);
         }
 #endif
     } else

@@ -7,7 +7,7 @@
 #include <Surfaces>
 #include <TracedBody>
 #include "lib/interface.glsl"
-#include "lib/lights.glsl"
+#include "lib/light.glsl"
 #include "lib/optics.glsl"
 #include "transport/random.glsl"
 #include "transport/hierarchy.glsl"

@@ -7,8 +7,8 @@
 // cancels its 1 / r^2; where it is inside a medium, so that the exponent has a kink next to it, the angle alone. Needs <View>.
 
 #include "intervals/slots.glsl"
-#include "lib/lights.glsl"
 #include "lib/phase.glsl"
+#include "shade/lights.glsl"
 #include "volume/light_views.glsl"
 
 struct ViewRay {
@@ -45,17 +45,12 @@ vec3 scattering_phase(float turns[SLOTS], float cos_scatter) {
 // One light's radiance at distance s along the segment, per metre, without the transmittances; w: its visibility.
 vec4 scattered_here(float turns[SLOTS], int light, ViewRay ray, float s, out vec3 tau) {
     vec3 point = ray.start + s * ray.direction;
-    vec4 position = scatter_light_position[light];
-    vec3 towards = position.w == 0.0 ? position.xyz : position.xyz - point;
-    float r2 = max(dot(towards, towards), 1e-30);
-    towards *= inversesqrt(r2);
-    float share = cone_attenuation(-towards, scatter_light_cone[light]);
+    LightSample arriving = light_at(light, point);
     tau = vec3(0.0);
-    if (share == 0.0) { return vec4(0.0); }  // a spot's view ends with its cone
+    if (arriving.irradiance == vec3(0.0)) { return vec4(0.0); }  // a spot's view ends with its cone
     vec4 depth = light_depth(light, point);
     tau = depth.rgb;
-    vec3 power = scatter_light_power[light].rgb * (position.w == 0.0 ? share : share / r2);
-    return vec4(power * scattering_phase(turns, dot(towards, ray.direction)), depth.a);
+    return vec4(arriving.irradiance * scattering_phase(turns, dot(arriving.towards, ray.direction)), depth.a);
 }
 
 // Between which distances, within metres, a ray is in a cone, of which rest is 1 - cos of the half angle: cones are convex, and
@@ -87,10 +82,10 @@ vec2 cone_part(vec3 from_light, vec3 direction, vec3 axis, float rest, float met
 // Ends of the three parts of a segment, of which some are empty, in which a light shines smoothly: a spot between its outer
 // and inner cone, in the inner one, and behind.
 vec4 lit_parts(int light, ViewRay ray, float metres) {
-    vec4 cone = scatter_light_cone[light];
+    vec4 cone = light_cone[light];
     float size2 = dot(cone.xyz, cone.xyz);
     if (size2 == 0.0) { return vec4(0.0, vec3(metres)); }
-    vec3 from_light = ray.start - scatter_light_position[light].xyz;
+    vec3 from_light = ray.start - light_position[light].xyz;
     vec3 axis = cone.xyz * inversesqrt(size2);
     vec2 outer = cone_part(from_light, ray.direction, axis, 0.5 * cone.w / size2, metres);
     if (cone.w < 1.0 + 1e-5) { return outer.xyyy; }
@@ -122,11 +117,11 @@ vec3 scatter_from_part(float turns[SLOTS], int light, ViewRay ray, vec2 lit, vec
     vec3 rise = sigma * metres + tau_end - tau_start;
 
     // Where the light is nearest: at distance closest along the ray, height metres off it.
-    vec4 position = scatter_light_position[light];
+    vec4 position = light_position[light];
     float closest = dot(position.xyz - ray.start, ray.direction);
     float height = max(length(position.xyz - ray.start - closest * ray.direction), 1e-4 * metres);
     bool angular = position.w == 1.0 && height < NEAR_LIGHT * metres && closest > lit.x - metres && closest < lit.y + metres;
-    if (scatter_light_power[light].a == 1.0) {
+    if (scatter_light_views[light].y < 0.0) {
         angular = true;
         rise = vec3(0.0);
     }

@@ -3,6 +3,7 @@
 // before it, moved along their faces to the very ray of the point.
 
 #include <constants>
+#include <Lights>
 #include <Scatter>
 #include "intervals/crossing.glsl"
 
@@ -100,9 +101,9 @@ int cube_face(vec3 from_light) {
 // is in between. The texel around the point tells it. Only next to a silhouette, where faces curve away within a texel,
 // the four texels around the point do, the more so the less steep their faces are.
 vec4 light_depth(int light, vec3 point) {
-    vec4 source = scatter_light_position[light];
+    vec4 source = light_position[light];
     vec4 views = scatter_light_views[light];  // number of the first, how many, texels along a side, first texel
-    int face = int(views.y) == 1 ? 0 : cube_face(point - source.xyz);
+    int face = int(abs(views.y)) == 1 ? 0 : cube_face(point - source.xyz);
     int view = int(views.x) + face;
     LightCells cells = LightCells(uint(views.w) + uint(face * int(views.z) * int(views.z)), int(views.z));
     vec4 here = vec4(point, 1.0);

@@ -39,7 +39,7 @@ vec3 step_shares(int i) {
 
 // Metres along the segment at a share of it, and how many there are to a share there: equal angles for a point light.
 vec2 metres_at_share(float share, int light, ViewRay ray, float metres) {
-    vec4 position = light < 0 ? vec4(0.0) : scatter_light_position[light];
+    vec4 position = light < 0 ? vec4(0.0) : light_position[light];
     if (march_rule != MARCH_EQUIANGULAR || position.w == 0.0) { return vec2(share, 1.0) * metres; }
     float closest = dot(position.xyz - ray.start, ray.direction);
     float height = max(length(position.xyz - ray.start - closest * ray.direction), 1e-6 * metres);
@@ -91,7 +91,7 @@ Marched march_pass(float turns[SLOTS], int variable, ViewRay ray, float metres, 
         if (max(seen.r, max(seen.g, seen.b)) < LEAST_SEEN) { continue; }
         if (variable >= 0) { source = vec3(0.0); }
         for (int light = 0; light < scatter_light_count; ++light) {
-            bool angular = march_rule == MARCH_EQUIANGULAR && scatter_light_position[light].w != 0.0;
+            bool angular = march_rule == MARCH_EQUIANGULAR && light_position[light].w != 0.0;
             if (angular ? light != variable : variable >= 0) { continue; }
             vec3 tau;
             vec4 lit = scattered_here(here, light, ray, at.x, tau);
@@ -108,7 +108,7 @@ Marched march_pass(float turns[SLOTS], int variable, ViewRay ray, float metres, 
 Marched marched(float turns[SLOTS], ViewRay ray, float metres, vec3 sigma, vec3 emission, vec3 before) {
     Marched sum = Marched(vec3(0.0), sigma * metres);
     for (int variable = -1; variable < scatter_light_count; ++variable) {
-        bool angular = march_rule == MARCH_EQUIANGULAR && scatter_light_position[max(variable, 0)].w != 0.0;
+        bool angular = march_rule == MARCH_EQUIANGULAR && light_position[max(variable, 0)].w != 0.0;
         if (variable >= 0 && !angular) { continue; }
         Marched pass = march_pass(turns, variable, ray, metres, sigma, emission, before);
         sum.color += pass.color;

@@ -17,7 +17,7 @@ HOST_ONLY = {
     "phase": {"parse_phase"},
     "color": {"to_hex"},
     "diffusion": {"haze_shares"},
-    "lights": {"light_cone"},
+    "light": {"light_cone"},
     "camera": {"check_size"},
     "tone": {"tone_curve"},
     "environment": {"filtered", "ggx_lobe", "parse_radiance", "radiance_harmonics"},

@@ -10,7 +10,7 @@ import pytest
 
 import translucent as tl
 from tests import references
-from translucent.formulas.lights import cone_attenuation
+from translucent.formulas.light import cone_attenuation
 from translucent.geometry.solids import Box, Sphere
 from translucent.reference import path_trace
 

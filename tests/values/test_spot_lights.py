@@ -15,7 +15,7 @@ import translucent as tl
 from translucent.diffusion.field import DiffusingBody, lit_body
 from translucent.diffusion.keys import diffusion_key
 from translucent.diffusion.volume import _mean_shares
-from translucent.formulas.lights import ALL_AROUND, cone_attenuation, light_cone
+from translucent.formulas.light import ALL_AROUND, cone_attenuation, light_cone
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.light_cameras import light_cameras
 

@@ -16,7 +16,7 @@ from translucent.arrays import Array, Integers, Mask
 from translucent.diffusion.grid import plane_points
 from translucent.diffusion.photon_surfaces import AIR, Met, PhotonSurfaces
 from translucent.formulas import optics
-from translucent.formulas.lights import cone_attenuation
+from translucent.formulas.light import cone_attenuation
 from translucent.planning.photon_aims import PhotonAim, photon_aims
 from translucent.scene.scene import Scene
 

@@ -23,7 +23,7 @@ from translucent.diffusion.photon_fluence import FineCells
 from translucent.diffusion.sweeps import condensed, swept
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffusion_coefficient
-from translucent.formulas.lights import cone_attenuation
+from translucent.formulas.light import cone_attenuation
 from translucent.geometry.embree import EmbreeMesh
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight, SpotLight

@@ -129,15 +129,19 @@ SURFACES = UniformBlock(
     ),
 )
 
-#: Per frame: lights on opaque objects.
+#: Per frame: the lights.
 LIGHTS = UniformBlock(
     "Lights",
     4,
     (
-        ("light_position", "f4", (MAX_LIGHTS, 4)),  # from the eye, w = 1; or direction to the light, w = 0
+        (
+            "light_position",
+            "f4",
+            (MAX_LIGHTS, 4),
+        ),  # from the center of the media, w = 1; direction to it, w = 0
         ("light_power", "f4", (MAX_LIGHTS, 4)),  # intensity or irradiance
         ("light_cone", "f4", (MAX_LIGHTS, 4)),  # as cone_attenuation takes it
-        ("light_count", "i4", ()),
+        ("light_count", "i4", ()),  # that surfaces are lit by
     ),
 )
 
@@ -174,14 +178,8 @@ SCATTER = UniformBlock(
         ("scatter_up", "f4", (4,)),
         ("scatter_off_axis", "f4", (4,)),  # from the camera's axis to the center
         ("scatter_near", "f4", (4,)),  # metres of axial depth 0 ahead of the eye; ahead of the center; 1 in perspective
-        ("scatter_light_position", "f4", (MAX_SCATTER_LIGHTS, 4)),  # position, w = 1; or direction to the light, w = 0
-        ("scatter_light_power", "f4", (MAX_SCATTER_LIGHTS, 4)),  # intensity or irradiance; w: 1 if inside a body
-        ("scatter_light_cone", "f4", (MAX_SCATTER_LIGHTS, 4)),  # as cone_attenuation takes it
-        (
-            "scatter_light_views",
-            "f4",
-            (MAX_SCATTER_LIGHTS, 4),
-        ),  # first view, how many, texels along a side, first texel
+        # First view; how many, negative where the light is inside a body; texels along a side; first texel
+        ("scatter_light_views", "f4", (MAX_SCATTER_LIGHTS, 4)),
         ("scatter_views", "f4", (4 * MAX_LIGHT_VIEWS, 4)),  # rows of x, y, w and axial depth, from a position
         ("gauss", "f4", (MAX_LIGHT_POINTS, 4)),  # points in 0..1 and their weights
         ("gauss_count", "i4", ()),

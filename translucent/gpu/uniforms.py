@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.diffuse_interface import diffuse_interface
-from translucent.formulas.lights import ALL_AROUND
+from translucent.formulas.light import ALL_AROUND
 from translucent.formulas.two_stream import two_stream_absorption, two_stream_scattering
 from translucent.gpu.balance import Balance
 from translucent.gpu.body_uniforms import MAX_SCENE_OPTICAL_DEPTH, bounded_extinction
@@ -37,7 +37,7 @@ from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import PositionalLight
-from translucent.scene.scene import Light, Object, Scene
+from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import SMOOTH
 
 #: Optical depth, across the scene, of what stops the straight light of lamps.
@@ -155,12 +155,9 @@ def scatter_uniforms(
     """
     scene, camera, media = placed.scene, placed.scene.camera, placed.media
     half_width, half_height = camera.half_extent(size)
-    seen = scene.lights[: len(lights.spans)]
-    position, power, cone = light_records(seen, lights.center, MAX_SCATTER_LIGHTS)
     spans = np.zeros((MAX_SCATTER_LIGHTS, 4))
-    for i in range(len(seen)):
-        power[i, 3] = lights.inside[i]
-        spans[i] = lights.spans[i]
+    spans[: len(lights.spans)] = lights.spans
+    spans[: len(lights.spans), 1] *= np.where(lights.inside, -1.0, 1.0)
     rows = np.zeros((4 * MAX_LIGHT_VIEWS, 4))
     rows[: len(lights.rows)] = lights.rows
     gauss = np.zeros((MAX_LIGHT_POINTS, 4))
@@ -175,14 +172,11 @@ def scatter_uniforms(
         scatter_up=[*(camera.up * half_height), 0.0],
         scatter_off_axis=[*off_axis, 0.0],
         scatter_near=[media.near, media.near - float(center @ camera.forward), float(camera.fov_y is not None), 0.0],
-        scatter_light_position=position,
-        scatter_light_power=power,
-        scatter_light_cone=cone,
         scatter_light_views=spans,
         scatter_views=rows,
         gauss=gauss,
         gauss_count=points,
-        scatter_light_count=len(seen),
+        scatter_light_count=len(lights.spans),
         stopping_slots=stopping,
         stopping_extinction=STOPPING / scene.diagonal,
     )
@@ -194,31 +188,26 @@ def slot_bits(count: int) -> int:
 
 
 def light_uniforms(scene: Scene, shine: bool) -> bytes:
-    """Contents of the Lights block: none where there is nothing opaque that they could shine on.
+    """Contents of the Lights block; none of them lights surfaces where there are none that they could shine on.
 
     Raises
     ------
     InputError
         If there are more lights than the block holds.
     """
-    lights = scene.lights if shine else ()
-    if len(lights) > MAX_LIGHTS:
-        raise InputError("lighting opaque objects", f"{len(lights)} lights", f"use at most {MAX_LIGHTS}")
-    position, power, cone = light_records(lights, scene.camera.eye, MAX_LIGHTS)
-    return LIGHTS.pack(light_position=position, light_power=power, light_cone=cone, light_count=len(lights))
-
-
-def light_records(lights: Sequence[Light], origin: Array, most: int) -> tuple[Array, Array, Array]:
-    """(most, 4) each: positions from an origin, w = 1, or directions to the light, w = 0; powers; and cones."""
-    position, power = np.zeros((2, most, 4))
-    cone = np.tile(ALL_AROUND, (most, 1))
+    if shine and len(scene.lights) > MAX_LIGHTS:
+        raise InputError("lighting opaque objects", f"{len(scene.lights)} lights", f"use at most {MAX_LIGHTS}")
+    lights, center = scene.lights[:MAX_LIGHTS], media_center(scene)
+    position, power = np.zeros((2, MAX_LIGHTS, 4))
+    cone = np.tile(ALL_AROUND, (MAX_LIGHTS, 1))
     for i, light in enumerate(lights):
         if isinstance(light, PositionalLight):
-            position[i], power[i, :3] = [*(np.asarray(light.position) - origin), 1.0], light.intensity
+            position[i], power[i, :3] = [*(np.asarray(light.position) - center), 1.0], light.intensity
             cone[i] = light.cone
         else:
             position[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
-    return position, power, cone
+    count = len(lights) if shine else 0
+    return LIGHTS.pack(light_position=position, light_power=power, light_cone=cone, light_count=count)
 
 
 def shade_uniforms(scene: Scene, balance: Balance) -> bytes:

@@ -30,7 +30,6 @@ from translucent.page.container import LIGHT_BITS, Container
 from translucent.page.meshes import mesh_told, name_of
 from translucent.page.plans import PagePlan
 from translucent.page.variants import current, editable, variant
-from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Scene
 from translucent.version import VERSION
 
@@ -186,10 +185,6 @@ def _scene_told(planned: PagePlan, size: tuple[int, int], gl: RecordingContext) 
         "center": media_center(scene).tolist(),
         "first_body": numbers[0],
         "first_throwing": throwing[0],
-        "lights": [
-            {"position": np.asarray(light.position, np.float64).tolist()} if isinstance(light, PositionalLight) else {}
-            for light in scene.lights
-        ],
         "media": [_medium_told(planned, medium) for medium in media],
         "objects": [
             {

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from translucent.arrays import Array
-from translucent.formulas.lights import ALL_AROUND
+from translucent.formulas.light import ALL_AROUND
 from translucent.planning.bodies import indices
 from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Object, Scene
@@ -36,7 +36,7 @@ class PhotonAim:
     weight : float
         Share of the photons, up to a factor.
     cone : (4,) float64
-        In which the light shines, as `translucent.formulas.lights.cone_attenuation` takes it.
+        In which the light shines, as `translucent.formulas.light.cone_attenuation` takes it.
     inside : tuple of int
         Numbers of the bodies that the light is in.
     photons : int

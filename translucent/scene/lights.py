@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
-from translucent.formulas.lights import ALL_AROUND, cone_attenuation, light_cone
+from translucent.formulas.light import ALL_AROUND, cone_attenuation, light_cone
 from translucent.scene.camera import MAX_COORDINATE
 
 #: Largest radiance, intensity or irradiance: its products with lengths stay within float32.
@@ -36,7 +36,7 @@ class PositionalLight(Frozen):
 
     @property
     def cone(self) -> Array:
-        """(4,): cone in which it shines, as `translucent.formulas.lights.cone_attenuation` takes it."""
+        """(4,): cone in which it shines, as `translucent.formulas.light.cone_attenuation` takes it."""
         return np.array(ALL_AROUND)
 
     @property
@@ -131,7 +131,7 @@ class SpotLight(PositionalLight):
 
     @cached_property
     def cone(self) -> Array:
-        """(4,): cone in which it shines, as `translucent.formulas.lights.cone_attenuation` takes it."""
+        """(4,): cone in which it shines, as `translucent.formulas.light.cone_attenuation` takes it."""
         cone = light_cone(self.direction, math.radians(self.inner_cone), math.radians(self.outer_cone))
         cone.setflags(write=False)
         return cone

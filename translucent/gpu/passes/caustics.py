@@ -113,7 +113,7 @@ class CausticsPass:
             UNION=scene.overlap == "union",
             EMISSION=False,
             FROM_EYE=False,
-            LAMPS=False,
+            LIGHTS=False,
             ROUGH=any(surface.roughness > 0 for surface in surfaces),
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
         )

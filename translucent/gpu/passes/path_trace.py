@@ -255,7 +255,7 @@ class PathTracer:
             UNION=scene.overlap == "union",
             SCATTER=any(medium.scatters for medium in media),
             EMISSION=any(medium.emits for medium in media),
-            LAMPS=bool(scene.lights),
+            LIGHTS=bool(scene.lights),
             ROUGH=any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies),
             DISPERSION=False,
             OPAQUE=job.features.has_opaque,

@@ -187,11 +187,6 @@ export function writeBlocks({ scene, meshes, variant, blocks, bodies, camera, si
       scene.diagonal);
   });
   if (blocks.Surfaces) surfacesBlock(blocks.Surfaces, scene, camera, size, media);
-  if (blocks.Lights) {
-    scene.lights.forEach((light, i) => {
-      if (light.position) blocks.Lights.light_position.set([...minus(light.position, camera.eye), 1], 4 * i);
-    });
-  }
   const pairs = placements.map((item, i) => item.expected.map((n) => n * variant.roles[i].weight));
   if (blocks.Shade) {
     const sheets = variant.makes_sheets;

@@ -1,4 +1,4 @@
-"""Formulas of lamps, in float64. Each has a twin of the same name in ``shaders/lib/lights.glsl``.
+"""Formulas of lights, in float64. Each has a twin of the same name in ``shaders/lib/light.glsl``.
 
 References
 ----------
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 
-#: Cone of a lamp that shines alike in all directions; see `light_cone`.
+#: Cone of a light that shines alike in all directions; see `light_cone`.
 ALL_AROUND = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -28,7 +28,7 @@ def light_cone(direction: npt.ArrayLike, inner: float, outer: float) -> Array:
 
 
 def cone_attenuation(travel: npt.ArrayLike, cone: npt.ArrayLike) -> Array:
-    """Share of a lamp's intensity in the unit directions `travel` (..., 3): (...).
+    """Share of a light's intensity in the unit directions `travel` (..., 3): (...).
 
     KHR_lights_punctual: the square of (cos - cos outer) / (cos inner - cos outer), within 0 to 1. Cosines come from
     chords, 1 - cos = |travel - direction|^2 / 2, which have their digits in narrow cones, too.

@@ -1,29 +1,9 @@
-// Light of point, spot and directional lights that comes straight to a place: through media, and interfaces that bend nothing.
-// No path finds what polished interfaces bend of it. Needs <Lights>, <Surfaces>, <View>, place.glsl and what that needs.
+// Light of the scene's lights that comes straight to a place: through media, and interfaces that bend nothing. No path finds
+// what polished interfaces bend of it. Needs shade/lights.glsl, <Surfaces>, <View>, place.glsl and what that needs.
 
-#include "lib/lights.glsl"
-
-struct Lamp {
-    vec3 towards;     // unit
-    float distance_m;
-    vec3 irradiance;  // on what faces it, if nothing is between
-};
-
-Lamp lamp_at(int number, vec3 point) {
-    vec4 at = light_position[number];
-    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
-    vec3 way = at.xyz - at.w * from_eye;
-    float distance_m = max(length(way), 1e-18);
-    vec3 towards = way / distance_m;
-    vec3 irradiance = light_power[number].rgb;
-    if (at.w == 0.0) { return Lamp(towards, NOTHING, irradiance); }
-    irradiance *= cone_attenuation(-towards, light_cone[number]);
-    return Lamp(towards, distance_m, irradiance / distance_m / distance_m);
-}
-
-// Share of a lamp's light that arrives straight. skipped: metres between the place and the origin, which lies beside a
+// Transmittance of the straight way to a light. skipped: metres between the place and the origin, which lies beside a
 // surface that is not to be met.
-vec3 straight_share(vec3 origin, float skipped, uvec4 record, vec3 towards, float distance_m, int channel) {
+vec3 straight_transmittance(vec3 origin, float skipped, uvec4 record, vec3 towards, float distance_m, int channel) {
     vec3 share = vec3(1.0);
     for (int surface = 0; surface < MOST_STEPS; ++surface) {
         int before = dominant_body(record);
