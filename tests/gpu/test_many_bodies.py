@@ -14,7 +14,7 @@ from translucent.gpu import shadow_cameras
 from translucent.gpu.balance import face_counts
 from translucent.gpu.body_uniforms import BodyRoles, body_records, clip_rows
 from translucent.gpu.constants import RECORD_SIZE
-from translucent.gpu.light_cameras import outermost
+from translucent.gpu.light_cameras import support_of
 from translucent.gpu.placement import PlacedScene, SampleView
 from translucent.gpu.shadow_cameras import ShadowThrowers
 
@@ -92,7 +92,7 @@ def _floor(count: int) -> tuple[tl.Scene, ShadowThrowers]:
     ball = tl.Object(BOX, WINE, trimesh.transformations.translation_matrix((2, 0.5, 1)))
     given = tl.Scene([*tiles, ball], tl.Camera.look_at((0, 0, 20), (0, 0, 0)))
     lamp = tl.PointLight((1, 1, 9), 1.0)
-    return given, ShadowThrowers(lamp, given, [outermost(item) for item in given.objects])
+    return given, ShadowThrowers(lamp, given, [support_of(item) for item in given.objects])
 
 
 def test_tiles_that_shadow_none_are_found_in_linear_time() -> None:

@@ -14,7 +14,7 @@ import trimesh
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.geometry.solids import Box, Sphere
-from translucent.gpu.light_cameras import outermost
+from translucent.gpu.light_cameras import support_of
 from translucent.gpu.shadow_atlas import LEAST_TEXELS, MOST_BYTES, ShadowViews
 from translucent.gpu.shadow_cameras import ShadowThrowers
 from translucent.planning.mirrors import lit_side
@@ -117,7 +117,7 @@ def test_each_texel_has_the_transmittance_of_its_ray(renderer: tl.Renderer, mesh
     item = tl.Object(body, tl.Medium(absorption=np.array([1, 2, 4]) / diagonal))
     shown = tl.Scene([item, floor], CAMERA, [lamps[light]], DARK)
     renderer.render(shown, (8, 8), shadows=tl.ShadowMaps(size))
-    camera = ShadowThrowers(lamps[light], shown, [outermost(item) for item in shown.objects]).cameras()[0]
+    camera = ShadowThrowers(lamps[light], shown, [support_of(item) for item in shown.objects]).cameras()[0]
     origins, ways = camera.rays((size, size))
     ways = np.broadcast_to(ways, (size, size, 3))
     path = _held(renderer)[::-1, :, 0] * np.linalg.norm(ways / (ways @ camera.forward)[..., None], axis=-1)
@@ -407,12 +407,12 @@ def test_other_choices_of_shadows_are_refused(renderer: tl.Renderer) -> None:
 
 def test_grounds_are_not_in_the_way() -> None:
     """A floor is none of what throws shadows, unless it is lit from behind; a bowl that shadows itself does."""
-    corners = [outermost(item) for item in (SCENES["ball"]["objects"])]
+    supports = [support_of(item) for item in (SCENES["ball"]["objects"])]
     shown = scene("ball", "sun")
-    found = ShadowThrowers(SUN, shown, corners)
+    found = ShadowThrowers(SUN, shown, supports)
     assert found.grounds == (1,)
     assert not found.in_the_way
-    below = ShadowThrowers(tl.DirectionalLight((0, 1, 0.2), (1, 1, 1)), shown, corners)
+    below = ShadowThrowers(tl.DirectionalLight((0, 1, 0.2), (1, 1, 1)), shown, supports)
     assert below.in_the_way == (1,)
     stone = replace(shown, objects=[*shown.objects, STONE])
-    assert ShadowThrowers(SUN, stone, [outermost(item) for item in stone.objects]).in_the_way == (2,)
+    assert ShadowThrowers(SUN, stone, [support_of(item) for item in stone.objects]).in_the_way == (2,)

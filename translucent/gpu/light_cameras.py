@@ -7,12 +7,12 @@ media, where their texels count, and maps all that throws shadows, large as it m
 from __future__ import annotations
 
 import weakref
-from weakref import WeakKeyDictionary
+from collections.abc import Sequence
 
 import numpy as np
 
 from translucent.arrays import Array
-from translucent.geometry.mesh import Mesh
+from translucent.geometry.support import Support, largest_of
 from translucent.scene.camera import Camera
 from translucent.scene.lights import DirectionalLight, SpotLight
 from translucent.scene.scene import Light, Object, Scene
@@ -37,38 +37,18 @@ def media_sphere(scene: Scene) -> tuple[Array, float]:
     return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) or 1.0
 
 
-#: Vertices from which on it pays to load SciPy and find those of the convex hull.
-_MANY = 1 << 14
-
-_HULLS: WeakKeyDictionary[Mesh, Array] = WeakKeyDictionary()
-
-
-def outermost(item: Object) -> Array:
-    """(n, 3): vertices of an object in the world, but for those inside the convex hull of many."""
-    return _outermost(item.mesh) @ item.matrix[:3, :3].T + item.matrix[:3, 3]
-
-
-def _outermost(mesh: Mesh) -> Array:
-    if len(mesh.vertices) < _MANY:
-        return mesh.vertices
-    if mesh not in _HULLS:
-        from scipy.spatial import ConvexHull, QhullError
-
-        try:
-            _HULLS[mesh] = mesh.vertices[ConvexHull(mesh.vertices).vertices]
-        except QhullError:  # flat
-            _HULLS[mesh] = mesh.vertices
-    return _HULLS[mesh]
+def support_of(item: Object) -> Support:
+    """Support of an object in the world."""
+    return Support(item.mesh, item.matrix)
 
 
 def light_cameras(light: Light, scene: Scene) -> list[Camera]:
     """Cameras of a light: one that sees all media, or six where the light is among them or close by."""
-    points = np.concatenate([outermost(body) for body in scene.bodies])
-    return cameras_towards(points, light, *media_sphere(scene))
+    return cameras_towards([support_of(body) for body in scene.bodies], light, *media_sphere(scene))
 
 
-def cameras_towards(points: Array, light: Light, center: Array, radius: float) -> list[Camera]:
-    """Cameras of a light: one that sees points (n, 3) in a ball, or six where the light is among or near them.
+def cameras_towards(supports: Sequence[Support], light: Light, center: Array, radius: float) -> list[Camera]:
+    """Cameras of a light: one that sees objects in a ball, or six where the light is among or near them.
 
     One of a spot may see the cone alone, where that is narrower.
     """
@@ -76,8 +56,13 @@ def cameras_towards(points: Array, light: Light, center: Array, radius: float) -
         direction = np.asarray(light.direction)
         eye = center - 2.0 * radius * direction
         pose = Camera.orthographic(eye, center, up=_any_up(direction)).pose
-        across = pose[:3, :2].T @ points.T
-        low, high = (bound - pose[:3, :2].T @ center for bound in (across.min(axis=1), across.max(axis=1)))
+
+        def across(points: Array) -> Array:
+            sides = pose[:3, :2].T @ points.T
+            return np.concatenate([-sides, sides]).T
+
+        ends = largest_of(supports, across)
+        low, high = (bound - pose[:3, :2].T @ center for bound in (-ends[:2], ends[2:]))
         middle, extent = 0.5 * (low + high), float((high - low).max()) or radius
         eye = eye + pose[:3, :2] @ middle
         return [Camera.orthographic(eye, eye + direction, up=_any_up(direction), height=extent * _MARGIN)]
@@ -87,11 +72,16 @@ def cameras_towards(points: Array, light: Light, center: Array, radius: float) -
     widest = _WIDEST if found is None or found.fov_y is None else found.fov_y
     if (distance := float(np.linalg.norm(towards))) > 0:
         pose = Camera.look_at(position, center, up=_any_up(towards)).pose
-        seen = (points - position) @ pose[:3, :3]  # right, up, backward
-        if (seen[:, 2] < 0).all():
-            tangent = float((np.abs(seen[:, :2]) / -seen[:, 2:]).max()) * _MARGIN
-            if (angle := 2.0 * float(np.degrees(np.arctan(tangent)))) < widest:
-                return [Camera.look_at(position, center, up=_any_up(towards), fov_y=max(angle, _NARROWEST))]
+
+        def tangents(points: Array) -> Array:
+            seen = (points - position) @ pose[:3, :3]  # right, up, backward
+            aside, ahead = np.abs(seen[:, :2]).max(axis=1), -seen[:, 2]
+            with np.errstate(over="ignore"):
+                return np.asarray(np.divide(aside, ahead, out=np.full(len(seen), np.inf), where=ahead > 0.0)[:, None])
+
+        tangent = float(largest_of(supports, tangents)[0]) * _MARGIN
+        if (angle := 2.0 * float(np.degrees(np.arctan(tangent)))) < widest:
+            return [Camera.look_at(position, center, up=_any_up(towards), fov_y=max(angle, _NARROWEST))]
     if found is not None:
         return [found]
     reach = max(distance, radius)

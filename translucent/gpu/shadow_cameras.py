@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from translucent.arrays import Array, Mask
+from translucent.geometry.support import Support, largest_of
 from translucent.gpu.light_cameras import cameras_towards
 from translucent.scene.camera import Camera
 from translucent.scene.lights import DirectionalLight
@@ -60,6 +61,44 @@ class _Stack:
         return np.logical_and.reduceat(which, self._starts) if self._starts else which[:0]
 
 
+class _Supports:
+    """Supports of many objects: the points of small ones in one array."""
+
+    def __init__(self) -> None:
+        self._few, self._many, self._small = _Stack(3), list[tuple[int, Support]](), list[int]()
+        self.count = 0
+
+    def add(self, support: Support) -> None:
+        """Add that of an object."""
+        number = len(self._small) + len(self._many)
+        if support.many:
+            self._many.append((number, support))
+        else:
+            self._small.append(number)
+            self._few.add(support.points)
+        self.count += support.count
+
+    def ahead(self, planes: Array, slack: float) -> Mask:
+        """(objects, faces): whether all of an object is before each of the planes (faces, 4)."""
+        found = np.empty((len(self._small) + len(self._many), len(planes)), dtype=bool)
+        found[self._small] = self._few.every(_distances(self._few.rows, planes) >= -slack)
+        for number, support in self._many:
+            found[number] = _ahead(support, planes, slack)
+        return found
+
+
+def _distances(points: Array, planes: Array) -> Array:
+    """(n, faces): distances of points (n, 3) before planes (faces, 4)."""
+    return np.asarray(points @ planes[:, :3].T - planes[:, 3])
+
+
+def _ahead(support: Support, planes: Array, slack: float) -> Mask:
+    """(faces,): whether all of an object is before planes (faces, 4), but for rounding."""
+    if not support.many:
+        return np.asarray((_distances(support.points, planes) >= -slack).all(axis=0))
+    return np.asarray(-support.largest(lambda points: -_distances(points, planes)) >= -slack)
+
+
 @dataclass(frozen=True, eq=False)
 class _Sides:
     """Planes of the faces of an object: normal, and its product with a point of the face.
@@ -83,8 +122,8 @@ class ShadowThrowers:
     ----------
     light : Light
     scene : Scene
-    corners : sequence of (n, 3) float64
-        Of its objects, as `outermost` gives them.
+    supports : sequence of Support
+        Of its objects.
 
     Attributes
     ----------
@@ -95,35 +134,33 @@ class ShadowThrowers:
         everything is.
     """
 
-    def __init__(self, light: Light, scene: Scene, corners: Sequence[Array]) -> None:
-        self._light, self._scene, self._corners = light, scene, corners
+    def __init__(self, light: Light, scene: Scene, supports: Sequence[Support]) -> None:
+        self._light, self._scene, self._supports = light, scene, supports
         self._sides: dict[int, _Sides] = {}
+        self._slack = _BEHIND * scene.diagonal
         self.grounds = self._found_grounds()
-        everything = _Stack(3)
-        for points in corners:
-            everything.add(points)
-        shadowed = {i for i in self.grounds if not self._lights(i, everything, range(len(corners)))}
+        everything = _Supports()
+        for support in supports:
+            everything.add(support)
+        shadowed = {i for i in self.grounds if not self._lights(i, everything, range(len(supports)))}
         opaque = set(np.flatnonzero(~scene.filled).tolist())
         self.in_the_way = tuple(sorted(opaque - set(self.grounds) | shadowed))
 
     def cameras(self) -> list[Camera]:
         """Cameras of the light that see all but the grounds; what they do not see is lit."""
         grounds = set(self.grounds)
-        throwing = [points for i, points in enumerate(self._corners) if i not in grounds]
+        throwing = [support for i, support in enumerate(self._supports) if i not in grounds]
         if not throwing:
             return []
-        points = np.concatenate(throwing)
-        low, high = (
-            np.min([part.T.min(axis=1) for part in throwing], axis=0),
-            np.max([part.T.max(axis=1) for part in throwing], axis=0),
-        )
+        bounds = np.array([support.bounds for support in throwing])
+        low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
         radius = 0.5 * float(np.linalg.norm(high - low)) or self._scene.diagonal or 1.0
-        cameras = cameras_towards(points, self._light, 0.5 * (low + high), radius)
+        cameras = cameras_towards(throwing, self._light, 0.5 * (low + high), radius)
         if not isinstance(self._light, DirectionalLight):
             return cameras
         # Grounds may be nearer to the light: they end its rays there.
         (camera,) = cameras
-        nearer = max(float(((camera.eye - corners) @ camera.forward).max()) for corners in self._corners)
+        nearer = float(largest_of(self._supports, lambda points: ((camera.eye - points) @ camera.forward)[:, None])[0])
         pose = camera.pose.copy()
         pose[:3, 3] -= max(nearer, 0.0) * camera.forward
         return [replace(camera, pose=pose)]
@@ -131,40 +168,41 @@ class ShadowThrowers:
     def _found_grounds(self) -> tuple[int, ...]:
         """Numbers of the grounds."""
         grounds: list[int] = []
-        points, planes, most_faces = _Stack(3), _Stack(4), 0
+        found, planes, most_faces = _Supports(), _Stack(4), 0
         # Large ones first: leaving those out makes the texels of maps smaller.
         sizes = {
-            i: -float(np.ptp(self._corners[i], axis=0).max()) for i in np.flatnonzero(~self._scene.filled).tolist()
+            i: -float(np.ptp(self._supports[i].bounds, axis=0).max())
+            for i in np.flatnonzero(~self._scene.filled).tolist()
         }
         for i in sorted(sizes, key=sizes.__getitem__):
-            faces, own = len(self._scene.objects[i].mesh.faces), self._corners[i]
-            if max(faces * (len(points) + len(own)), most_faces * len(own)) > _MOST_PAIRS:
+            faces, own = len(self._scene.objects[i].mesh.faces), self._supports[i]
+            if max(faces * (found.count + own.count), most_faces * own.count) > _MOST_PAIRS:
                 continue
-            if not self._lights_one(i, i) or not self._lights(i, points, grounds):
+            if not self._lights_one(i, i) or not self._lights(i, found, grounds):
                 continue
-            before = planes.every(np.asarray(self._ahead(own, planes.rows).all(axis=0)))
+            before = planes.every(_ahead(own, planes.rows, self._slack))
             if not all(self._lights_one(grounds[k], i) for k in np.flatnonzero(~before).tolist()):
                 continue
             grounds.append(i)
-            points.add(own)
+            found.add(own)
             planes.add(self._sides_of(i).planes)
             most_faces = max(most_faces, faces)
             if len(grounds) == MOST_GROUNDS:
                 break
         return tuple(grounds)
 
-    def _lights(self, ground: int, points: _Stack, others: Sequence[int]) -> bool:
-        """True if an object shadows none of the others, whose corners are stacked; see `_lights_one`."""
+    def _lights(self, ground: int, supports: _Supports, others: Sequence[int]) -> bool:
+        """True if an object shadows none of the others, whose supports these are; see `_lights_one`."""
         item = self._scene.objects[ground]
-        if len(item.mesh.faces) * len(points) > _MOST_PAIRS:
+        if len(item.mesh.faces) * supports.count > _MOST_PAIRS:
             return False
         sides = self._sides_of(ground)
-        lit = points.every(np.asarray(self._ahead(points.rows, sides.planes).all(axis=1)))
+        lit = supports.ahead(sides.planes, self._slack).all(axis=1)
         if lit.all():
             return True
         if not self._turns_once(item):
             return False
-        lit |= points.every(self._ahead(points.rows, sides.lit)).any(axis=1)
+        lit |= supports.ahead(sides.lit, self._slack).any(axis=1)
         return all(others[k] == ground for k in np.flatnonzero(~lit).tolist())
 
     def _lights_one(self, ground: int, other: int) -> bool:
@@ -172,21 +210,17 @@ class ShadowThrowers:
         one that the eye is not in, of some face.
         """
         item = self._scene.objects[ground]
-        sides, points = self._sides_of(ground), self._corners[other]
-        if self._ahead(points, sides.planes).all():
+        sides, support = self._sides_of(ground), self._supports[other]
+        if _ahead(support, sides.planes, self._slack).all():
             return True
         if not self._turns_once(item):
             return False
         # Of a convex body what faces the light is lit.
-        return other == ground or bool(self._ahead(points, sides.lit).all(axis=0).any())
+        return other == ground or bool(_ahead(support, sides.lit, self._slack).any())
 
     def _turns_once(self, item: Object) -> bool:
         """True if an object is convex, and seen from outside alone."""
         return item.mesh.diagnosis.convex and not holds_eye(item, self._scene)
-
-    def _ahead(self, points: Array, planes: Array) -> Mask:
-        """(n, faces): whether points (n, 3) are before planes (faces, 4), but for rounding."""
-        return np.asarray(points @ planes[:, :3].T - planes[:, 3] >= -_BEHIND * self._scene.diagonal)
 
     def _sides_of(self, number: int) -> _Sides:
         """Planes of the faces of an object."""

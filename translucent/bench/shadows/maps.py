@@ -16,7 +16,7 @@ from translucent.bench.timing import Sample, Samples, interleaved
 from translucent.errors import RenderError
 from translucent.frames.metrics import interior
 from translucent.gpu.job import FrameJob
-from translucent.gpu.light_cameras import outermost
+from translucent.gpu.light_cameras import support_of
 from translucent.gpu.passes.depth_only import DepthOnlyPass
 from translucent.gpu.passes.shortcuts import HalfFloatPass
 from translucent.gpu.shadow_cameras import ShadowThrowers
@@ -30,7 +30,7 @@ from translucent.scene.scene import Scene
 
 def map_camera(scene: Scene) -> Camera:
     """Camera of the one map of a scene with one light; raises `RenderError` if there are more."""
-    cameras = ShadowThrowers(scene.lights[0], scene, [outermost(item) for item in scene.objects]).cameras()
+    cameras = ShadowThrowers(scene.lights[0], scene, [support_of(item) for item in scene.objects]).cameras()
     if len(cameras) != 1:
         raise RenderError("a map of shadows", f"its light has {len(cameras)}", "move it away from what it lights")
     return cameras[0]

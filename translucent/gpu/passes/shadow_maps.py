@@ -18,7 +18,7 @@ from translucent.gpu.compile_budget import before_making
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
-from translucent.gpu.light_cameras import light_key, objects_key, outermost
+from translucent.gpu.light_cameras import light_key, objects_key, support_of
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
 from translucent.gpu.passes.opaque import OpaquePass
@@ -216,9 +216,9 @@ class ShadowMapsPass:
         key = seen.places, seen.step, in_place
         if self._placed is None or self._placed[0] != key:
             scene = job.scene
-            corners = [outermost(item) for item in scene.objects]
+            supports = [support_of(item) for item in scene.objects]
             lights, sky = (
-                [ShadowThrowers(light, scene, corners) for light in group]
+                [ShadowThrowers(light, scene, supports) for light in group]
                 for group in (scene.lights, _sky_lights(scene)[:: seen.step])
             )
             seen_by, seen_from_sky = (
