@@ -28,21 +28,21 @@ from translucent.scene.scene import Light
 
 
 @dataclass(frozen=True, eq=False)
-class Legs:
-    """Ray segments: straight parts of refracted rays.
+class LiveRays:
+    """Rays that are still followed: the current straight segments of paths that refract and reflect.
 
     Attributes
     ----------
     rays : Rays
-        From where each begins.
+        Origin and direction of each segment.
     owner : (k,) int64
-        Number of the ray of the picture that it is a part of.
+        Number of the ray of the picture that the path belongs to.
     throughput : (k, 3) float64
-        Share of its light that reaches the eye.
+        Product of all factors along the path so far.
     inside : Inside
-        What it begins in.
+        Interior list at the origin.
     bent : (k,) bool
-        Whether it has met an interface.
+        Whether an interface has changed the direction.
     reflected : (k,) bool
         Whether an interface has reflected it.
     """
@@ -57,10 +57,10 @@ class Legs:
     def __len__(self) -> int:
         return len(self.owner)
 
-    def where(self, chosen: Integers | Mask) -> Legs:
+    def where(self, chosen: Integers | Mask) -> LiveRays:
         """Selection of ray segments by indices or a mask."""
         index = np.flatnonzero(chosen) if chosen.dtype == bool else np.asarray(chosen, np.int64)
-        return Legs(
+        return LiveRays(
             self.rays.where(index),
             self.owner[index],
             self.throughput[index],
@@ -69,15 +69,17 @@ class Legs:
             self.reflected[index],
         )
 
-    def turned(self, directions: Array, share: Array, inside: Inside, *, bent: bool, reflected: Mask | bool) -> Legs:
+    def turned(
+        self, directions: Array, share: Array, inside: Inside, *, bent: bool, reflected: Mask | bool
+    ) -> LiveRays:
         """Ray segments from the same origins in other directions (k, 3), with a share (k, 3) of the light."""
         rays = Rays(self.rays.origins, directions, self.rays.backdrop)
         with np.errstate(under="ignore"):
             throughput = self.throughput * share
-        return Legs(rays, self.owner, throughput, inside, self.bent | bent, self.reflected | reflected)
+        return LiveRays(rays, self.owner, throughput, inside, self.bent | bent, self.reflected | reflected)
 
 
-def joined(parts: Sequence[Legs]) -> Legs:
+def joined(parts: Sequence[LiveRays]) -> LiveRays:
     """Concatenate ray segments; at least one part."""
     rays = Rays(
         np.concatenate([part.rays.origins for part in parts]),
@@ -87,7 +89,7 @@ def joined(parts: Sequence[Legs]) -> Legs:
     inside = Inside(
         np.concatenate([part.inside.windings for part in parts]), np.concatenate([part.inside.since for part in parts])
     )
-    return Legs(
+    return LiveRays(
         rays,
         np.concatenate([part.owner for part in parts]),
         np.concatenate([part.throughput for part in parts]),
@@ -107,48 +109,48 @@ class Outcome:
 
     Attributes
     ----------
-    branches : tuple of Legs
+    branches : tuple of LiveRays
         In which it goes on.
     radiance : (k, 3) float64
         That the interfaces add themselves.
     """
 
-    branches: tuple[Legs, ...]
+    branches: tuple[LiveRays, ...]
     radiance: Array
 
 
-class Meetings:
+class Interactions:
     """Ray segments that end at interfaces, and continue from there.
 
     Parameters
     ----------
     own : Optics
-    legs : Legs
+    live : LiveRays
         With their origins moved to the interfaces.
     interfaces : Interfaces
     light : SurfaceLight
         On paint, and mirrored in rough interfaces.
     rng : Generator, optional
         Chooses between reflection and refraction; without it both are followed.
-    lamps : StraightLight, optional
-        To add the light of `Scene.lights` that rough interfaces of solids turn into the legs, on either side, where
-        no interface on its way bends it. Without it, and by sheets, it is reflected once, and interfaces on its way do
-        not bend it.
+    lights : StraightLight, optional
+        Adds the light of `Scene.lights` that rough interfaces of solids scatter into the rays, on either side, where no
+        interface on its way bends it. Without it, and at sheets, that light is reflected once, and interfaces on its
+        way do not bend it.
     """
 
     def __init__(
         self,
         own: Optics,
-        legs: Legs,
+        live: LiveRays,
         interfaces: Interfaces,
         light: SurfaceLight,
         rng: np.random.Generator | None,
-        lamps: StraightLight | None = None,
+        lights: StraightLight | None = None,
     ) -> None:
-        self.own, self.legs, self.interfaces, self.light = own, legs, interfaces, light
-        self.rng, self.lamps = rng, lamps
-        self.normals, self.faces = interface_normals(own, interfaces, legs.rays.directions)
-        self.cosine = np.clip(-np.einsum("ki,ki->k", self.normals, legs.rays.directions), 0.0, 1.0)
+        self.own, self.live, self.interfaces, self.light = own, live, interfaces, light
+        self.rng, self.lights = rng, lights
+        self.normals, self.faces = interface_normals(own, interfaces, live.rays.directions)
+        self.cosine = np.clip(-np.einsum("ki,ki->k", self.normals, live.rays.directions), 0.0, 1.0)
         self.is_sheet = interfaces.before == interfaces.after
         beyond = np.where(self.is_sheet, interfaces.item, interfaces.after)
         self.ior = own.iors[beyond] / own.iors[interfaces.before]
@@ -169,15 +171,15 @@ class Meetings:
             (self.is_sheet & ~rough, self._at_sheets),
             (self.is_sheet & rough, self._at_rough_sheets),
         )
-        self.radiance = np.zeros((len(self.legs), 3))
-        self._add_highlights(np.flatnonzero(rough & (self.is_sheet | (self.lamps is None))))
-        branches: list[Legs] = []
+        self.radiance = np.zeros((len(self.live), 3))
+        self._add_highlights(np.flatnonzero(rough & (self.is_sheet | (self.lights is None))))
+        branches: list[LiveRays] = []
         for mask, method in ways:
             chosen = np.flatnonzero(mask)
             if chosen.size:
                 found, passed = method(chosen)
                 branches.extend(found)
-                self._add_paint(chosen, passed)
+                self._add_diffuse(chosen, passed)
         return Outcome(tuple(branches), self.radiance)
 
     def _table(self, name: str) -> Array:
@@ -190,10 +192,10 @@ class Meetings:
         enters = self.is_sheet[chosen] | (self.interfaces.item[chosen] == self.interfaces.after[chosen])
         return self.transmission[chosen] * np.where(enters[:, None], self.color[chosen], 1.0)
 
-    def _at_interfaces(self, chosen: Integers) -> tuple[list[Legs], Array]:
+    def _at_interfaces(self, chosen: Integers) -> tuple[list[LiveRays], Array]:
         """Branches at interfaces of solids, and the share (k, 1) of light that passes."""
-        legs, here, there = self.legs.where(chosen), self.interfaces.here, self.interfaces.there
-        directions, normals = legs.rays.directions, self.normals[chosen]
+        live, here, there = self.live.where(chosen), self.interfaces.here, self.interfaces.there
+        directions, normals = live.rays.directions, self.normals[chosen]
         back_way = reflected_direction(directions, normals)
         on_way = refracted_direction(directions, normals, self.ior[chosen])
         share_back = self._under_coat(chosen, self.reflectance[chosen])
@@ -208,21 +210,21 @@ class Meetings:
         back, on = np.flatnonzero((share_back > 0.0).any(axis=1)), np.flatnonzero((share_on > 0.0).any(axis=1))
         passing = (share_on * self._passing(chosen))[on]
         back_way, on_way = _towards(back_way, self.faces[chosen]), _towards(on_way, -self.faces[chosen])
-        reflected = legs.where(back).turned(
+        reflected = live.where(back).turned(
             back_way[back], share_back[back], here.where(chosen[back]), bent=True, reflected=True
         )
-        refracted = legs.where(on).turned(on_way[on], passing, there.where(chosen[on]), bent=True, reflected=False)
+        refracted = live.where(on).turned(on_way[on], passing, there.where(chosen[on]), bent=True, reflected=False)
         return [reflected, refracted], share_on
 
     def _at_microfacets(self, chosen: Integers, rng: np.random.Generator) -> tuple[Array, Mask]:
-        """Directions from rough interfaces, and whether they pass; adds the light of lamps."""
-        directions, normals, points = self.legs.rays.directions[chosen], self.normals[chosen], self.legs.rays.origins
-        lamps = None if self.lamps is None else self.lamps.at_interfaces(points[chosen])
+        """Directions from rough interfaces, and whether they pass; adds what lights emit."""
+        directions, normals, points = self.live.rays.directions[chosen], self.normals[chosen], self.live.rays.origins
+        lights = None if self.lights is None else self.lights.at_interfaces(points[chosen])
         found = directions, normals, self.ior[chosen], self.alpha[chosen]
-        if lamps is None or not len(lamps):
+        if lights is None or not len(lights):
             return scattered_at_interface(*found, rng)
-        way, passed, seen = lit_at_interface(*found, lamps, rng)
-        for number, to_light in enumerate(lamps):
+        way, passed, seen = lit_at_interface(*found, lights, rng)
+        for number, to_light in enumerate(lights):
             across, by_face = (np.einsum("ki,ki->k", to_light, n) for n in (normals, self.faces[chosen]))
             for side, passing, inside in (
                 (1.0, np.ones((len(chosen), 3)), self.interfaces.here),
@@ -235,17 +237,17 @@ class Meetings:
         return way, passed
 
     def _arriving(self, number: int, chosen: Integers, inside: Inside, share: Array) -> Array:
-        """(k, 3): a share (k, 3) of one lamp's light."""
-        assert self.lamps is not None
-        arriving = self.lamps.irradiance(
-            number, self.legs.rays.origins[chosen], inside.where(chosen), self.own.tolerance
+        """(k, 3): fraction (k, 3) of what one light emits."""
+        assert self.lights is not None
+        arriving = self.lights.irradiance(
+            number, self.live.rays.origins[chosen], inside.where(chosen), self.own.tolerance
         )
         with np.errstate(under="ignore"):
             return arriving * share
 
-    def _at_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
+    def _at_sheets(self, chosen: Integers) -> tuple[list[LiveRays], Array]:
         """Branches at polished sheets, as `_at_interfaces`: both sides of each at once."""
-        legs, inside = self.legs.where(chosen), self.interfaces.here.where(chosen)
+        live, inside = self.live.where(chosen), self.interfaces.here.where(chosen)
         metres, extinction, emission = self._matter(chosen)
         front, behind, ior = self.reflectance[chosen], self.bare[chosen], self.ior[chosen]
         path = optics.thin_layer_thickness(metres, self.cosine[chosen], ior)[:, None]
@@ -259,20 +261,20 @@ class Meetings:
             leaving = np.where(kept > 0.0, (1.0 - front) * (1.0 + again) / np.where(kept > 0.0, kept, 1.0), 0.0)
             leaving = (1.0 - self.coated[chosen]) * leaving
             self.radiance[chosen] += leaving * optics.emitted_radiance(emission, extinction, path)
-        mirrored = _towards(reflected_direction(legs.rays.directions, self.normals[chosen]), self.faces[chosen])
+        mirrored = _towards(reflected_direction(live.rays.directions, self.normals[chosen]), self.faces[chosen])
         branches = [
-            legs.turned(mirrored, back, inside, bent=True, reflected=True),
-            legs.turned(legs.rays.directions, on * self._passing(chosen), inside, bent=False, reflected=False),
+            live.turned(mirrored, back, inside, bent=True, reflected=True),
+            live.turned(live.rays.directions, on * self._passing(chosen), inside, bent=False, reflected=False),
         ]
         return branches, on
 
-    def _at_rough_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
+    def _at_rough_sheets(self, chosen: Integers) -> tuple[list[LiveRays], Array]:
         """Branches at rough sheets, as `_at_interfaces`: light goes from one side to the other until it leaves."""
         assert self.rng is not None
-        legs, inside, normals = self.legs.where(chosen), self.interfaces.here.where(chosen), self.normals[chosen]
+        live, inside, normals = self.live.where(chosen), self.interfaces.here.where(chosen), self.normals[chosen]
         metres, extinction, emission = self._matter(chosen)
         ior, alpha = self.ior[chosen], self.alpha[chosen]
-        way, entered = scattered_at_interface(legs.rays.directions, normals, ior, alpha, self.rng)
+        way, entered = scattered_at_interface(live.rays.directions, normals, ior, alpha, self.rng)
         weight, emitted = np.ones((len(chosen), 3)), np.zeros((len(chosen), 3))
         within = np.flatnonzero(entered)
         for _ in range(MOST_PASSAGES):
@@ -294,7 +296,7 @@ class Meetings:
         way = _towards(way, np.where(passed[:, None], -1.0, 1.0) * self.faces[chosen])
         with np.errstate(under="ignore"):
             share = weight * np.where(passed[:, None], self._passing(chosen), 1.0)
-        return [legs.turned(way, share, inside, bent=True, reflected=~passed)], weight * passed[:, None]
+        return [live.turned(way, share, inside, bent=True, reflected=~passed)], weight * passed[:, None]
 
     def _under_coat(self, chosen: Integers, share: Array) -> Array:
         """(k, 3): what interfaces that reflect a `share` (k, 3) do with the clear coats on them."""
@@ -308,14 +310,14 @@ class Meetings:
         rows = np.array([(m.extinction, m.emission) if m is not None else np.zeros((2, 3)) for m in media])
         return metres[item], rows[item, 0], rows[item, 1]
 
-    def _add_paint(self, chosen: Integers, passed: Array) -> None:
+    def _add_diffuse(self, chosen: Integers, passed: Array) -> None:
         """Add diffuse reflection of the share `passed` (k, 1 or 3) of the light."""
         share = passed * (1.0 - self.transmission[chosen])
         painted = np.flatnonzero((share > 0.0).any(axis=1))
         chosen, share = chosen[painted], share[painted]
         if not chosen.size:
             return
-        points, normals = self.legs.rays.origins[chosen], self.normals[chosen]
+        points, normals = self.live.rays.origins[chosen], self.normals[chosen]
         through = self._table("diffuse_transmission")[chosen, None]
         front, back = (self.light.on_interfaces(points, side * normals) for side in (1.0, -1.0))
         behind = through * self._table("diffuse_transmission_color")[chosen] * back
@@ -324,8 +326,8 @@ class Meetings:
 
     def _add_highlights(self, rough: Integers) -> None:
         """Add highlights of `Scene.lights` in rough interfaces, by single reflection of what reaches these."""
-        points, normals = self.legs.rays.origins[rough], self.normals[rough]
-        to_eye = -self.legs.rays.directions[rough]
+        points, normals = self.live.rays.origins[rough], self.normals[rough]
+        to_eye = -self.live.rays.directions[rough]
         for light in self.light.paths.lights if rough.size else ():
             if isinstance(light, PositionalLight):
                 to_light = np.asarray(light.position) - points
@@ -387,23 +389,23 @@ class StraightLight:
         found = [_way(light, points)[0] for light in self.light.lights]
         return np.array(found).reshape(len(found), len(points), 3)
 
-    def scattered(self, legs: Legs, weights: Array, channel: int) -> Array:
-        """(k, 3): radiance that media scatter from lights at the origins of `legs` back along them, for each unit that
+    def scattered(self, live: LiveRays, weights: Array, channel: int) -> Array:
+        """(k, 3): radiance that media scatter from lights at the origins of `live` back along them, for each unit that
         they scatter.
 
         Parameters
         ----------
-        legs : Legs
+        live : LiveRays
         weights : (k, n) float64
             What fills the places, as `Volume.at` gives it.
         channel : int
             One of those whose media scatter alike.
         """
-        volume, rays = self.light.volume, legs.rays
-        radiance = np.zeros((len(legs), 3))
+        volume, rays = self.light.volume, live.rays
+        radiance = np.zeros((len(live), 3))
         total = weights @ volume.scattering[:, channel]
         for number, to_light in enumerate(self.at_interfaces(rays.origins)):
-            arriving = self.irradiance(number, rays.origins, legs.inside)
+            arriving = self.irradiance(number, rays.origins, live.inside)
             cosine = np.einsum("ki,ki->k", to_light, rays.directions)
             phase = volume.source(weights, cosine)[:, channel] / np.where(total > 0, total, 1.0)
             with np.errstate(under="ignore"):

@@ -18,7 +18,7 @@ from translucent.planning.limits import SHEET_ON_OPAQUE
 from translucent.reference.compositing import _layers, composite
 from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits
-from translucent.reference.interactions import Legs, Meetings, StraightLight, joined
+from translucent.reference.interactions import Interactions, LiveRays, StraightLight, joined
 from translucent.reference.interfaces import Inside, Interfaces, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge
 from translucent.reference.opaque import OpaqueHits, nearest_opaque
@@ -106,9 +106,9 @@ class InterfacePaths:
         carried = np.zeros((count, 3))
         carried[:, self.channels] = 1.0
         never = np.zeros(count, dtype=bool)
-        legs = Legs(rays, np.arange(count), carried, self._at_origins(rays), never, never)
-        while len(legs):
-            legs = self._step(legs)
+        live = LiveRays(rays, np.arange(count), carried, self._at_origins(rays), never, never)
+        while len(live):
+            live = self._step(live)
         return self.found[:, self.channels]
 
     def _at_origins(self, rays: Rays) -> Inside:
@@ -120,31 +120,31 @@ class InterfacePaths:
         inside.windings[behind], inside.since[behind] = found.windings, found.since
         return inside
 
-    def _step(self, legs: Legs) -> Legs:
+    def _step(self, live: LiveRays) -> LiveRays:
         """Follow paths to their next events, and turn them there; those that end are gone."""
-        flight = self._fly(legs)
-        legs, event, weights = self._through_media(legs, flight)
+        flight = self._fly(live)
+        live, event, weights = self._through_media(live, flight)
         collided = np.isfinite(event)
         walled = ~collided & (flight.wall.distance <= flight.end)
         met = ~collided & (flight.interfaces.distance <= flight.end)
-        self._add_ends(legs, flight, np.flatnonzero(walled | (~collided & ~met & flight.leaves)))
+        self._add_ends(live, flight, np.flatnonzero(walled | (~collided & ~met & flight.leaves)))
         further = np.flatnonzero(~collided & ~met & ~walled & ~flight.leaves)
         return joined(
             (
-                self._moved(legs.where(further), flight.end[further], flight.interfaces.there.where(further)),
-                self._meet(legs, flight, np.flatnonzero(met)),
-                self._scatter(legs, flight, event, weights),
+                self._moved(live.where(further), flight.end[further], flight.interfaces.there.where(further)),
+                self._interact(live, flight, np.flatnonzero(met)),
+                self._scatter(live, flight, event, weights),
             )
         )
 
-    def _fly(self, legs: Legs) -> _Flight:
-        rays, tracer = legs.rays, self.light.tracer
+    def _fly(self, live: LiveRays) -> _Flight:
+        rays, tracer = live.rays, self.light.tracer
         _, far = tracer.ball(rays.origins, rays.directions)
         far = np.maximum(far, 0.0)
-        reach = np.minimum(far, FREE_PATHS * self._mean_free_path(legs.inside))
-        hits = tracer.hits(Lines(rays.origins, rays.directions, self.start[legs.owner], reach))
-        wall = nearest_opaque(self.scene, hits, len(legs))
-        interfaces = self.own.first_interfaces([line.before(wall.distance) for line in hits], legs.inside)
+        reach = np.minimum(far, FREE_PATHS * self._mean_free_path(live.inside))
+        hits = tracer.hits(Lines(rays.origins, rays.directions, self.start[live.owner], reach))
+        wall = nearest_opaque(self.scene, hits, len(live))
+        interfaces = self.own.first_interfaces([line.before(wall.distance) for line in hits], live.inside)
         end = np.minimum(np.minimum(interfaces.distance, wall.distance), reach)
         return _Flight(hits, wall, interfaces, end, reach >= far)
 
@@ -160,24 +160,24 @@ class InterfacePaths:
         filling[:, solids] = _weights(self.scene, solids, inside.windings[:, solids].T).T
         return filling
 
-    def _through_media(self, legs: Legs, flight: _Flight) -> tuple[Legs, Array, Array]:
+    def _through_media(self, live: LiveRays, flight: _Flight) -> tuple[LiveRays, Array, Array]:
         """Attenuate paths up to their events, and add what media emit; distance of the events (inf: none) and media."""
-        rays, count = legs.rays, len(legs)
-        segments, filling = self._segments(legs, flight)
+        rays, count = live.rays, len(live)
+        segments, filling = self._segments(live, flight)
         event, weights = self._collisions(rays, segments, filling)
         segments, filling = self._cut(rays, segments, filling, event)
         segments = emission_of_mixtures(self.absorbing, rays, segments, filling)
         emitted, depth = composite(segments, count)
-        self._add(legs, emitted)
+        self._add(live, emitted)
         with np.errstate(under="ignore"):
-            return replace(legs, throughput=legs.throughput * optics.transmittance(depth)), event, weights
+            return replace(live, throughput=live.throughput * optics.transmittance(depth)), event, weights
 
-    def _segments(self, legs: Legs, flight: _Flight) -> tuple[Segments, Array]:
-        rays, end = legs.rays, flight.end
+    def _segments(self, live: LiveRays, flight: _Flight) -> tuple[Segments, Array]:
+        rays, end = live.rays, flight.end
         none = np.empty(0, np.int64)
         parts = [Intervals(none, np.empty(0), np.empty(0), none, none)]
         for i in self.own.solids:
-            origin = legs.inside.windings[:, i].astype(np.int64)
+            origin = live.inside.windings[:, i].astype(np.int64)
             parts.append(body_intervals(flight.hits[i].before(end), origin, end, i))
         sheets = [None if i in self.own.walls else metres for i, metres in enumerate(self.own.sheets)]
         # A sheet that lies on an interface is met on one side of it only.
@@ -221,64 +221,64 @@ class InterfacePaths:
             extinction[cut], emission[cut] = mean @ self.absorbing.extinction, mean @ self.absorbing.emission
         return Segments(pixel, t_enter, t_exit, length, extinction, emission, counts), filling
 
-    def _add(self, legs: Legs, radiance: Array) -> None:
+    def _add(self, live: LiveRays, radiance: Array) -> None:
         # Each path is at one place at a time, so no owner comes twice.
         with np.errstate(under="ignore"):
-            self.found[legs.owner] += legs.throughput * radiance
+            self.found[live.owner] += live.throughput * radiance
 
-    def _add_ends(self, legs: Legs, flight: _Flight, chosen: Integers) -> None:
+    def _add_ends(self, live: LiveRays, flight: _Flight, chosen: Integers) -> None:
         wall = flight.wall.where(chosen)
-        self._add(legs.where(chosen), self.ends.radiance(legs.where(chosen), wall))
+        self._add(live.where(chosen), self.ends.radiance(live.where(chosen), wall))
 
-    def _moved(self, legs: Legs, distance: Array, inside: Inside, start: float = 0.0) -> Legs:
-        self.start[legs.owner] = start
+    def _moved(self, live: LiveRays, distance: Array, inside: Inside, start: float = 0.0) -> LiveRays:
+        self.start[live.owner] = start
         with np.errstate(under="ignore"):
-            points = legs.rays.origins + distance[:, None] * legs.rays.directions
-        return replace(legs, rays=replace(legs.rays, origins=points), inside=inside)
+            points = live.rays.origins + distance[:, None] * live.rays.directions
+        return replace(live, rays=replace(live.rays, origins=points), inside=inside)
 
-    def _meet(self, legs: Legs, flight: _Flight, met: Integers) -> Legs:
+    def _interact(self, live: LiveRays, flight: _Flight, met: Integers) -> LiveRays:
         """Paths that go on from interfaces."""
         interfaces = flight.interfaces.where(met)
-        legs = self._moved(legs.where(met), interfaces.distance, interfaces.here, self.own.tolerance)
-        if not len(legs):
-            return legs
-        outcome = Meetings(self.own, legs, interfaces, self.surface, self.rng, self.straight).outcome()
-        self._add(legs, outcome.radiance)
-        legs = self._one_branch(joined(outcome.branches))
-        self.interfaces_met[legs.owner] += 1
-        return self._roulette(legs)
+        live = self._moved(live.where(met), interfaces.distance, interfaces.here, self.own.tolerance)
+        if not len(live):
+            return live
+        outcome = Interactions(self.own, live, interfaces, self.surface, self.rng, self.straight).outcome()
+        self._add(live, outcome.radiance)
+        live = self._one_branch(joined(outcome.branches))
+        self.interfaces_met[live.owner] += 1
+        return self._roulette(live)
 
-    def _one_branch(self, legs: Legs) -> Legs:
+    def _one_branch(self, live: LiveRays) -> LiveRays:
         """One leg of each path, chosen by what it carries: a polished sheet gives two."""
-        legs = legs.where(np.argsort(legs.owner, kind="stable"))
-        carried = legs.throughput.max(axis=1)
-        first = np.flatnonzero(np.diff(legs.owner, prepend=-1) != 0)
+        live = live.where(np.argsort(live.owner, kind="stable"))
+        carried = live.throughput.max(axis=1)
+        first = np.flatnonzero(np.diff(live.owner, prepend=-1) != 0)
         total = np.add.reduceat(carried, first)
-        double = np.diff(first, append=len(legs)) == 2
+        double = np.diff(first, append=len(live)) == 2
         share = np.where(total > 0, carried[first] / np.where(total > 0, total, 1.0), 1.0)
         second = double & (self.rng.random(len(first)) >= share)
         chosen = first + second
         chance = np.where(double, np.where(second, 1.0 - share, share), 1.0)
-        legs = legs.where(chosen)
-        return replace(legs, throughput=legs.throughput / chance[:, None])
+        live = live.where(chosen)
+        return replace(live, throughput=live.throughput / chance[:, None])
 
-    def _scatter(self, legs: Legs, flight: _Flight, event: Array, weights: Array) -> Legs:
-        """Paths that go on from where media scatter them; adds the light of lamps there."""
+    def _scatter(self, live: LiveRays, flight: _Flight, event: Array, weights: Array) -> LiveRays:
+        """Paths that go on from where media scatter them; adds what lights emit towards there."""
         some = np.flatnonzero(np.isfinite(event))
         if self.max_events is not None:
-            some = some[self.events[legs.owner[some]] < self.max_events]
-        inside = self._inside_at(legs.inside, flight, event, some)
-        legs, weights = self._moved(legs.where(some), event[some], inside), weights[some]
-        if not len(legs):
-            return legs
-        self.events[legs.owner] += 1
-        self._add(legs, self.straight.scattered(legs, weights, int(self.channels[0])))
+            some = some[self.events[live.owner[some]] < self.max_events]
+        inside = self._inside_at(live.inside, flight, event, some)
+        live, weights = self._moved(live.where(some), event[some], inside), weights[some]
+        if not len(live):
+            return live
+        self.events[live.owner] += 1
+        self._add(live, self.straight.scattered(live, weights, int(self.channels[0])))
         chosen = self._chosen_phases(weights)
         rays = replace(
-            legs.rays, directions=scattered_directions(legs.rays.directions, self.light.volume.phases, chosen, self.rng)
+            live.rays, directions=scattered_directions(live.rays.directions, self.light.volume.phases, chosen, self.rng)
         )
-        always = np.ones(len(legs), dtype=bool)
-        return self._roulette(replace(legs, rays=rays, bent=always, reflected=always))
+        always = np.ones(len(live), dtype=bool)
+        return self._roulette(replace(live, rays=rays, bent=always, reflected=always))
 
     def _inside_at(self, inside: Inside, flight: _Flight, event: Array, some: Integers) -> Inside:
         """Bodies that the events lie in: surfaces without an interface may come before them."""
@@ -291,11 +291,11 @@ class InterfacePaths:
         chosen = (shares < self.rng.random((len(weights), 1)) * shares[:, -1:]).sum(axis=1)
         return np.asarray(self.light.volume.phase[np.minimum(chosen, len(self.scattering) - 1)])
 
-    def _roulette(self, legs: Legs) -> Legs:
+    def _roulette(self, live: LiveRays) -> LiveRays:
         """Paths that go on, and carry more for those that do not (Arvo & Kirk 1990)."""
-        chance = np.minimum(legs.throughput.max(axis=1) / ROULETTE, 1.0)
-        chance = np.where(self.interfaces_met[legs.owner] > MANY_INTERFACES, np.minimum(chance, GOES_ON), chance)
+        chance = np.minimum(live.throughput.max(axis=1) / ROULETTE, 1.0)
+        chance = np.where(self.interfaces_met[live.owner] > MANY_INTERFACES, np.minimum(chance, GOES_ON), chance)
         # Without a direction light is lost.
-        lives = (self.rng.random(len(legs)) < chance) & legs.rays.directions.any(axis=1)
-        legs = legs.where(lives)
-        return replace(legs, throughput=legs.throughput / chance[lives, None])
+        lives = (self.rng.random(len(live)) < chance) & live.rays.directions.any(axis=1)
+        live = live.where(lives)
+        return replace(live, throughput=live.throughput / chance[lives, None])

@@ -160,8 +160,8 @@ class Optics:
         """Distance in metres within which surfaces coincide."""
         return TOGETHER * self.scene.diagonal
 
-    def dominant(self, inside: Inside) -> Integers:
-        """(n,): dominant object around each ray, or `AIR`."""
+    def effective_medium(self, inside: Inside) -> Integers:
+        """(n,): object of the effective medium around each ray, or `AIR`."""
         present = (inside.windings > 0) & self.decides
         key = np.where(present, self._rank * (1 << 40) + inside.since, -1)
         best = key.argmax(axis=1)
@@ -240,7 +240,7 @@ class _Walk:
         """First interface of each ray."""
         count = len(self.time)
         self.here = Inside(self.inside.windings.copy(), self.inside.since.copy())
-        self.before = self.optics.dominant(self.inside)
+        self.before = self.optics.effective_medium(self.inside)
         self.reached = np.full(count, -np.inf)
         self.sheet = np.full(count, -1)
         stopped = np.zeros(count, dtype=bool)
@@ -271,7 +271,7 @@ class _Walk:
     def _begin_point(self, crossings: _Crossings) -> None:
         ray = crossings.pixel
         self.reached[ray] = crossings.distance
-        self.before[ray] = self.optics.dominant(self.inside.where(ray))
+        self.before[ray] = self.optics.effective_medium(self.inside.where(ray))
         self.here.windings[ray], self.here.since[ray] = self.inside.windings[ray], self.inside.since[ray]
         self.face[ray] = -1
 
@@ -284,11 +284,11 @@ class _Walk:
         self.barycentric[ray[free], crossings.item[free]] = crossings.barycentric[free]
 
     def _changed(self, ray: Integers) -> Mask:
-        return self.optics.matters(self.before[ray], self.optics.dominant(self.inside.where(ray)))
+        return self.optics.matters(self.before[ray], self.optics.effective_medium(self.inside.where(ray)))
 
     def _interfaces(self) -> Interfaces:
         rays = np.arange(len(self.time))
-        after = self.optics.dominant(self.inside)
+        after = self.optics.effective_medium(self.inside)
         is_sheet = self.sheet >= 0
         found = is_sheet | self.optics.matters(self.before, after)
         # The interface is that of the body that is entered; where the ray only leaves one, of that.

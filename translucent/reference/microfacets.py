@@ -79,7 +79,7 @@ def lit_at_interface(
         for light, own in zip(lights, seen, strict=True):
             own[ray] += _turned_to(side * light[ray], side * way, height, relative, alpha[ray])
         facet = side * _visible_normals(-side * way, alpha[ray], rng)
-        way, passed = _meet(way, facet, relative, rng)
+        way, passed = _interact(way, facet, relative, rng)
         above[ray] ^= passed
         # Heights count upwards on either side.
         height = np.where(passed, 1.0 - height, height)
@@ -107,7 +107,7 @@ def _turned_to(light: Array, way: Array, height: Array, ior: Array, alpha: Array
     return np.where(turns, density * leaves / np.where(turns, area, 1.0), 0.0)
 
 
-def _meet(way: Array, facet: Array, ior: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
+def _interact(way: Array, facet: Array, ior: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
     """Directions (n, 3) after meeting microfacets (n, 3), and whether the light is transmitted."""
     cosine = np.clip(-np.einsum("ki,ki->k", way, facet), 0.0, 1.0)
     passed = rng.random(len(way)) >= optics.fresnel_dielectric(cosine, ior)

@@ -291,7 +291,7 @@ def _left_out(scene: Scene) -> tuple[Note, ...]:
     ]
     if not scene.lights or not polished:
         return ()
-    text = "light of lamps and directional lights that polished interfaces bend on its way: in media, and as caustics"
+    text = "light that polished interfaces refract or reflect on its way from lights: in media, and as caustics"
     return (Note(NoteKind.LIGHTS_LEFT_OUT, text),)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from translucent.arrays import Array, Integers
 from translucent.errors import InputError
 from translucent.reference.hits import world_normals
-from translucent.reference.interactions import Legs
+from translucent.reference.interactions import LiveRays
 from translucent.reference.interface_paths import InterfacePaths, _Flight
 from translucent.reference.interfaces import Optics
 from translucent.reference.light_paths import LightPaths
@@ -82,17 +82,17 @@ def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> Landed
             raise InputError(f"photons through {body.mesh.name!r}", "not closed", "close it, or declare it a sheet")
     rng = np.random.default_rng(seed)
     sheets = sheet_thicknesses(scene)
-    # Nothing but the photons themselves carries light of lamps.
+    # Nothing but the photons themselves carries what lights emit.
     light = LightPaths(replace(scene, lights=(), environment_shadows=0), sheets)
     surface = SurfaceLight(light)
     optics = [Optics(scene, sheets, channel) for channel in range(3)]
     parts = []
     for channels in _alike(np.concatenate([light.volume.scattering, np.stack([own.iors for own in optics], axis=1)])):
         paths = PhotonPaths(surface, RayEnds(surface, 1.0), optics[channels[0]], channels, 0, rng)
-        for lamp in scene.lights:
+        for source in scene.lights:
             for first in range(0, photons, BENT_BATCH):
                 some = np.arange(first, min(first + BENT_BATCH, photons))
-                rays, power = _emitted(scene, lamp, some, photons, rng)
+                rays, power = _emitted(scene, source, some, photons, rng)
                 parts.append(paths.land(rays, power))
     return _joined(parts)
 
@@ -116,27 +116,27 @@ class PhotonPaths(InterfacePaths):
         self.radiance(rays)
         return _joined(self.parts)
 
-    def _meet(self, legs: Legs, flight: _Flight, met: Integers) -> Legs:
+    def _interact(self, live: LiveRays, flight: _Flight, met: Integers) -> LiveRays:
         interfaces = flight.interfaces.where(met)
         solid = interfaces.before != interfaces.after
         stepped = np.zeros(len(self.turned), dtype=bool)
-        stepped[legs.owner[met]] = solid & (self.own.iors[interfaces.before] != self.own.iors[interfaces.after])
-        found = super()._meet(legs, flight, met)
+        stepped[live.owner[met]] = solid & (self.own.iors[interfaces.before] != self.own.iors[interfaces.after])
+        found = super()._interact(live, flight, met)
         self.turned[found.owner] |= stepped[found.owner] | found.reflected
         return found
 
-    def _add_ends(self, legs: Legs, flight: _Flight, chosen: Integers) -> None:
-        legs, wall = legs.where(chosen), flight.wall.where(chosen)
-        kept = np.flatnonzero(np.isfinite(wall.distance) & self.turned[legs.owner])
-        legs, wall = legs.where(kept), wall.where(kept)
-        normals = np.zeros((len(legs), 3))
+    def _add_ends(self, live: LiveRays, flight: _Flight, chosen: Integers) -> None:
+        live, wall = live.where(chosen), flight.wall.where(chosen)
+        kept = np.flatnonzero(np.isfinite(wall.distance) & self.turned[live.owner])
+        live, wall = live.where(kept), wall.where(kept)
+        normals = np.zeros((len(live), 3))
         for item in np.unique(wall.item):
             own = wall.item == item
             normals[own] = world_normals(self.scene.objects[item], wall.face[own])
-        normals[np.einsum("ki,ki->k", normals, legs.rays.directions) > 0] *= -1.0
+        normals[np.einsum("ki,ki->k", normals, live.rays.directions) > 0] *= -1.0
         with np.errstate(under="ignore"):
-            points = legs.rays.origins + wall.distance[:, None] * legs.rays.directions
-            power = self.power[legs.owner] * legs.throughput
+            points = live.rays.origins + wall.distance[:, None] * live.rays.directions
+            power = self.power[live.owner] * live.throughput
         self.parts.append(LandedPhotons(points, normals, power, wall.item))
 
 

@@ -21,7 +21,7 @@ from translucent.planning.limits import SHEET_ON_OPAQUE
 from translucent.reference.compositing import composite
 from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits
-from translucent.reference.interactions import Legs, Meetings, joined
+from translucent.reference.interactions import Interactions, LiveRays, joined
 from translucent.reference.interfaces import Interfaces, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge, sum_signs, unbalanced
 from translucent.reference.opaque import OpaqueHits, nearest_opaque, reflected_radiance
@@ -51,21 +51,21 @@ class RayEnds:
     def __init__(self, light: SurfaceLight, aspect: float) -> None:
         self.light, self.scene, self.aspect = light, light.scene, aspect
 
-    def radiance(self, legs: Legs, wall: OpaqueHits) -> Array:
+    def radiance(self, live: LiveRays, wall: OpaqueHits) -> Array:
         """(k, 3): of the opaque surfaces that stop ray segments, or where none does of the environment."""
-        seen = reflected_radiance(self.scene, legs.rays, wall, self.light.on_opaque)
+        seen = reflected_radiance(self.scene, live.rays, wall, self.light.on_opaque)
         free = np.flatnonzero(np.isinf(wall.distance))
-        seen[free] = self._environment(legs.where(free))
+        seen[free] = self._environment(live.where(free))
         return seen
 
-    def _environment(self, legs: Legs) -> Array:
+    def _environment(self, live: LiveRays) -> Array:
         """(k, 3): radiance of unblocked ray segments: the environment's light in reflections, else its background."""
-        environment, rays = self.scene.environment, legs.rays
+        environment, rays = self.scene.environment, live.rays
         place, ahead = places_on_backdrop(self.scene, self.aspect, rays)
-        seen = environment.radiance(rays.directions, np.where(legs.bent[:, None], place, rays.backdrop))
+        seen = environment.radiance(rays.directions, np.where(live.bent[:, None], place, rays.backdrop))
         if environment.seen.kind == "checkerboard":
-            seen[legs.bent & ~ahead] = environment.seen.mean
-        return np.where(legs.reflected[:, None], environment.lighting(rays.directions), seen)
+            seen[live.bent & ~ahead] = environment.seen.mean
+        return np.where(live.reflected[:, None], environment.lighting(rays.directions), seen)
 
 
 def places_on_backdrop(scene: Scene, aspect: float, rays: Rays) -> tuple[Array, Mask]:
@@ -185,43 +185,43 @@ class _Tree:
         behind = self.refracted.tracer.hits(Lines(rays.origins, rays.directions, -everywhere, np.zeros(len(rays))))
         never = np.zeros(len(rays), dtype=bool)
         inside = self.own.at_origins(behind, len(rays))
-        legs = Legs(rays, owner, np.tile(carried, (len(rays), 1)), inside, never, never)
+        live = LiveRays(rays, owner, np.tile(carried, (len(rays), 1)), inside, never, never)
         for level in range(self.refracted.bounces + 1):
-            legs, interfaces = self._fly(legs, 0.0 if level == 0 else self.own.tolerance)
-            if not len(legs):
+            live, interfaces = self._fly(live, 0.0 if level == 0 else self.own.tolerance)
+            if not len(live):
                 return
-            outcome = Meetings(self.own, legs, interfaces, self.refracted.light, self.refracted.rng).outcome()
-            self._add(legs, outcome.radiance)
-            legs = joined(outcome.branches)
+            outcome = Interactions(self.own, live, interfaces, self.refracted.light, self.refracted.rng).outcome()
+            self._add(live, outcome.radiance)
+            live = joined(outcome.branches)
             lost = np.asarray(
-                (legs.throughput < self.refracted.faintest).all(axis=1) | ~legs.rays.directions.any(axis=1)
+                (live.throughput < self.refracted.faintest).all(axis=1) | ~live.rays.directions.any(axis=1)
             )
-            self._drop(legs.where(lost))
-            legs = legs.where(~lost)
-        self._drop(legs)
+            self._drop(live.where(lost))
+            live = live.where(~lost)
+        self._drop(live)
 
-    def _drop(self, legs: Legs) -> None:
-        np.add.at(self.found.residual, legs.owner, legs.throughput)
+    def _drop(self, live: LiveRays) -> None:
+        np.add.at(self.found.residual, live.owner, live.throughput)
 
-    def _add(self, legs: Legs, radiance: Array) -> None:
+    def _add(self, live: LiveRays, radiance: Array) -> None:
         with np.errstate(under="ignore"):
-            np.add.at(self.found.radiance, legs.owner, legs.throughput * radiance)
+            np.add.at(self.found.radiance, live.owner, live.throughput * radiance)
 
-    def _fly(self, legs: Legs, start: float) -> tuple[Legs, Interfaces]:
-        """Add what legs see on their way and at its end. Those that end at interfaces instead, there, and these."""
-        rays = legs.rays
-        reach = np.full(len(legs), start), np.full(len(legs), np.inf)
+    def _fly(self, live: LiveRays, start: float) -> tuple[LiveRays, Interfaces]:
+        """Add radiance of media and ray ends; return rays that reach interfaces, moved there, with those interfaces."""
+        rays = live.rays
+        reach = np.full(len(live), start), np.full(len(live), np.inf)
         hits = self.refracted.tracer.hits(Lines(rays.origins, rays.directions, *reach))
-        wall = nearest_opaque(self.scene, hits, len(legs))
-        interfaces = self.own.first_interfaces([line.before(wall.distance) for line in hits], legs.inside)
-        legs = self._through_media(legs, hits, interfaces.distance, wall.distance)
+        wall = nearest_opaque(self.scene, hits, len(live))
+        interfaces = self.own.first_interfaces([line.before(wall.distance) for line in hits], live.inside)
+        live = self._through_media(live, hits, interfaces.distance, wall.distance)
         ends = np.isinf(interfaces.distance)
-        self._add(legs.where(ends), self.refracted.ends.radiance(legs.where(ends), wall.where(np.flatnonzero(ends))))
+        self._add(live.where(ends), self.refracted.ends.radiance(live.where(ends), wall.where(np.flatnonzero(ends))))
         met = np.flatnonzero(~ends)
-        interfaces, legs = interfaces.where(met), legs.where(met)
+        interfaces, live = interfaces.where(met), live.where(met)
         with np.errstate(under="ignore"):
-            points = legs.rays.origins + interfaces.distance[:, None] * legs.rays.directions
-        return replace(legs, rays=replace(legs.rays, origins=points)), interfaces
+            points = live.rays.origins + interfaces.distance[:, None] * live.rays.directions
+        return replace(live, rays=replace(live.rays, origins=points)), interfaces
 
     def _goes_astray(self, body: int, hits: Hits, origin: Integers, interface: Array, wall: Array) -> Mask:
         """(n,): ray segments that show a hole of a body: they never leave it, or would not if nothing stopped them."""
@@ -230,27 +230,27 @@ class _Tree:
         rightly = np.isfinite(interface) | (np.isfinite(wall) & outside)
         return np.asarray(~rightly & unbalanced(hits, origin))
 
-    def _through_media(self, legs: Legs, hits: Sequence[Hits], interface: Array, wall: Array) -> Legs:
+    def _through_media(self, live: LiveRays, hits: Sequence[Hits], interface: Array, wall: Array) -> LiveRays:
         """Attenuate ray segments by the media, and add emitted and scattered radiance."""
-        scene, volume, rays = self.scene, self.refracted.volume, legs.rays
+        scene, volume, rays = self.scene, self.refracted.volume, live.rays
         end = np.minimum(interface, wall)
         none = np.empty(0, np.int64)
         parts = [Intervals(none, np.empty(0), np.empty(0), none, none)]
         for i in self.own.solids:
-            origin = legs.inside.windings[:, i].astype(np.int64)
+            origin = live.inside.windings[:, i].astype(np.int64)
             parts.append(body_intervals(hits[i].before(end), origin, end, i))
-            self.found.valid[legs.owner[self._goes_astray(i, hits[i], origin, interface, wall)]] = False
+            self.found.valid[live.owner[self._goes_astray(i, hits[i], origin, interface, wall)]] = False
         sheets = [None if i in self.own.walls else metres for i, metres in enumerate(self.refracted.sheets)]
         # A sheet that lies on an interface is met on one side of it only.
         until = np.where(interface < wall, interface - SHEET_ON_OPAQUE * scene.diagonal, wall)
         crossings = scene_crossings(scene, rays, hits, sheets, until, self.refracted.light.on_interfaces)
         segments, filling = volume_segments(scene, volume, rays, merge(parts), crossings)
         segments = emission_of_mixtures(volume, rays, segments, filling)
-        emitted, depth = composite(segments, len(legs))
+        emitted, depth = composite(segments, len(live))
         if self.refracted.scatter:
             light = scattered_once(self.refracted.light.paths, rays, segments, filling, self.refracted.tolerance)
             emitted = emitted + light.radiance
-            self.found.valid[legs.owner[~light.valid]] = False
-        self._add(legs, emitted)
+            self.found.valid[live.owner[~light.valid]] = False
+        self._add(live, emitted)
         with np.errstate(under="ignore"):
-            return replace(legs, throughput=legs.throughput * optics.transmittance(depth))
+            return replace(live, throughput=live.throughput * optics.transmittance(depth))
