@@ -20,7 +20,7 @@ import trimesh
 
 import translucent as tl
 from translucent.bench.cases import CASES
-from translucent.bench.drawing import Floor, Planned, Studio
+from translucent.bench.drawing import BenchContext, FloorDrawing, PlanDrawing
 from translucent.gpu.targets import Targets
 
 COLUMNS = ("thickness", "drawn", "rendered", "all arrays")
@@ -47,11 +47,11 @@ def seconds(action: Callable[[], object]) -> float:
     return time.process_time() - began
 
 
-def measured(studio: Studio, scene: tl.Scene, size: tuple[int, int], rounds: int) -> np.ndarray:
+def measured(studio: BenchContext, scene: tl.Scene, size: tuple[int, int], rounds: int) -> np.ndarray:
     """(rounds, 1 + columns): processor time of the floor, and the quotient of each column."""
     renderer = studio.renderer
-    floor = Floor(studio, scene, Targets(studio.gl, size))
-    planned = Planned(studio, scene, Targets(studio.gl, size), renderer.plan(scene))
+    floor = FloorDrawing(studio, scene, Targets(studio.gl, size))
+    planned = PlanDrawing(studio, scene, Targets(studio.gl, size), renderer.plan(scene))
 
     def rendered() -> None:
         frame = renderer.render(scene, size)
@@ -84,7 +84,7 @@ def main(side: int = 1024, rounds: int = 20) -> None:
     with tl.Renderer() as renderer, renderer.gpu.context.current():
         print(renderer.provenance["renderer"])
         print(f"{'scene':12s}{'floor':>10s}" + "".join(f"{name:>16s}" for name in COLUMNS))
-        studio = Studio(renderer)
+        studio = BenchContext(renderer)
         for name, scene in scenes(size).items():
             rows = measured(studio, scene, size, rounds)
             low, median, high = np.quantile(rows, (0.25, 0.5, 0.75), axis=0)

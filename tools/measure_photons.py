@@ -1,6 +1,6 @@
 """Light of photons in media against random paths of light: fog, wax and milk below a ball of glass in a wide sun.
 
-The scenes and errors are those of the report (`translucent.bench.shadows.caustic_media`).
+The scenes and errors are those of the report (`translucent.bench.caustics`).
 
     python tools/measure_photons.py [--share 0.1] [--only wax]
     python tools/measure_photons.py --picture docs/caustics-in-media.png
@@ -15,7 +15,8 @@ import numpy as np
 from PIL import Image
 
 import translucent as tl
-from translucent.bench.shadows.caustic_media import FULL, GLASS, SCENES, MediumEffort, MediumScene, measure_medium
+from translucent.bench.caustics import GLASS, MEDIUM_SCENES, MediumCaustics, MediumScene
+from translucent.bench.drawing import BenchContext
 from translucent.geometry.solids import Box
 
 
@@ -52,21 +53,21 @@ def main() -> None:
     """Compare the scenes, with photons and without."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--share", type=float, default=1.0, help="of the paths, which take some minutes")
-    parser.add_argument("--only", choices=[told.name for told in SCENES], help="one of the scenes")
+    parser.add_argument("--only", choices=[told.name for told in MEDIUM_SCENES], help="one of the scenes")
     parser.add_argument("--picture", type=Path, help="of fog and wax, and nothing else")
     asked = parser.parse_args()
     if asked.picture is not None:
         return picture(asked.picture)
     with tl.Renderer() as renderer:
-        for told in SCENES:
+        for told in MEDIUM_SCENES:
             if asked.only in (None, told.name):
-                compare(renderer, told, asked.share)
+                compare(BenchContext(renderer), told, asked.share)
     return None
 
 
-def compare(renderer: tl.Renderer, told: MediumScene, share: float) -> None:
+def compare(bench: BenchContext, told: MediumScene, share: float) -> None:
     """Print how far a scene is from its truth."""
-    case = measure_medium(renderer, told, MediumEffort(share, FULL.photons))
+    case = MediumCaustics(paths=share).measure(bench, told)
     if case.failure:
         print(f"{told.name}: {case.failure}")
         return

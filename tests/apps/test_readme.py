@@ -95,11 +95,11 @@ def one_scene(monkeypatch: pytest.MonkeyPatch) -> None:
             monkeypatch.setattr(option, "default", "320x180")
     monkeypatch.setattr(run, "QUICK", run.Effort(0.0, 0.0, 0.3))
     monkeypatch.setattr(run, "QUICK_SIZE", (64, 64))
-    monkeypatch.setattr(run, "CASES", run.CASES[:1])
-    monkeypatch.setattr(run.ScalingRun, "ladders", lambda _: [])
-    monkeypatch.setattr(run, "measure_hard_cases", lambda _: iter(()))
-    monkeypatch.setattr(run, "measure_slabs", lambda *, quick: ())
-    monkeypatch.setattr(run.ShadowsRun, "steps", lambda _: {})
+
+    def few(quick: bool, extra: Any = (), methods: Any = ()) -> Any:
+        return (run.MethodComparison((*extra, run.CASES[0]), methods, quick),)
+
+    monkeypatch.setattr(run, "experiments", few)
 
 
 def commands(text: str) -> list[str]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import translucent as tl
 from translucent.bench.cases import CASES, Case
-from translucent.bench.contenders import contenders
-from translucent.bench.drawing import Studio
-from translucent.bench.measure import CaseRun
+from translucent.bench.drawing import BenchContext
+from translucent.bench.methods import MethodComparison
 from translucent.bench.record import CaseRecord
 
 
@@ -14,9 +13,10 @@ def case_of(mesh: tl.Mesh, **more: object) -> Case:
     return Case("mine", "Mine", "mine", lambda size: tl.showcase(mesh, size=size, stage="none"), **more)  # type: ignore[arg-type]
 
 
-def measured(studio: Studio, case: Case, *names: str, size: tuple[int, int] = (64, 64)) -> CaseRecord:
-    chosen = contenders(case.effect, quick=False, only=names)
-    return CaseRun(studio, None, case, size, 0.0).measure(chosen)
+def measured(bench: BenchContext, case: Case, *names: str, size: tuple[int, int] = (64, 64)) -> CaseRecord:
+    bench.size = size
+    found: CaseRecord = MethodComparison((case,), names).measure(bench, case)
+    return found
 
 
 def named(name: str) -> Case:

@@ -9,43 +9,29 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.bench.hard import geometry as hard_geometry
-from translucent.bench.hard import interfaces as hard_interfaces
-from translucent.bench.hard import scattering as hard_scattering
-from translucent.bench.hard import shadows as hard_shadows
-from translucent.bench.hard import values as hard_values
-from translucent.bench.hard import views as hard_views
-from translucent.bench.hard.cases import Checks, Hard
-from translucent.bench.hard.measure import CASES as ALL
-from translucent.bench.hard.measure import measure_hard_cases
+from translucent.bench.hard import Checks, HardCheck
+from translucent.bench.hard_light import HARD_CASES as ALL
 
 
 def test_there_is_one_of_each() -> None:
-    rooms = (hard_values, hard_views, hard_geometry, hard_interfaces, hard_scattering, hard_shadows)
-    assert len(ALL) == sum(len(room.CASES) for room in rooms)
-    assert [case.id for case in ALL] == [f"H{i:02}" for i in range(1, len(ALL) + 1)]
+    assert [case.name for case in ALL] == [f"H{i:02}" for i in range(1, len(ALL) + 1)]
     assert all(case.title and case.promise for case in ALL)
 
 
 def test_the_page_on_the_report_names_the_first_and_the_last() -> None:
     page = (Path(__file__).resolve().parents[2] / "docs" / "report.md").read_text(encoding="utf-8")
-    assert f"{ALL[0].id} to {ALL[-1].id} are inputs" in page
+    assert f"{ALL[0].name} to {ALL[-1].name} are inputs" in page
 
 
-@pytest.mark.parametrize("case", [case for case in ALL if case.id != "H23"], ids=lambda case: case.id)
-def test_it_holds(renderer: tl.Renderer, case: Hard) -> None:
+@pytest.mark.parametrize("case", [case for case in ALL if case.name != "H23"], ids=lambda case: case.name)
+def test_it_holds(renderer: tl.Renderer, case: HardCheck) -> None:
     found = case.measure(renderer)
     assert found.passed, found.result
     assert found.error is None or found.error <= case.limit
 
 
-def test_they_come_in_order(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Hard, "measure", lambda self, renderer: self)
-    assert [case.id for case in measure_hard_cases(renderer)] == [case.id for case in ALL]
-
-
 def test_distances_from_the_camera_would_fail(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    far = next(case for case in ALL if case.id == "H07")
+    far = next(case for case in ALL if case.name == "H07")
     render = Checks.render
 
     def from_the_camera(checks: Checks, scene: tl.Scene, size: tuple[int, int], *_: object) -> tl.Frame:
@@ -63,7 +49,7 @@ def check(*values: float, limit: float = 1.0) -> tuple[bool, float | None, str]:
         for value in values:
             checks.error("off by", value)
 
-    found = Hard("H00", "t", "p", run, limit).measure(None)  # type: ignore[arg-type]
+    found = HardCheck("H00", "t", "p", run, limit, "").measure(None)  # type: ignore[arg-type]
     return found.passed, found.error, found.result
 
 

@@ -9,13 +9,13 @@ import pytest
 
 import translucent as tl
 from tests.bench.measuring import case_of, measured, named
-from translucent.bench import measure
+from translucent.bench import methods
 from translucent.bench import truth as truths
 from translucent.bench.cases import CASES
 from translucent.bench.contenders import contenders
-from translucent.bench.drawing import Studio
+from translucent.bench.drawing import BenchContext
 from translucent.bench.judgement import advise
-from translucent.bench.truth import Truth
+from translucent.bench.truth import CaseTruth
 from translucent.geometry.solids import Sphere
 from translucent.gpu.passes import traced_interfaces
 
@@ -24,14 +24,14 @@ from translucent.gpu.passes import traced_interfaces
 def along_centers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures and truths along the rays of pixels' centers: errors are what a way of finding interfaces leaves out."""
     monkeypatch.setattr(traced_interfaces, "FOOTPRINT_STEP", 0.0)
-    monkeypatch.setattr(Truth, "over_pixels", Truth.of)
-    monkeypatch.setattr(measure, "SAMPLES", 1)
+    monkeypatch.setattr(CaseTruth, "over_pixels", CaseTruth.of)
+    monkeypatch.setattr(methods, "SAMPLES", 1)
 
 
 @pytest.mark.usefixtures("along_centers")
-def test_a_deeper_tree_is_nearer_to_all_light_and_what_is_drawn_is_not(studio: Studio) -> None:
+def test_a_deeper_tree_is_nearer_to_all_light_and_what_is_drawn_is_not(bench: BenchContext) -> None:
     names = ("constant-thickness", "straight rays", "FrontInterface", "ScreenInterfaces", "TracedInterfaces")
-    made = measured(studio, named("glass"), *names, size=(64, 64))
+    made = measured(bench, named("glass"), *names, size=(64, 64))
     rows = {row.method: row for row in made.rows}
     constant, straight, front, screen = (
         rows[name]
@@ -61,8 +61,8 @@ def test_a_deeper_tree_is_nearer_to_all_light_and_what_is_drawn_is_not(studio: S
 
 
 @pytest.mark.usefixtures("along_centers")
-def test_a_thin_wall_mirrors_and_does_not_bend(studio: Studio) -> None:
-    made = measured(studio, named("thin wall"), "ScreenInterfaces", "FrontInterface", "straight rays", size=(192, 192))
+def test_a_thin_wall_mirrors_and_does_not_bend(bench: BenchContext) -> None:
+    made = measured(bench, named("thin wall"), "ScreenInterfaces", "FrontInterface", "straight rays", size=(192, 192))
     rows = {row.method: row for row in made.rows}
     assert rows["FrontInterface"].refusal == "sheets have one interface, at which nothing bends"
     wall, none = rows["ScreenInterfaces"].radiance, rows["straight rays"].radiance
@@ -74,21 +74,21 @@ def test_a_thin_wall_mirrors_and_does_not_bend(studio: Studio) -> None:
 
 
 def test_what_the_planner_picks_for_interfaces_is_measured() -> None:
-    measured = {one.interfaces for one in contenders("interfaces", quick=True)}
+    measured = {one.choices.get("interfaces") for one in contenders("interfaces", quick=True)}
     for case in CASES:
         if case.effect == "interfaces":
             assert tl.plan(case.scene((8, 8))).interfaces in measured
 
 
-def test_media_within_each_other_have_a_method_that_finds_their_order(studio: Studio) -> None:
-    made = measured(studio, named("filled goblet"), "traced-interfaces-depth-12-2-forks", size=(32, 32))
+def test_media_within_each_other_have_a_method_that_finds_their_order(bench: BenchContext) -> None:
+    made = measured(bench, named("filled goblet"), "traced-interfaces-depth-12-2-forks", size=(32, 32))
     row = made.rows[1]
     assert row.parameters == "FragmentLists(light_points=8), TracedInterfaces(depth=12, forks=2)"
     assert row.radiance is not None
 
 
-def test_pictures_are_held_against_the_mean_over_pixels_with_one_sample_and_with_many(studio: Studio) -> None:
-    made = measured(studio, named("glass"), "traced-interfaces-depth-12-2-forks", "constant-thickness", size=(48, 48))
+def test_pictures_are_held_against_the_mean_over_pixels_with_one_sample_and_with_many(bench: BenchContext) -> None:
+    made = measured(bench, named("glass"), "traced-interfaces-depth-12-2-forks", "constant-thickness", size=(48, 48))
     _, constant, row = made.rows
     assert made.truth_rays == 2 * truths.RAYS
     assert 0.0 < made.truth_spread < 0.1
@@ -100,12 +100,12 @@ def test_pictures_are_held_against_the_mean_over_pixels_with_one_sample_and_with
 
 def test_the_reference_follows_rays_until_they_come_out() -> None:
     """In a knot light goes around for a hundred reflections: twelve leave most of some pixels open."""
-    frame = Truth.of(named("glass knot").scene((16, 16)), (16, 16), 1e-3).frame
+    frame = CaseTruth.of(named("glass knot").scene((16, 16)), (16, 16), 1e-3).frame
     assert float(frame.provenance["residual"]) < 0.01
 
 
 def test_noise_of_the_reference_is_no_error(rng: np.random.Generator) -> None:
-    truth = Truth.of(case_of(Sphere().tessellate(24)).scene((96, 96)), (96, 96), 1e-3)
+    truth = CaseTruth.of(case_of(Sphere().tessellate(24)).scene((96, 96)), (96, 96), 1e-3)
     right = truth.frame.radiance
     one, other = (right + 0.3 * rng.normal(size=right.shape) for _ in range(2))
     mean = dataclasses.replace(truth.frame, radiance=0.5 * (one + other))
@@ -123,7 +123,7 @@ def test_noise_of_the_reference_is_no_error(rng: np.random.Generator) -> None:
 
 def test_frosted_glass_has_two_references(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(truths, "PATHS", 2)
-    truth = Truth.over_pixels(named("frosted").scene((8, 8)), (8, 8), 1e-3)
+    truth = CaseTruth.over_pixels(named("frosted").scene((8, 8)), (8, 8), 1e-3)
     assert truth.halves is not None
     assert truth.rays == 4
     one, other = truth.halves

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from translucent.bench.hard.measure import CASES
+from translucent.bench.hard_light import HARD_CASES
 from translucent.bench.judgement import Agreement, agreement, beats, compare_reports, machines_differ, mark_frontier
 from translucent.bench.record import (
     CaseRecord,
@@ -26,14 +26,13 @@ from translucent.bench.record import (
     Shadows,
     TimeStatistics,
 )
-from translucent.bench.run import judged
+from translucent.bench.run import experiments
 from translucent.bench.timing import (
     FEWEST,
     FEWEST_LONG,
     FEWEST_UNSURE,
     MOST,
     MOST_REPEATED,
-    Pace,
     Sample,
     interleaved,
     ratio,
@@ -42,7 +41,7 @@ from translucent.bench.timing import (
 
 from .test_record import PROVENANCE
 
-ALL_HARD = tuple(HardCase(case.id, "", "", "", True) for case in CASES)
+ALL_HARD = tuple(HardCase(case.name, "", "", "", True) for case in HARD_CASES)
 
 
 def row(
@@ -185,7 +184,8 @@ def claims(*cases: CaseRecord, hard: tuple[HardCase, ...] = ()) -> list[bool | N
 
 
 def checked(*cases: CaseRecord, hard: tuple[HardCase, ...] = ()) -> tuple[Claim, ...]:
-    return judged(report(*cases, hard=hard)).claims
+    made = report(*cases, hard=hard)
+    return tuple(judge(made) for experiment in experiments(False) for judge in experiment.claims)
 
 
 def test_claims_hold_where_the_numbers_do() -> None:
@@ -310,7 +310,7 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
 
     # A share of 0.1 s: five rounds of 0.01 s with a floor of as much, and four times as many.
     drawings = {"sure": steady(0.01), "unsure": unsteady(0.01)}
-    found = interleaved(steady(0.01), drawings, 0.23, lambda *_: None, Pace(patience=4.0))
+    found = interleaved(steady(0.01), drawings, 0.23, lambda *_: None, patience=4.0)
     assert len(found["sure"].wall) == 5
     assert 19 <= len(found["unsure"].wall) <= 21
     # In haste: three rounds, more only of what is unsure and cheap.
@@ -323,7 +323,7 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
     }
     # A pace for those who wait: two rounds of what is long.
     drawings = {"sure": steady(0.008), "unsure": unsteady(0.007), "long": unsteady(0.1)}
-    quick = interleaved(steady(0.005), drawings, 0.0, lambda *_: None, Pace(long=0.05))
+    quick = interleaved(steady(0.005), drawings, 0.0, lambda *_: None, long=0.05)
     assert {name: len(one.wall) for name, one in quick.items()} == {
         "sure": FEWEST,
         "unsure": FEWEST_UNSURE,

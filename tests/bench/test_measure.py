@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import NoReturn, get_args
+from typing import Any, NoReturn, get_args
 
 import moderngl
 import numpy as np
 import pytest
 
 import translucent as tl
+from tests.bench.conftest import HASTE
 from tests.bench.measuring import case_of, measured
 from tests.bench.provenance import PROVENANCE
-from translucent.bench import measure as measuring
 from translucent.bench import run as running
 from translucent.bench import scaling
 from translucent.bench.cases import CASES, Case
-from translucent.bench.contenders import CONTENDERS, Effect, check_names, contenders
-from translucent.bench.drawing import Floor, Studio
-from translucent.bench.measure import CaseRun
+from translucent.bench.contenders import CONTENDERS, Contender, Effect, check_names, contenders
+from translucent.bench.drawing import BenchContext, FloorDrawing
+from translucent.bench.experiment import Experiment, Whole
+from translucent.bench.methods import MethodComparison
 from translucent.bench.output import read_report, table, write_report
-from translucent.bench.record import HardCase, Report, ShadowCase
-from translucent.bench.run import Effort, measure_all
-from translucent.bench.scaling import ScalingRun
+from translucent.bench.record import HardCase, Part, Report, ShadowCase
+from translucent.bench.run import measure_all
+from translucent.bench.scaling import CostScaling, ScalingStep
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
-from translucent.bench.truth import Truth
+from translucent.bench.truth import CaseTruth
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes.depth_only import DepthOnlyPass
 from translucent.gpu.passes.opaque import OpaquePass
@@ -34,12 +37,9 @@ from translucent.gpu.storage import Storage
 from translucent.gpu.targets import Targets
 from translucent.planning.passes import PassName
 
-#: Rounds are few and frames small: what is tested is that there are numbers.
-HASTE = Effort(0.0, 0.0, 0.4)
 
-
-def test_rows_have_times_errors_and_pictures(studio: Studio) -> None:
-    made = measured(studio, case_of(lying_torus(48)), "signed-depth", "DepthPeeling", "constant thickness")
+def test_rows_have_times_errors_and_pictures(bench: BenchContext) -> None:
+    made = measured(bench, case_of(lying_torus(48)), "signed-depth", "DepthPeeling", "constant thickness")
     rows = {row.method: row for row in made.rows}
     assert made.failure is None
     assert next(iter(rows)) == "depth only"
@@ -71,19 +71,19 @@ def test_rows_have_times_errors_and_pictures(studio: Studio) -> None:
 
 
 def test_programs_are_compiled_once_for_all_scenes_and_for_the_renderer(
-    studio: Studio, monkeypatch: pytest.MonkeyPatch
+    bench: BenchContext, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     names = ("SignedDepth", "constant thickness", "sphere assumption", "BackFaceDepth")
-    measured(studio, case_of(lying_torus(24)), *names)
+    measured(bench, case_of(lying_torus(24)), *names)
 
     def compiled(*_: object, **__: object) -> NoReturn:
         raise AssertionError("a program that there is")
 
     monkeypatch.setattr(moderngl.Context, "program", compiled)
-    again = measured(studio, case_of(lying_torus(20)), *names)
+    again = measured(bench, case_of(lying_torus(20)), *names)
     assert len(again.rows) >= 8
     assert not [row.failure for row in again.rows if row.failure]
-    assert studio.step(PassName.SIGNED_DEPTH) is studio.renderer.gpu.step(SignedDepthPass), "one for both"
+    assert bench.step(PassName.SIGNED_DEPTH) is bench.renderer.gpu.step(SignedDepthPass), "one for both"
 
 
 @pytest.fixture
@@ -96,7 +96,7 @@ def staged() -> tl.Scene:
 
 
 def test_staging_is_in_the_floor_as_in_every_cost(
-    studio: Studio, staged: tl.Scene, monkeypatch: pytest.MonkeyPatch
+    bench: BenchContext, staged: tl.Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[tuple[str, tuple[int, ...]]] = []
     run = OpaquePass.run
@@ -104,40 +104,40 @@ def test_staging_is_in_the_floor_as_in_every_cost(
     monkeypatch.setattr(
         OpaquePass, "run", lambda self, job, spec: (drawn.append(("opaque", spec.objects)), run(self, job, spec))
     )
-    targets = Targets(studio.gl, (16, 16))
-    floor = Floor(studio, staged, targets)
+    targets = Targets(bench.gl, (16, 16))
+    floor = FloorDrawing(bench, staged, targets)
     floor.draw()
     floor.release()
     assert drawn == [("opaque", (0, 2)), ("depth", (1,))]
     drawn.clear()
-    bare = Floor(studio, dataclasses.replace(staged, objects=staged.bodies), targets)
+    bare = FloorDrawing(bench, dataclasses.replace(staged, objects=staged.bodies), targets)
     bare.draw()
     bare.release()
     targets.release()
     assert drawn == [("depth", (0,))]
 
 
-def test_edges_of_opaque_objects_are_no_errors_of_a_method(studio: Studio, staged: tl.Scene) -> None:
+def test_edges_of_opaque_objects_are_no_errors_of_a_method(bench: BenchContext, staged: tl.Scene) -> None:
     """A rasterizer decides there which of two opaque objects ends a ray, which is not about thickness."""
     inside = [Box((-0.2, -3.0, 0.2), (0.2, 3.0, 0.3)), Box((-3.0, -3.0, -0.4), (3.0, 3.0, -0.3))]
     ends = [tl.Object(box.tessellate(), color=(0.9, 0.1, 0.1)) for box in inside]
     scene = dataclasses.replace(staged, objects=[*staged.bodies, *ends])
-    truth = Truth.of(scene, (64, 64), 1e-3)
+    truth = CaseTruth.of(scene, (64, 64), 1e-3)
     assert truth.diagonal == pytest.approx(np.linalg.norm([2.0, 2.0, 2.0]), rel=1e-2), "of the ball alone"
     depth, kept = truth.frame.thickness[32], truth.inside[32]
     (edges,) = np.nonzero((np.abs(np.diff(depth)) > 0.4) & truth.frame.coverage[32, 1:] & truth.frame.coverage[32, :-1])
     assert len(edges) == 2, "left and right of the bar, where rays end half a radius earlier"
     assert not kept[[edges, edges + 1]].any()
     assert truth.compared.sum() > 300
-    made = measured(studio, Case("mine", "Mine", "mine", lambda _: scene), "signed-depth")
+    made = measured(bench, Case("mine", "Mine", "mine", lambda _: scene), "signed-depth")
     signed = next(row for row in made.rows if row.method == "SignedDepth")
     assert signed.thickness is not None
     assert signed.thickness.p999 < 1e-5
 
 
-def test_shortcuts_get_the_best_thickness_that_there_is(studio: Studio) -> None:
+def test_shortcuts_get_the_best_thickness_that_there_is(bench: BenchContext) -> None:
     """A ball is what the sphere assumption assumes; and the mean is the best constant."""
-    made = measured(studio, case_of(Sphere().tessellate(96)), "sphere assumption", "constant thickness", size=(96, 96))
+    made = measured(bench, case_of(Sphere().tessellate(96)), "sphere assumption", "constant thickness", size=(96, 96))
     rows = {row.method: row for row in made.rows}
     assert float(rows["sphere assumption"].parameters.split()[0]) == pytest.approx(2.0, rel=2e-3)
     assert rows["sphere assumption"].thickness.rms < 0.01  # type: ignore[union-attr]
@@ -150,8 +150,8 @@ def test_shortcuts_get_the_best_thickness_that_there_is(studio: Studio) -> None:
     assert "least squared error" in constant.parameters
 
 
-def test_back_face_depth_without_its_mask_is_wrong_where_there_is_a_gap(studio: Studio) -> None:
-    made = measured(studio, case_of(lying_torus(48)), "back-face-depth")
+def test_back_face_depth_without_its_mask_is_wrong_where_there_is_a_gap(bench: BenchContext) -> None:
+    made = measured(bench, case_of(lying_torus(48)), "back-face-depth")
     rows = {row.method: row for row in made.rows}
     honest, silent = rows["BackFaceDepth"], rows["BackFaceDepth, unmarked"]
     assert honest.invalid > 0.01  # type: ignore[operator]
@@ -159,58 +159,68 @@ def test_back_face_depth_without_its_mask_is_wrong_where_there_is_a_gap(studio: 
     assert silent.thickness.rms > 1e3 * honest.thickness.rms  # type: ignore[union-attr]
 
 
-def test_a_refusal_is_an_answer_and_not_a_failure(studio: Studio) -> None:
+def test_a_refusal_is_an_answer_and_not_a_failure(bench: BenchContext) -> None:
     case = next(case for case in CASES if case.name == "two emitters")
-    made = measured(studio, case, "SignedDepth", "FragmentLists", size=(48, 48))
+    made = measured(bench, case, "SignedDepth", "FragmentLists", size=(48, 48))
     rows = {row.method: row for row in made.rows}
     assert "emission among several media" in str(rows["SignedDepth"].refusal)
     assert rows["FragmentLists"].radiance is not None
-    assert Report(running.provenance(studio.renderer, "test", quick=True), (made,)).failures == ()
+    assert Report(running.provenance(bench.renderer, "test", quick=True), (made,)).failures == ()
 
 
-def test_what_fails_in_the_middle_is_a_row(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(shared: Studio, contender: object, *more: object) -> object:
-        if contender.name == "BackFaceDepth":  # type: ignore[attr-defined]
+def test_what_fails_in_the_middle_is_a_row(bench: BenchContext, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(contender: Contender, *more: Any) -> Any:
+        if contender.name == "BackFaceDepth":
             raise MemoryError("no room for\nthe frame")
-        return original(shared, contender, *more)  # type: ignore[arg-type]
+        return original(contender, *more)
 
-    original = measuring.drawing
-    monkeypatch.setattr(measuring, "drawing", failing)
-    made = measured(studio, case_of(Sphere().tessellate(32)), "BackFaceDepth", "SignedDepth")
+    original = Contender.drawing
+    monkeypatch.setattr(Contender, "drawing", failing)
+    made = measured(bench, case_of(Sphere().tessellate(32)), "BackFaceDepth", "SignedDepth")
     rows = {row.method: row for row in made.rows}
     assert rows["BackFaceDepth"].failure == "MemoryError: no room for the frame"
     assert rows["SignedDepth"].ratio is not None
 
 
-def test_a_model_without_a_pixel_to_trust_fails(studio: Studio) -> None:
+def test_a_model_without_a_pixel_to_trust_fails(bench: BenchContext) -> None:
     wall = tl.Mesh(np.array([(-1, -1, 0), (1, -1, 0), (0, 1, 0)], float), np.array([(0, 1, 2)], np.int32), name="wall")
-    made = measured(studio, case_of(wall), "SignedDepth")
+    made = measured(bench, case_of(wall), "SignedDepth")
     assert "no pixel of the reference can be trusted; 'wall'" in str(made.failure)
     assert made.rows == ()
 
 
-def test_density_is_marched_without_a_gpu(studio: Studio) -> None:
+def test_density_is_marched_without_a_gpu(bench: BenchContext) -> None:
     case = next(case for case in CASES if case.name == "density")
     with tl.Renderer("cpu") as cpu:
-        chosen = contenders(
-            "density",
-            quick=True,
-            only=("RayMarched on the CPU, 8 steps", "RayMarched on the CPU, 64 steps", "cpu backend"),
-        )
-        made = CaseRun(studio, cpu, case, (48, 48), 0.0).measure(chosen)
+        bench.cpu = cpu
+        names = ("RayMarched on the CPU, 8 steps", "RayMarched on the CPU, 64 steps", "cpu backend")
+        made = measured(bench, case, *names, size=(48, 48))
     rows = {row.method: row for row in made.rows}
     coarse, fine = rows["RayMarched on the CPU, 8 steps"], rows["RayMarched on the CPU, 64 steps"]
     assert coarse.radiance.rms > 20 * fine.radiance.rms  # type: ignore[union-attr]  # second order: 64 times
     assert rows["cpu backend"].radiance.rms < 1e-6  # type: ignore[union-attr]
 
 
-def small(monkeypatch: pytest.MonkeyPatch, *cases: Case) -> None:
-    """A report of these cases alone."""
-    monkeypatch.setattr(running, "CASES", cases)
-    monkeypatch.setattr(running.ScalingRun, "ladders", lambda self: [])
-    monkeypatch.setattr(running, "measure_hard_cases", lambda renderer: iter(()))
-    monkeypatch.setattr(running, "measure_slabs", lambda *, quick: ())
-    monkeypatch.setattr(running.ShadowsRun, "steps", lambda self: {})
+class Told(Experiment[Whole]):
+    """An experiment whose record is known beforehand."""
+
+    shown = (Whole("one"),)
+    label = ""
+
+    def __init__(self, part: Part, into: str, record: Any) -> None:
+        self.part, self.into, self.known = part, into, record  # type: ignore[misc]
+
+    def measure(self, bench: BenchContext, scene: Whole) -> Any:
+        return self.known
+
+
+def small(monkeypatch: pytest.MonkeyPatch, *cases: Case, more: tuple[Told, ...] = ()) -> None:
+    """A report of these cases, and of what is known."""
+
+    def few(quick: bool, extra: Sequence[Case] = (), methods: Sequence[str] = ()) -> tuple[Experiment[Any], ...]:
+        return MethodComparison((*extra, *cases), methods, quick), *more
+
+    monkeypatch.setattr(running, "experiments", few)
 
 
 def test_a_case_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -244,11 +254,8 @@ def test_an_interruption_leaves_what_is_done(monkeypatch: pytest.MonkeyPatch, tm
 
 
 def test_parts_are_measured_anew_and_the_rest_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    small(monkeypatch, case_of(Sphere().tessellate(24)))
     ball = ShadowCase("ball", "Ball", "round")
-    monkeypatch.setattr(
-        running.ShadowsRun, "steps", lambda self: {"ball": lambda made: dataclasses.replace(made, cases=(ball,))}
-    )
+    small(monkeypatch, case_of(Sphere().tessellate(24)), more=(Told("shadows", "shadows.cases", ball),))
     hard = HardCase("H01", "grazing", "exact", "as promised", passed=True)
     old = Report(PROVENANCE, hard_cases=(hard,), seconds=9.0, complete=True)
     new = measure_all(only=["shadows"], base=old, quick=True, command="the command")
@@ -319,21 +326,23 @@ def test_shells_and_plates_have_as_many_surfaces_as_asked_for() -> None:
     assert truth.thickness == pytest.approx(0.5)
 
 
-def test_cost_is_measured_along_an_axis_and_limits_are_told(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
-    def layers(count: int):  # type: ignore[no-untyped-def]
+def test_cost_is_measured_along_an_axis_and_limits_are_told(
+    bench: BenchContext, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def layers(count: int) -> tuple[tl.Scene, tuple[int, int]]:
         camera = tl.Camera.orthographic((0, 0, 2), (0, 0, 0), height=1.0)
-        return lambda: (tl.Scene([tl.Object(plates(count), tl.Medium(absorption=(1, 1, 1)))], camera), (16, 16))
+        return tl.Scene([tl.Object(plates(count), tl.Medium(absorption=(1, 1, 1)))], camera), (16, 16)
 
-    def gone() -> object:
+    def gone() -> NoReturn:
         raise OSError("gone")
 
     monkeypatch.setattr(scaling, "METHODS", {"SignedDepth": tl.SignedDepth(), "KBuffer": tl.KBuffer(k=256)})
-    ladder = scaling.Ladder("layers", "16 x 16", {2: layers(2), 20: layers(20), 30: gone})  # type: ignore[dict-item]
-    monkeypatch.setattr(ScalingRun, "ladders", lambda self: [ladder])
     monkeypatch.setattr(Storage, "largest", 1000)
-    *_, (name, series) = ScalingRun(studio, 0.0, quick=True).steps()
-    assert name == "layers 30"
-    found = {one.family: one.points for one in series}
+    report, experiment = Report(PROVENANCE), CostScaling()
+    for x, make in {2: partial(layers, 2), 20: partial(layers, 20), 30: gone}.items():
+        step = ScalingStep("layers", "16 x 16", x, make)
+        report = experiment.added(report, experiment.measure(bench, step))
+    found = {one.family: one.points for one in report.scaling}
     assert found.keys() == {"depth only", "SignedDepth", "KBuffer"}
     assert [point.x for point in found["SignedDepth"]] == [2, 20, 30]
     assert [point.ratio is not None for point in found["SignedDepth"]] == [True, True, False]
@@ -342,8 +351,14 @@ def test_cost_is_measured_along_an_axis_and_limits_are_told(studio: Studio, monk
     assert [point.failure for point in found["KBuffer"]] == [None, None, "OSError: gone"]
 
 
-def test_the_ladders_are_those_of_the_design(studio: Studio) -> None:
-    full, quick = ({x.axis: list(x.steps) for x in ScalingRun(studio, 0, quick).ladders()} for quick in (False, True))
+def test_the_axes_are_those_of_the_design(bench: BenchContext) -> None:
+    def steps(quick: bool) -> dict[str, list[int]]:
+        found: dict[str, list[int]] = {}
+        for step in CostScaling(quick=quick).scenes(bench):
+            found.setdefault(step.axis, []).append(step.x)
+        return found
+
+    full, quick = steps(False), steps(True)
     assert full.keys() == quick.keys() == {"triangles", "pixels", "layers", "media"}
     assert min(full["triangles"]) <= 1100
     assert max(full["triangles"]) >= 1_000_000

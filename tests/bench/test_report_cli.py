@@ -13,7 +13,7 @@ import pytest
 from tests.bench.provenance import PROVENANCE
 from tests.command_line import Run
 from translucent.assets import mesh_path
-from translucent.bench.models import effect_of, model_cases
+from translucent.bench.cases import effect_of, model_cases
 from translucent.bench.record import CaseRecord, ErrorStatistics, MethodRow, Ratio, Report, TimeStatistics
 from translucent.media.medium import Medium
 from translucent.mesh_files import load_mesh
@@ -173,12 +173,12 @@ def test_bad_usage(
 def nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     """The models that the test asks for, and none of the toolkit's scenes, sizes and hard cases."""
     from translucent.bench import run as measuring
+    from translucent.bench.methods import MethodComparison
 
-    monkeypatch.setattr(measuring, "CASES", ())
-    monkeypatch.setattr(measuring.ScalingRun, "ladders", lambda _: ())
-    monkeypatch.setattr(measuring, "measure_hard_cases", lambda _: ())
-    monkeypatch.setattr(measuring, "measure_slabs", lambda *, quick: ())
-    monkeypatch.setattr(measuring.ShadowsRun, "steps", lambda _: {})
+    def few(quick: bool, extra: Any = (), methods: Any = ()) -> Any:
+        return (MethodComparison(extra, methods, quick),)
+
+    monkeypatch.setattr(measuring, "experiments", few)
 
 
 SMALL = ("--quick", "--size", "64x48", "--methods", "signed-depth,constant-thickness")
@@ -241,16 +241,16 @@ def test_a_medium_for_the_model_says_what_would_be_seen_in_it(run: Run, tmp_path
 
 @pytest.mark.usefixtures("nothing_else")
 def test_interrupted_the_finished_scenes_are_written(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from translucent.bench.measure import CaseRun
+    from translucent.bench.methods import MethodComparison
 
-    measure = CaseRun.measure
+    measure = MethodComparison.measure
 
-    def impatient(self: CaseRun, *arguments: Any) -> CaseRecord:
-        if self.case.name == "model bear":
+    def impatient(self: MethodComparison, bench: Any, case: Any) -> Any:
+        if case.name == "model bear":
             raise KeyboardInterrupt
-        return measure(self, *arguments)
+        return measure(self, bench, case)
 
-    monkeypatch.setattr(CaseRun, "measure", impatient)
+    monkeypatch.setattr(MethodComparison, "measure", impatient)
     result = run("knot", "bear", "-o", tmp_path, *SMALL)
     assert result.code == 130
     assert "error: interrupted" in result.err
@@ -261,16 +261,16 @@ def test_interrupted_the_finished_scenes_are_written(run: Run, tmp_path: Path, m
 
 @pytest.mark.usefixtures("nothing_else")
 def test_a_case_that_fails_leaves_the_others(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from translucent.bench.truth import Truth
+    from translucent.bench.truth import CaseTruth
 
-    trace = Truth.of
+    trace = CaseTruth.of
 
-    def failing(scene: Any, *arguments: Any) -> Truth:
+    def failing(scene: Any, *arguments: Any) -> CaseTruth:
         if "knot" in scene.objects[0].mesh.name:
             raise RuntimeError("no luck")
         return trace(scene, *arguments)
 
-    monkeypatch.setattr(Truth, "of", failing)
+    monkeypatch.setattr(CaseTruth, "of", failing)
     result = run("knot", "bear", "-o", tmp_path, *SMALL)
     assert result.code == 1
     assert "model knot: RuntimeError: no luck" in result.err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,35 +12,44 @@ import pytest
 import translucent as tl
 from tests.bench.measuring import measured, named
 from tests.bench.provenance import PROVENANCE
+from translucent.bench.cases import CASES, Case
 from translucent.bench.claims import SLAB_CLAIMS
-from translucent.bench.drawing import Studio
+from translucent.bench.drawing import BenchContext
+from translucent.bench.engines import (
+    RAYS,
+    Frostbite,
+    NormalizedDiffusion,
+    PaintLayer,
+    cosine_directions,
+    visible_points,
+)
+from translucent.bench.experiment import Whole
 from translucent.bench.record import Report, Slab
-from translucent.bench.scattering import slabs as slab_bench
-from translucent.bench.scattering.engines import Frostbite, NormalizedDiffusion, PaintLayer
-from translucent.bench.scattering.scenes import SCENES, ScatteringScene
-from translucent.bench.scattering.shot import RAYS, cosine_directions, shot_of
-from translucent.bench.scattering.stored import StoredTruth, file_name, stored_truth
-from translucent.bench.truth import Truth
+from translucent.bench.slabs import SlabComparison
+from translucent.bench.truth import CaseTruth, StoredTruth, stored_truth, truth_file
 from translucent.diffusion.cache import FieldCache
 from translucent.errors import InputError
 from translucent.geometry.solids import Sphere
+
+#: Those whose truth is stored.
+SCENES = [case for case in CASES if case.paths]
 
 WHITE = tl.Environment.constant((1, 1, 1))
 
 
 @pytest.mark.parametrize("one", SCENES, ids=lambda one: one.name)
-def test_each_scene_has_a_truth_of_its_own(one: ScatteringScene) -> None:
-    truth = stored_truth(one.name, one.make())
-    assert truth.mask.shape == (one.side, one.side)
+def test_each_scene_has_a_truth_of_its_own(one: Case) -> None:
+    truth = stored_truth(one.name, one.scene((0, 0)))
+    assert truth.mask.shape == (one.compared, one.compared)
     assert truth.noise < 0.04
-    assert len(files("translucent.bench.scattering").joinpath("truth", file_name(one.name)).read_bytes()) < 30_000
+    assert len(files("translucent.bench").joinpath(truth_file(one.name)).read_bytes()) < 30_000
     # The two halves differ by no more than their standard error says: their mean has half of the difference.
     apart = 0.5 * np.sqrt(((truth.halves[0] - truth.halves[1]) ** 2).mean())
     assert apart == pytest.approx(np.sqrt((truth.error**2).mean()), rel=0.1)
 
 
 def test_a_scene_that_has_changed_is_told() -> None:
-    jade = SCENES[0].make()
+    jade = SCENES[0].scene((0, 0))
     body = jade.objects[0]
     assert body.medium is not None
     media = [
@@ -74,7 +84,7 @@ def test_a_truth_is_the_same_after_writing_and_reading(rng: np.random.Generator)
 
 
 def test_errors_are_shares_of_the_mean_without_the_noise() -> None:
-    truth = Truth.stored("jade ring", SCENES[0].make())
+    truth = CaseTruth.stored("jade ring", SCENES[0].scene((0, 0)))
     used = truth.compared
     mean = truth.frame.radiance[used].mean(axis=0)
     shown = dataclasses.replace(truth.frame, radiance=truth.frame.radiance + 0.1 * mean)
@@ -89,12 +99,14 @@ def test_errors_are_shares_of_the_mean_without_the_noise() -> None:
     assert found.block == pytest.approx(wanted, rel=0.1)
 
 
-def test_diffusion_is_nearer_than_layers_and_what_engines_do(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_diffusion_is_nearer_than_layers_and_what_engines_do(
+    bench: BenchContext, monkeypatch: pytest.MonkeyPatch
+) -> None:
     names = ("diffusion-resolution-16", "diffusion-resolution-32", "ScatteringLayer", "layer-without-inner-mirrors")
     solved: list[tl.Diffusion] = []
     solve = FieldCache._body
     monkeypatch.setattr(FieldCache, "_body", lambda *given: (solved.append(given[-1]), solve(*given))[1])
-    made = measured(studio, named("jade ring"), *names)
+    made = measured(bench, named("jade ring"), *names)
     assert solved == [tl.Diffusion(16), tl.Diffusion(32)], "once each, though drawn in two sizes"
     assert made.truth_noise is not None
     assert made.compared_size == (40, 40)
@@ -121,7 +133,7 @@ def test_paint_without_interfaces_is_the_layer(renderer: tl.Renderer) -> None:
     """NumPy and the shader agree where next to nothing mirrors inside."""
     sky = tl.Environment.gradient((0.2, 0.1, 0.3), (1.0, 1.4, 0.8))
     scene = ball(tl.Medium(absorption=(0.1, 0.3, 1.0), scattering=(2.0, 1.0, 4.0), anisotropy=0.3, ior=1.0005), sky)
-    shot = shot_of(renderer, scene, (24, 24))
+    shot = visible_points(renderer, scene, (24, 24))
     paint = shot.frame(PaintLayer().light(shot)).radiance.reshape(-1, 3)[shot.pixels]
     layer = renderer.render(scene, (24, 24), scattering=tl.ScatteringLayer()).radiance.reshape(-1, 3)[shot.pixels]
     # An interface that faint still mirrors 0.2 % of diffuse light.
@@ -130,7 +142,7 @@ def test_paint_without_interfaces_is_the_layer(renderer: tl.Renderer) -> None:
 
 
 def test_normalized_diffusion_gives_back_its_color_in_uniform_light(renderer: tl.Renderer) -> None:
-    shot = shot_of(renderer, ball(tl.Medium((0.1, 1, 5), (20, 20, 20), ior=1.4), WHITE), (16, 16))
+    shot = visible_points(renderer, ball(tl.Medium((0.1, 1, 5), (20, 20, 20), ior=1.4), WHITE), (16, 16))
     found = NormalizedDiffusion(400).light(shot)
     np.testing.assert_allclose(found, np.broadcast_to(shot.entering * shot.diffuse_color, found.shape), rtol=1e-3)
     assert (np.diff(shot.diffuse_color) < 0).all()
@@ -142,14 +154,14 @@ def test_normalized_diffusion_spreads_light_by_the_mean_free_path(renderer: tl.R
     found = []
     for extinction in (2.0, 8.0):
         medium = tl.Medium(0.001 * extinction, 0.999 * extinction)
-        shot = shot_of(renderer, ball(medium, dark, tl.PointLight((5, 0, 0), (25, 25, 25))), (16, 16))
+        shot = visible_points(renderer, ball(medium, dark, tl.PointLight((5, 0, 0), (25, 25, 25))), (16, 16))
         found.append(NormalizedDiffusion(400).light(shot)[shot.points[:, 0] < -0.2].mean())
     assert found[0] > 1.5 * found[1] > 0
 
 
 def test_frostbite_gets_the_best_of_its_settings(renderer: tl.Renderer) -> None:
     lamp = tl.PointLight((2, 1, -2), (9, 9, 9))
-    shot = shot_of(renderer, ball(tl.Medium(0.1, (4, 6, 8)), WHITE, lamp), (16, 16))
+    shot = visible_points(renderer, ball(tl.Medium(0.1, (4, 6, 8)), WHITE, lamp), (16, 16))
     wanted = Frostbite(wrap=0.5, distortion=0.3, power=8.0, reach=1.0, front=0.4, scale=2.0, ambient=0.7)
     found = Frostbite().fitted(shot, shot.frame(wanted.light(shot)).radiance.astype(np.float64))
     np.testing.assert_allclose(found.light(shot), wanted.light(shot), rtol=0.02, atol=1e-4)
@@ -163,10 +175,14 @@ def test_directions_are_even_by_the_cosine(rng: np.random.Generator) -> None:
     assert cosine.mean(axis=1) == pytest.approx(2 / 3, abs=1 / RAYS)
 
 
-def test_slabs_are_measured_by_all_ways(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(slab_bench, "ALBEDOS", (0.99,))
-    monkeypatch.setattr(slab_bench, "DEPTHS", ((0.005, 4.0, 16.0),))
-    found = {(slab.ior, slab.depth): slab for slab in slab_bench.measure_slabs(quick=True)}
+def measured_slabs(*given: Any) -> tuple[Slab, ...]:
+    """By albedos, triples of depths, anisotropies and indices of refraction."""
+    found: tuple[Slab, ...] = SlabComparison((Whole(),), *given).measure(None, Whole())
+    return found
+
+
+def test_slabs_are_measured_by_all_models() -> None:
+    found = {(slab.ior, slab.depth): slab for slab in measured_slabs((0.99,), ((0.005, 4.0, 16.0),), (0.0,))}
     assert len(found) == 6
     for slab in found.values():
         assert abs(slab.error("diffusion")) < 0.04
@@ -179,13 +195,10 @@ def test_slabs_are_measured_by_all_ways(monkeypatch: pytest.MonkeyPatch) -> None
     )
 
 
-def test_slabs_that_scatter_ahead_are_near(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The worst of all, 0.075 off, were it not that what interfaces mirror of the haze is dimmed on its way back."""
-    monkeypatch.setattr(slab_bench, "ALBEDOS", (0.9,))
-    monkeypatch.setattr(slab_bench, "DEPTHS", ((2.0, 4.0, 8.0),))
-    monkeypatch.setattr(slab_bench, "INDICES", (1.5,))
-    monkeypatch.setattr(slab_bench, "ANISOTROPIES", (0.9,))
-    assert max(abs(slab.error("diffusion")) for slab in slab_bench.measure_slabs(quick=False)) < 0.03
+def test_slabs_that_scatter_ahead_are_near() -> None:
+    """The worst of all, 0.075 off, were it not that the haze is dimmed on its way back from interfaces."""
+    found = measured_slabs((0.9,), ((2.0, 4.0, 8.0),), (0.9,), (1.5,))
+    assert max(abs(slab.error("diffusion")) for slab in found) < 0.03
 
 
 def slab(depth: float, transmittance: float, **more: float) -> Slab:

@@ -10,8 +10,10 @@ import pytest
 
 import translucent as tl
 from tests.bench.provenance import PROVENANCE
+from translucent.bench import shadows
+from translucent.bench.caustics import CAUSTIC_SCENES, MEDIUM_SCENES, GroundCaustics, SkyShadows
 from translucent.bench.claims import SHADOW_CLAIMS
-from translucent.bench.drawing import Studio
+from translucent.bench.drawing import BenchContext
 from translucent.bench.judgement import compare_reports
 from translucent.bench.output import table
 from translucent.bench.page import build_page
@@ -31,31 +33,25 @@ from translucent.bench.record import (
     SkyRow,
     TimeStatistics,
 )
-from translucent.bench.shadows import caustic_media, caustics, sky
-from translucent.bench.shadows import measure as measuring
-from translucent.bench.shadows.maps import map_camera
-from translucent.bench.shadows.measure import ShadowEffort, measure_shadow
-from translucent.bench.shadows.part import ShadowsRun
-from translucent.bench.shadows.scenes import SCENES, WINE, ShadowScene, over_ground
+from translucent.bench.run import experiments
+from translucent.bench.shadows import SHADOW_SCENES, WINE, LightScene, ShadowMapComparison, map_camera, over_ground
 from translucent.geometry.solids import Box, Sphere
 
-HASTE = ShadowEffort((128, 256), 64, 56, 0.0)
+HASTE = ShadowMapComparison((), (128, 256), texels=64, pixels=56, seconds=0.0)
 
 
-def told(*objects: tl.Object, light: str = "sun") -> ShadowScene:
-    return ShadowScene("mine", "Mine", "mine", lambda: over_ground(objects, light))
+def told(*objects: tl.Object, light: str = "sun") -> LightScene:
+    return LightScene("mine", "Mine", "mine", lambda: over_ground(objects, light))
 
 
 BALL = tl.Object(Sphere().tessellate(48), WINE)
 BLOCK = tl.Object(Box((-0.3, 1.3, -0.3), (0.3, 1.5, 0.3)).tessellate())
 
 
-def test_maps_are_nearer_than_what_others_throw(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measuring, "USUAL", 256)
+def test_maps_are_nearer_than_what_others_throw(bench: BenchContext) -> None:
     # Texels of the map that was rounded to half floats before.
-    made = measure_shadow(
-        studio, dataclasses.replace(told(BALL), pictured=True), dataclasses.replace(HASTE, texels=256)
-    )
+    haste = dataclasses.replace(HASTE, usual=256, texels=256)
+    made = haste.measure(bench, dataclasses.replace(told(BALL), pictured=True))
     assert made.failure is None
     rows = {row.method: row for row in made.rows}
     assert not [row.failure or row.refusal for row in made.rows if row.failure or row.refusal]
@@ -75,8 +71,8 @@ def test_maps_are_nearer_than_what_others_throw(studio: Studio, monkeypatch: pyt
     assert np.nanmin(error.array()) < -0.5, "an opaque map takes light away"
 
 
-def test_what_is_opaque_is_in_the_way_of_maps_and_keeps_some_rows_out(studio: Studio) -> None:
-    made = measure_shadow(studio, told(BALL, BLOCK, light="lamp"), HASTE)
+def test_what_is_opaque_is_in_the_way_of_maps_and_keeps_some_rows_out(bench: BenchContext) -> None:
+    made = HASTE.measure(bench, told(BALL, BLOCK, light="lamp"))
     assert (made.failure, made.opaque, made.texels) == (None, True, None)
     rows = {row.method: row for row in made.rows}
     assert rows[HALF].refusal == "drawn without opaque objects"
@@ -84,16 +80,16 @@ def test_what_is_opaque_is_in_the_way_of_maps_and_keeps_some_rows_out(studio: St
     assert rows["map of 256"].errors.median < 1e-4
 
 
-def test_what_fails_is_told_and_leaves_the_rest(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_fails_is_told_and_leaves_the_rest(bench: BenchContext, monkeypatch: pytest.MonkeyPatch) -> None:
     def failing(*_: object) -> object:
         raise MemoryError("no room for\nthe map")
 
-    monkeypatch.setattr(measuring, "map_times", failing)
-    made = measure_shadow(studio, told(BALL), HASTE)
+    monkeypatch.setattr(shadows, "map_times", failing)
+    made = HASTE.measure(bench, told(BALL))
     rows = {row.method: row for row in made.rows}
     assert rows["map of 128"].failure == "MemoryError: no room for the map"
     assert rows[OPAQUE].errors is not None
-    broken = measure_shadow(studio, ShadowScene("gone", "Gone", "", failing), HASTE)  # type: ignore[arg-type]
+    broken = HASTE.measure(bench, LightScene("gone", "Gone", "", failing))  # type: ignore[arg-type]
     assert broken.failure == "MemoryError: no room for the map"
     report = Report(PROVENANCE, shadows=Shadows((made, broken), sky_failure="no sky"))
     assert [line.partition(":")[0] for line in report.failures] == [
@@ -117,8 +113,8 @@ def test_the_largest_ground_is_left_out_of_maps_wherever_it_stands() -> None:
 
 
 def test_scenes_are_those_of_the_design() -> None:
-    names = {scene.name for scene in SCENES}
-    assert len(names) == len(SCENES)
+    names = {scene.name for scene in SHADOW_SCENES}
+    assert len(names) == len(SHADOW_SCENES)
     lights = {"sun", "lamp"}
     assert {
         f"{mesh}, {light}" for mesh in ("bear", "knot", "shell", "goblet", "bangle", "soap") for light in lights
@@ -127,15 +123,14 @@ def test_scenes_are_those_of_the_design() -> None:
 
 
 def test_directions_come_nearer_to_light_from_everywhere(renderer: tl.Renderer) -> None:
-    rows = {
-        row.directions: row.error for row in sky.measure_sky(renderer, sky.SkyEffort(("sky",), (4, 48), (16, 12), 8))
-    }
+    few = SkyShadows(environments=("sky",), directions=(4, 48), size=(16, 12), strata=8)
+    rows = {row.directions: row.error for row in few.rows(renderer)}
     assert rows[48] < 0.06
     assert rows[48] < 0.5 * rows[4] < 0.15
 
 
-def test_a_caustic_has_the_power_of_the_truth(renderer: tl.Renderer) -> None:
-    made = caustics.measure_caustic(renderer, caustics.SCENES[0], caustics.CausticEffort((20_000,), 4_000, (32, 24)))
+def test_a_caustic_has_the_power_of_the_truth(bench: BenchContext) -> None:
+    made = GroundCaustics((), (20_000,), 4_000, (32, 24)).measure(bench, CAUSTIC_SCENES[0])
     assert made.failure is None
     (row,) = made.rows
     assert abs(row.power) < 0.02
@@ -143,10 +138,14 @@ def test_a_caustic_has_the_power_of_the_truth(renderer: tl.Renderer) -> None:
     assert [picture.method for picture in made.pictures] == ["the picture", "reference", "20,000 photons"]
 
 
-def test_steps_of_a_quick_run_are_few(studio: Studio) -> None:
-    quick, full = (list(ShadowsRun(studio, quick).steps()) for quick in (True, False))
+def test_a_quick_run_has_few_scenes(bench: BenchContext) -> None:
+    def steps(quick: bool) -> list[str]:
+        parts = [one for one in experiments(quick) if one.part == "shadows"]
+        return [f"{one.label}{scene.name}" for one in parts for scene in one.scenes(bench)]
+
+    quick, full = steps(True), steps(False)
     assert quick == ["shadow, bear, sun", "shadow, two media", "shadows of environments", "caustic, glass ball"]
-    assert len(full) == len(SCENES) + 1 + len(caustics.SCENES) + len(caustic_media.SCENES)
+    assert len(full) == len(SHADOW_SCENES) + 1 + len(CAUSTIC_SCENES) + len(MEDIUM_SCENES)
     assert set(quick) < set(full)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from translucent.bench.judgement import NOISES, error_of
@@ -375,71 +376,70 @@ def _near_in_medium(case: CausticMediumCase) -> Verdict | None:
     return Verdict(found.where, found.held, found.words + without, found.badness)
 
 
-SHADOW_CLAIMS: tuple[Judge, ...] = (
-    ClaimRule(
+_worst = partial(ClaimRule, worst=True)
+
+SHADOW_MAP_CLAIMS: tuple[Judge, ...] = (
+    _worst(
         "In the rays of a shadow map's texels, transmittance is within 1e-5 of the reference, but for one "
         "in a thousand and for outlines",
         _shadows,
         _exact,
-        worst=True,
     ),
-    ClaimRule(
+    _worst(
         f"Errors of shadows fall with the width of texels, outlines included: order {LEAST_ORDER:g} or better",
         _shadows,
         _falling,
-        worst=True,
     ),
-    ClaimRule(
+    _worst(
         f"A shadow map takes at most {MOST_OF_DEPTH:g} times as long as one of depth alone, at {USUAL} texels, "
         "where bodies have one medium and nothing opaque is in the way",
         lambda report: [case for case in _shadows(report) if case.alike and not case.opaque],
         _cheap,
-        worst=True,
     ),
-    ClaimRule(
+    _worst(
         f"It takes at most {MOST_OF_DEPTH:g} times as long where media differ, or something opaque is in the way",
         lambda report: [case for case in _shadows(report) if case.opaque or not case.alike],
         _cheap,
-        worst=True,
     ),
-    ClaimRule(
+    _worst(
         f"Opaque shadow maps, one thickness for each body and float16 are at least {SHADOW_FACTOR:g} times as far off "
         f"as a map of {USUAL}, in the median",
         _shadows,
         _shortcuts,
-        worst=True,
     ),
-    ClaimRule(
+)
+SKY_CLAIMS: tuple[Judge, ...] = (
+    _worst(
         f"Shadows of an environment by {DIRECTIONS} directions are within {SKY_ERROR:.0%} of the mean",
         lambda report: [row for row in report.shadows.sky if row.directions == DIRECTIONS],
         _near_sky,
-        worst=True,
     ),
-    ClaimRule(
+    _worst(
         "Errors of shadows of an environment fall with the root of the number of directions, or faster",
         _skies,
         _converging,
-        worst=True,
     ),
-    ClaimRule(
-        f"Caustics have the power of the truth within {POWER_ERROR:.0%}, from {PHOTONS:,} photons",
-        _caustics,
-        _powerful,
-        worst=True,
+)
+CAUSTIC_CLAIMS: tuple[Judge, ...] = (
+    _worst(
+        f"Caustics have the power of the truth within {POWER_ERROR:.0%}, from {PHOTONS:,} photons", _caustics, _powerful
     ),
-    ClaimRule(
+    _worst(
         f"Caustics are within {CAUSTIC_ERROR:g} of the mean, blurred by a pixel, from {PHOTONS:,} photons",
         _caustics,
         _sharp,
-        worst=True,
     ),
-    ClaimRule(
+)
+MEDIUM_CLAIMS: tuple[Judge, ...] = (
+    _worst(
         f"In fog, wax and milk, light behind glass is within {CAUSTIC_ERROR:g} of the mean, with photons",
         lambda report: report.shadows.media,
         _near_in_medium,
-        worst=True,
     ),
 )
+
+#: All claims about shadows and caustics, as the page tells them again.
+SHADOW_CLAIMS = (*SHADOW_MAP_CLAIMS, *SKY_CLAIMS, *CAUSTIC_CLAIMS, *MEDIUM_CLAIMS)
 
 
 def hard_claim(known: Sequence[str]) -> Judge:

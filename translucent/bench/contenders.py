@@ -1,16 +1,25 @@
-"""Contenders, as data: the methods with their parameters, and the shortcuts of other renderers."""
+"""Contenders: the methods with their parameters, and the shortcuts of other renderers, each a row of a case."""
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Literal, get_args
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Literal, NamedTuple, Self, get_args
 
-from translucent.bench.record import RowKind
-from translucent.bench.scattering.engines import Engine, Frostbite, NormalizedDiffusion, PaintLayer
+import numpy as np
+
+from translucent import reference
+from translucent.bench.drawing import BenchContext, Drawing, FrameDrawing, PlanDrawing, ShortcutDrawing, Size
+from translucent.bench.engines import Engine, Frostbite, NormalizedDiffusion, PaintLayer, visible_points
+from translucent.bench.record import Quantity, RowKind
 from translucent.errors import InputError
-from translucent.planning.interfaces import FrontInterface, Interfaces, ScreenInterfaces, TracedInterfaces
+from translucent.frames.frame import Frame
+from translucent.gpu.passes.shortcuts import HalfFloatPass, NearestFace, NearestFacePass, Shortcut, UnmarkedBackFacePass
+from translucent.gpu.targets import Targets
+from translucent.planning.interfaces import FrontInterface, ScreenInterfaces, TracedInterfaces
 from translucent.planning.methods import (
     METHODS,
     BackFaceDepth,
@@ -25,11 +34,11 @@ from translucent.planning.methods import (
 )
 from translucent.planning.methods.depth_peeling import MAX_LAYERS
 from translucent.planning.methods.ray_marched import Quadrature
+from translucent.planning.notes import NoteKind
+from translucent.planning.passes import PassName
+from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
-from translucent.scene.scene import Scene
-
-#: Kinds of contenders: by the plan for its method, by a shortcut of the bench, or without OpenGL.
-Technique = Literal["plan", "constant", "ball", "unmarked", "half", "cpu", "march", "engine"]
+from translucent.scene.scene import Object, Scene
 
 #: Effects of a scene, which decide on the contenders that are measured.
 Effect = Literal["absorption", "emission", "scattering", "density", "sheet", "interfaces", "multiple scattering"]
@@ -39,30 +48,62 @@ REFRACTED_IOR = 1.5
 
 _WHOLE_FRAMES: tuple[Effect, ...] = ("interfaces", "multiple scattering")
 _ALL: tuple[Effect, ...] = tuple(effect for effect in get_args(Effect) if effect not in _WHOLE_FRAMES)
-_STEPS = (8, 16, 32, 64, 128, 256, 512)
 _SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
+_INTERFACES: tuple[Effect, ...] = ("interfaces",)
+_SCATTERING: tuple[Effect, ...] = ("multiple scattering",)
 
-#: Largest number of steps with light scattered into each: more take seconds for a frame.
-_MOST_LIT_STEPS = 128
+#: Steps of marching; with more than so many, light scattered into each takes seconds for a frame.
+_STEPS, _MOST_LIT_STEPS = (8, 16, 32, 64, 128, 256, 512), 128
+
+#: Light that a sum of one event each does not have; rows say so by their effect.
+_LIT = (NoteKind.SCATTERED_AGAIN,)
+
+#: Effects that change pictures, but not the thickness along straight rays.
+_BESIDE_THICKNESS = (
+    *_LIT,
+    NoteKind.LIGHTS_LEFT_OUT,
+    NoteKind.ONLY_REMOVES,
+    NoteKind.REFRACTION,
+    NoteKind.LATER_REFRACTION,
+    NoteKind.CUT_OFF_PATHS,
+)
 
 #: Trees of traced interfaces, as depth and forks, and whether brief cases have them: from the cheapest tree to one
 #: whose depth is beyond the planner's, which is among them, each with as many forks as pay there.
 _TREES = {(2, 0): True, (4, 0): False, (4, 1): True, (8, 1): False, (8, 2): False, (12, 2): True, (16, 3): False}
 
+#: Treatments of light that is scattered many times, whether brief cases have them, and what they promise: no bound.
+_DIFFUSES = "no bound: light diffuses, which it does a few mean free paths below the surface"
+_SCATTERINGS: dict[str, tuple[Scattering, bool, str]] = {
+    "SingleScattering": (SingleScattering(), False, "light of lamps that is scattered once; the rest is lost"),
+    "ScatteringLayer": (
+        ScatteringLayer(),
+        True,
+        "no bound: exact for a wide flat slab in diffuse light; nothing spreads sideways",
+    ),
+    "Diffusion, resolution 16": (Diffusion(16), True, _DIFFUSES),
+    "Diffusion, resolution 24": (Diffusion(24), False, _DIFFUSES),
+    "Diffusion, resolution 32": (Diffusion(32), True, _DIFFUSES),
+    "Diffusion, resolution 48": (Diffusion(48), False, _DIFFUSES),
+}
 
-@dataclass(frozen=True)
+#: Paths of each pixel; with fewer than two there is no standard error.
+_PATHS = (2, 4, 16)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Contender:
-    """Contender: one row of every case that it fits.
+    """Method of the public API, drawn by the plan for it: one row of every case that it fits.
 
     Attributes
     ----------
     name, family : str
-        As in `translucent.bench.row.Row`.
+        As in a row.
     method : Method
-        With its parameters; with `interfaces`, the planner picks another where the scene needs it. `ThinLayer` and
-        shortcuts get the thickness with the least squared error of all, which nobody has who does not know the truth:
-        no choice of theirs would do better.
-    technique : str
+        With its parameters. A thin layer gets the thickness with the least squared error of all, which nobody has who
+        does not know the truth: no choice would do better.
+    choices : mapping of str to object
+        Requested of the planner in place of `method`, which then follows from the scene.
     kind : {"method", "counter-example", "cpu"}
     effects : tuple of str
         Cases in which it is measured.
@@ -75,198 +116,417 @@ class Contender:
     ior : {"matched", "refracted"}, optional
         Drawn with media of the index of refraction 1 and without surfaces, or else of `REFRACTED_IOR` where they have
         none of their own.
-    interfaces : Interfaces, optional
-        How they are found, as `translucent.Renderer.render` has it; None where they are not what is measured.
-    scattering : Scattering, optional
-        How light that is scattered many times is shown; None where that is not what is measured.
-    engine : Engine, optional
-        What an engine would show of it.
+    said : str
+        What it promises, where that does not follow from the plan.
+    thickness : float
+        That it assumes, in metres, once it is fitted.
     """
 
     name: str
     family: str
-    method: Method
-    technique: Technique = "plan"
+    method: Method = field(default_factory=SignedDepth)
+    choices: Mapping[str, Any] = field(default_factory=dict)
     kind: RowKind = "method"
     effects: tuple[Effect, ...] = _ALL
     brief: bool = True
     quick: bool = True
     pictured: tuple[Effect, ...] = ()
     ior: Literal["matched", "refracted"] | None = None
-    interfaces: Interfaces | None = None
-    scattering: Scattering | None = None
-    engine: Engine | None = None
-
-    @property
-    def fitted(self) -> bool:
-        """True if its thickness, in solids, is chosen to fit the truth best."""
-        return self.technique in ("constant", "ball") or self.method.makes_sheets
+    said: str = ""
+    thickness: float = 0.0
 
     @property
     def samplable(self) -> bool:
-        """True if several samples of a pixel are another picture, which `Renderer.render` draws."""
-        return self.technique in ("plan", "cpu") and not isinstance(self.method, PathTraced)
+        """True if several samples of a pixel are another picture."""
+        return not isinstance(self.method, PathTraced)
+
+    def scene(self, scene: Scene) -> Scene:
+        """Scene with the contender's index of refraction."""
+        if self.ior is None:
+            return scene
+
+        def bent(body: Object) -> Object:
+            if body.medium is None:
+                return body
+            own = body.medium.ior if body.medium.ior > 1 else REFRACTED_IOR
+            ior = 1.0 if self.ior == "matched" else own
+            surface = None if self.ior == "matched" else body.surface
+            return dataclasses.replace(body, medium=dataclasses.replace(body.medium, ior=ior), surface=surface)
+
+        return dataclasses.replace(scene, objects=[bent(body) for body in scene.objects])
 
     def refusal(self, scene: Scene) -> str | None:
         """Reason why it is not measured on a scene, though the planner would run it."""
-        if self.technique in ("constant", "ball", "unmarked", "half") and scene.opaque:
-            return "the shortcuts are drawn without opaque objects"
-        if self.technique == "half" and any(body.sheet_thickness is not None for body in scene.bodies):
-            return "signed distances of a sheet mean nothing"
-        front = self.interfaces is not None and self.interfaces.one_interface
-        if front and all(body.sheet_thickness is not None for body in scene.bodies):
+        interfaces = self.choices.get("interfaces")
+        if interfaces is not None and interfaces.one_interface and _sheets(scene):
             return "sheets have one interface, at which nothing bends"
         return None
 
+    def plan(self, bench: BenchContext, scene: Scene) -> RenderPlan:
+        """Plan of the contender; raises `InputError` if the planner refuses."""
+        return bench.renderer.plan(scene, **(self.choices or {"method": self.method}))
 
-def _ordered() -> Iterable[Contender]:
+    def drawing(self, bench: BenchContext, scene: Scene, plan: RenderPlan, targets: Targets) -> Drawing:
+        """Frame of the contender, ready to be drawn."""
+        return PlanDrawing(bench, scene, targets, plan)
+
+    def sampled(self, bench: BenchContext, scene: Scene, size: Size, samples: int) -> Frame:
+        """Frame with several samples of each pixel."""
+        return bench.renderer.render(scene, size, samples=samples, **self.choices)
+
+    def passes_of(self, plan: RenderPlan) -> int | None:
+        """Draws of the geometry; None without OpenGL."""
+        return plan.geometry_passes
+
+    def parameters(self, plan: RenderPlan | None) -> str:
+        """The configuration as Python writes it, with that of interfaces behind it."""
+        if scattering := self.choices.get("scattering"):
+            return str(scattering)
+        interfaces = self.choices.get("interfaces") if plan is None else plan.interfaces
+        found = self._method(self.method if plan is None or not self.choices else plan.method)
+        if self.thickness:
+            found = f"{self.thickness:.4g} m, of least squared error"
+        return found if interfaces is None else f"{found}, {interfaces}"
+
+    def _method(self, method: Method) -> str:
+        return str(method)
+
+    def fitted(self, bench: BenchContext, scene: Scene, truth: Frame) -> Contender:
+        """The contender with the thickness of least squared error, where it assumes one.
+
+        Thickness is proportional to what is assumed, so one picture tells: with t for 1 m, the best is <t d> / <t t>
+        over all pixels that truth or picture cover.
+        """
+        probe = float(scene.diagonal)
+        if not self._assumes(scene):
+            return self
+        trial = self.assuming(probe)
+        frame = drawn_once(bench, trial, scene, trial.plan(bench, scene), truth.size).frame
+        used = truth.valid & (truth.coverage | frame.coverage)
+        shape = np.asarray(frame.thickness, np.float64)[used] / probe
+        best = float(np.sum(shape * truth.thickness[used]) / max(np.sum(shape**2), np.finfo(np.float64).tiny))
+        return self.assuming(best)
+
+    def _assumes(self, scene: Scene) -> bool:
+        """True if its thickness is chosen to fit the truth: that of sheets is declared."""
+        return self.method.makes_sheets and not _sheets(scene)
+
+    def assuming(self, thickness: float) -> Self:
+        """The contender with a thickness in metres."""
+        return dataclasses.replace(self, method=ThinLayer(thickness), thickness=thickness)
+
+    def promise(self, plan: RenderPlan, scene: Scene, quantity: Quantity) -> tuple[str, bool]:
+        """Promise of its row in a quantity, in words, and whether it is exact: the planner's notes."""
+        if self.said:
+            return self.said, False
+        points = self.method.light_points
+        if self.method.marches and any(map(_shines, scene.bodies)):
+            return f"sums over {points} steps in each interval", False
+        if plan.has(PassName.LIGHT_VIEWS):
+            return f"{points} points of an interval look at the lights; {'; '.join(plan.limits)}".rstrip("; "), False
+        beside = _BESIDE_THICKNESS if quantity == "thickness" else _LIT
+        limits = [*plan.limits, *(effect for effect in plan.unmodelled if effect.kind not in beside)]
+        return "; ".join(map(str, limits)) or "exact", not limits
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShortcutContender(Contender):
+    """Shortcut of other renderers, over the shading of signed depth.
+
+    Attributes
+    ----------
+    shown : str
+        Its parameters, in words.
+    passes : callable
+        Makes the passes that find its thickness, of the context and the thickness that is assumed.
+    fits : bool
+        It assumes a thickness.
+    solids : bool
+        It needs bodies with an inside.
+    """
+
+    kind: RowKind = "counter-example"
+    shown: str
+    passes: Callable[[BenchContext, float], Shortcut]
+    fits: bool = False
+    solids: bool = False
+
+    @property
+    def samplable(self) -> bool:
+        """False: no renderer draws it."""
+        return False
+
+    def refusal(self, scene: Scene) -> str | None:
+        """Reason why it is not measured on a scene."""
+        if scene.opaque:
+            return "the shortcuts are drawn without opaque objects"
+        if self.solids and any(body.sheet_thickness is not None for body in scene.bodies):
+            return "signed distances of a sheet mean nothing"
+        return super().refusal(scene)
+
+    def drawing(self, bench: BenchContext, scene: Scene, plan: RenderPlan, targets: Targets) -> Drawing:
+        """Frame of the shortcut, ready to be drawn."""
+        return ShortcutDrawing(bench, scene, targets, plan, self.passes(bench, self.thickness))
+
+    def passes_of(self, plan: RenderPlan) -> int | None:
+        """Draws of the geometry: one, of the nearest face, where a thickness is assumed."""
+        return 1 if self.fits else super().passes_of(plan)
+
+    def _method(self, method: Method) -> str:
+        return self.shown
+
+    def _assumes(self, scene: Scene) -> bool:
+        return self.fits
+
+    def assuming(self, thickness: float) -> Self:
+        """The shortcut with a thickness in metres."""
+        return dataclasses.replace(self, thickness=thickness)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CpuContender(Contender):
+    """Drawing without OpenGL: by the backend ``cpu``, or by the march of the reference where `marched`."""
+
+    kind: RowKind = "cpu"
+    marched: RayMarched | None = None
+
+    def plan(self, bench: BenchContext, scene: Scene) -> RenderPlan:
+        """Plan of the backend ``cpu``."""
+        if bench.cpu is None:
+            raise InputError(self.name, "Embree cannot be loaded", "pip install embreex")
+        return bench.cpu.plan(scene, scattering=SingleScattering())  # as the reference has it
+
+    def drawing(self, bench: BenchContext, scene: Scene, plan: RenderPlan, targets: Targets) -> Drawing:
+        """Frame on the processor."""
+        if self.marched is not None:
+            return FrameDrawing(bench, partial(reference.march, scene, targets.size, self.marched))
+        return FrameDrawing(bench, partial(self.sampled, bench, scene, targets.size, 1))
+
+    def sampled(self, bench: BenchContext, scene: Scene, size: Size, samples: int) -> Frame:
+        """Frame with several samples of each pixel."""
+        assert bench.cpu is not None, "there is a plan for it"
+        return bench.cpu.render(scene, size, samples=samples, scattering=SingleScattering())
+
+    def passes_of(self, plan: RenderPlan) -> int | None:
+        """None: no OpenGL draws anything."""
+        return None
+
+    def _method(self, method: Method) -> str:
+        return 'Renderer(backend="cpu")' if self.marched is None else f"reference.march with {self.marched}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class EngineContender(Contender):
+    """What an engine would show: of NumPy in place of its shaders, on a frame of our own."""
+
+    engine: Engine
+    kind: RowKind = "counter-example"
+
+    def drawing(self, bench: BenchContext, scene: Scene, plan: RenderPlan, targets: Targets) -> Drawing:
+        """Frame of the engine."""
+
+        def make() -> Frame:
+            seen = visible_points(bench.renderer, scene, targets.size)
+            return seen.frame(self.engine.light(seen))
+
+        return FrameDrawing(bench, make)
+
+    def fitted(self, bench: BenchContext, scene: Scene, truth: Frame) -> Contender:
+        """The engine with its best settings."""
+        seen = visible_points(bench.renderer, scene, truth.size)
+        return dataclasses.replace(self, engine=self.engine.fitted(seen, truth.radiance))
+
+    def passes_of(self, plan: RenderPlan) -> int | None:
+        """Draws of the geometry: one."""
+        return 1
+
+    def parameters(self, plan: RenderPlan | None) -> str:
+        """Its settings."""
+        return str(self.engine)
+
+
+class Drawn(NamedTuple):
+    """Frame of a contender, its bytes per pixel, and the seconds of the diffusion solve; None where there are none."""
+
+    frame: Frame
+    bytes_per_pixel: int | None
+    solve_seconds: float | None
+
+
+def drawn_once(bench: BenchContext, contender: Contender, scene: Scene, plan: RenderPlan, size: Size) -> Drawn:
+    """Draw a contender once."""
+    targets = Targets(bench.gl, size)
+    try:
+        drawing = contender.drawing(bench, scene, plan, targets)
+        try:
+            drawing.draw()
+            return Drawn(drawing.read(), drawing.bytes_per_pixel, drawing.solve_seconds)
+        finally:
+            drawing.release()
+    finally:
+        targets.release()
+
+
+def _sheets(scene: Scene) -> bool:
+    return all(body.sheet_thickness is not None for body in scene.bodies)
+
+
+def _shines(body: Object) -> bool:
+    """True if steps through the body add up any light."""
+    medium = body.medium
+    return medium is not None and (medium.emits or medium.scatters or body.density is not None)
+
+
+def _nearest_face(sphere: bool) -> Callable[[BenchContext, float], Shortcut]:
+    return lambda bench, thickness: NearestFace(bench.own(NearestFacePass), sphere=sphere, size=thickness)
+
+
+def _straight_lines() -> Iterable[Contender]:
+    """Thickness along straight rays: shortcuts, and methods that need no order."""
+    nearest = "none: the nearest face alone, with the best thickness that there is"
+    constant, ball = "constant thickness", "sphere assumption"
+    meters = "best constant in metres", "best diameter in metres"
+    faces = _nearest_face(sphere=False), _nearest_face(sphere=True)
+    yield ShortcutContender(
+        name=constant, family=constant, said=nearest, shown=meters[0], passes=faces[0], fits=True, pictured=_ALL
+    )
+    yield ShortcutContender(name=ball, family=ball, said=nearest, shown=meters[1], passes=faces[1], fits=True)
+    yield Contender(name="ThinLayer", family="ThinLayer", method=ThinLayer(), ior="matched")
+    yield Contender(name="ThinLayer, refracted", family="ThinLayer", method=ThinLayer(), ior="refracted", brief=False)
+    for method in METHODS.values():
+        # Those without parameters worth rows of their own, whichever there are.
+        if method not in (SignedDepth, ThinLayer, DepthPeeling, FragmentLists, KBuffer, RayMarched, PathTraced):
+            yield Contender(name=method.__name__, family=method.__name__, method=method())
+    yield ShortcutContender(
+        name="BackFaceDepth, unmarked",
+        family="BackFaceDepth",
+        method=BackFaceDepth(),
+        said="exact for convex bodies; says nothing where a body is not",
+        shown="BackFaceDepth() without its mask",
+        passes=lambda bench, _: bench.own(UnmarkedBackFacePass),
+        pictured=("absorption", "emission"),
+    )
+    yield Contender(name="SignedDepth", family="SignedDepth", pictured=_ALL)
+    yield Contender(
+        name="SignedDepth from the camera",
+        family="SignedDepth",
+        method=SignedDepth(anchored=False),
+        kind="counter-example",
+        pictured=("absorption",),
+    )
+    yield ShortcutContender(
+        name="SignedDepth in float16",
+        family="SignedDepth",
+        said="none: 11 bits for sums of signed distances",
+        shown="SignedDepth(anchored=True) into float16",
+        passes=lambda bench, _: bench.own(HalfFloatPass),
+        solids=True,
+        pictured=("absorption",),
+    )
+
+
+def _in_order() -> Iterable[Contender]:
+    """Methods that put surfaces in order, and march."""
     for layers in (1, 2, 4, 8):
-        name = f"DepthPeeling, {layers} layer{'s' if layers > 1 else ''}"
         yield Contender(
-            name,
-            "DepthPeeling",
-            DepthPeeling(max_layers=layers),
+            name=f"DepthPeeling, {layers} layer{'s' if layers > 1 else ''}",
+            family="DepthPeeling",
+            method=DepthPeeling(max_layers=layers),
             brief=layers in (2, 8),
             quick=layers == 2,
         )
-    yield Contender("DepthPeeling, all layers", "DepthPeeling", DepthPeeling(max_layers=MAX_LAYERS))
+    every = DepthPeeling(max_layers=MAX_LAYERS)
+    yield Contender(name="DepthPeeling, all layers", family="DepthPeeling", method=every)
     for k in (2, 4, 8):
-        yield Contender(f"KBuffer, k = {k}", "KBuffer", KBuffer(k=k), brief=k == 8)
-    yield Contender("FragmentLists", "FragmentLists", FragmentLists(), pictured=_SOURCES)
-
-
-def _light_points() -> Iterable[Contender]:
+        yield Contender(name=f"KBuffer, k = {k}", family="KBuffer", method=KBuffer(k=k), brief=k == 8)
+    lists = partial(Contender, family="FragmentLists")
+    yield lists(name="FragmentLists", method=FragmentLists(), pictured=_SOURCES)
     for points in (1, 2, 4):  # 8 is what FragmentLists does by itself
         name = f"FragmentLists, {points} light point{'s' if points > 1 else ''}"
         method = FragmentLists(light_points=points)
-        yield Contender(name, "FragmentLists", method, effects=("scattering",), brief=points != 2, quick=points == 1)
-
-
-def _marched() -> Iterable[Contender]:
+        yield lists(name=name, method=method, effects=("scattering",), brief=points != 2, quick=points == 1)
     # Where media only absorb there is nothing to sum, and marching costs what its fragment lists cost.
     for steps in _STEPS:
-        brief = steps in (8, 64)
         yield Contender(
-            f"RayMarched, {steps} steps",
-            "RayMarched",
-            RayMarched(steps=steps),
+            name=f"RayMarched, {steps} steps",
+            family="RayMarched",
+            method=RayMarched(steps=steps),
             effects=_SOURCES if steps <= _MOST_LIT_STEPS else ("emission", "density"),
-            brief=brief,
+            brief=steps in (8, 64),
             pictured=_SOURCES if steps == 8 else (),
         )
-        yield Contender(
-            f"RayMarched on the CPU, {steps} steps",
-            "RayMarched on the CPU",
-            RayMarched(steps=steps),
-            "march",
-            "cpu",
-            ("density",),
-            brief,
+        yield CpuContender(
+            name=f"RayMarched on the CPU, {steps} steps",
+            family="RayMarched on the CPU",
+            marched=RayMarched(steps=steps),
+            said=f"sums over {steps} steps in each interval",
+            effects=("density",),
+            brief=steps in (8, 64),
             quick=steps == 8,
             pictured=("density",) if steps == 8 else (),
         )
     for rule in get_args(Quadrature):
         if rule != "midpoint":
             steps = 16 if rule == "gauss" else 64  # shaders hold 16 Gauss points
-            method = RayMarched(steps=steps, quadrature=rule)
-            name = f"RayMarched, {steps} steps, {rule}"
-            yield Contender(name, "RayMarched", method, effects=_SOURCES, brief=rule == "equiangular")
-
-
-def _as_they_are() -> Iterable[Contender]:
-    """Contenders of methods without parameters worth rows of their own: none is left out."""
-    for method in METHODS.values():
-        if method not in (SignedDepth, ThinLayer, DepthPeeling, FragmentLists, KBuffer, RayMarched, PathTraced):
-            yield Contender(method.__name__, method.__name__, method())
+            marched = RayMarched(steps=steps, quadrature=rule)
+            name, brief = f"RayMarched, {steps} steps, {rule}", rule == "equiangular"
+            yield Contender(name=name, family="RayMarched", method=marched, effects=_SOURCES, brief=brief)
 
 
 def _with_interfaces() -> Iterable[Contender]:
-    """Ways of finding interfaces; and what viewers of glTF do, one interface before a constant thickness."""
-    every: tuple[Effect, ...] = ("interfaces",)
+    """Treatments of interfaces; and what viewers of glTF do, one interface before a constant thickness."""
+    made = partial(Contender, effects=_INTERFACES)
     front, screen = FrontInterface(), ScreenInterfaces()
-    yield Contender(
-        "constant thickness, one interface",
-        "constant thickness",
-        SignedDepth(),
-        "constant",
-        "counter-example",
-        every,
-        pictured=every,
-        interfaces=front,
+    yield ShortcutContender(
+        name="constant thickness, one interface",
+        family="constant thickness",
+        choices={"interfaces": front},
+        said="none: the best constant thickness, and rays that bend once, where they enter",
+        shown="best constant in metres",
+        passes=_nearest_face(sphere=False),
+        fits=True,
+        effects=_INTERFACES,
+        pictured=_INTERFACES,
     )
-    yield Contender(
-        "straight rays",
-        "straight rays",
-        SignedDepth(),
+    yield made(
+        name="straight rays",
+        family="straight rays",
         kind="counter-example",
-        effects=every,
         ior="matched",
-        interfaces=screen,  # of which matched media have none
+        choices={"interfaces": screen},  # of which matched media have none
+        said="none: interfaces are left out",
     )
     for one in (front, screen):
         name = type(one).__name__
-        yield Contender(name, name, SignedDepth(), effects=every, pictured=every, interfaces=one)
+        yield made(name=name, family=name, pictured=_INTERFACES, choices={"interfaces": one})
     for (depth, forks), brief in _TREES.items():
-        yield Contender(
-            f"TracedInterfaces, depth {depth}, {'1 fork' if forks == 1 else f'{forks} forks'}",
-            "TracedInterfaces",
-            SignedDepth(),
-            effects=every,
+        yield made(
+            name=f"TracedInterfaces, depth {depth}, {'1 fork' if forks == 1 else f'{forks} forks'}",
+            family="TracedInterfaces",
             brief=brief,
             quick=depth != 4,
-            pictured=every if (depth, forks) in ((2, 0), (12, 2)) else (),
-            interfaces=TracedInterfaces(depth, forks),
+            pictured=_INTERFACES if (depth, forks) in ((2, 0), (12, 2)) else (),
+            choices={"interfaces": TracedInterfaces(depth, forks)},
         )
-
-
-#: Ways of showing light that is scattered many times, and whether ``--quick`` and brief cases have them.
-_SCATTERINGS: dict[str, tuple[Scattering, bool]] = {
-    "SingleScattering": (SingleScattering(), False),
-    "ScatteringLayer": (ScatteringLayer(), True),
-    "Diffusion, resolution 16": (Diffusion(16), True),
-    "Diffusion, resolution 24": (Diffusion(24), False),
-    "Diffusion, resolution 32": (Diffusion(32), True),
-    "Diffusion, resolution 48": (Diffusion(48), False),
-}
-
-#: Paths of each pixel; with fewer than two there is no standard error.
-_PATHS = (2, 4, 16)
-
-#: What engines show of it.
-_ENGINES: tuple[Engine, ...] = (PaintLayer(), NormalizedDiffusion(), Frostbite())
 
 
 def _with_scattering() -> Iterable[Contender]:
-    every: tuple[Effect, ...] = ("multiple scattering",)
-    for engine in _ENGINES:
-        yield Contender(
-            engine.name,
-            engine.name,
-            SignedDepth(),
-            "engine",
-            "counter-example",
-            every,
-            pictured=every,
-            engine=engine,
-        )
-    for name, (scattering, brief) in _SCATTERINGS.items():
-        yield Contender(
-            name,
-            type(scattering).__name__,
-            SignedDepth(),
-            effects=every,
-            brief=brief,
-            pictured=every,
-            scattering=scattering,
-        )
+    """Treatments of light that is scattered many times, and what engines show of it."""
+    often: dict[str, Any] = {"effects": _SCATTERING, "pictured": _SCATTERING}
+    for engine in (PaintLayer(), NormalizedDiffusion(), Frostbite()):
+        name, once = engine.name, {"scattering": SingleScattering()}
+        yield EngineContender(name=name, family=name, engine=engine, said=engine.promise, choices=once, **often)
+    for name, (scattering, brief, said) in _SCATTERINGS.items():
+        family, choices = type(scattering).__name__, {"scattering": scattering}
+        yield Contender(name=name, family=family, brief=brief, said=said, choices=choices, **often)
 
 
 def _path_traced() -> Iterable[Contender]:
     for paths in _PATHS:
         yield Contender(
-            f"PathTraced, {paths} paths",
-            "PathTraced",
-            PathTraced(paths=paths),
+            name=f"PathTraced, {paths} paths",
+            family="PathTraced",
+            method=PathTraced(paths=paths),
             effects=_WHOLE_FRAMES,
             brief=False,
             pictured=_WHOLE_FRAMES if paths == _PATHS[-1] else (),
@@ -274,37 +534,18 @@ def _path_traced() -> Iterable[Contender]:
 
 
 CONTENDERS: tuple[Contender, ...] = (
-    Contender("constant thickness", "constant thickness", ThinLayer(), "constant", "counter-example", pictured=_ALL),
-    Contender("sphere assumption", "sphere assumption", ThinLayer(), "ball", "counter-example"),
-    Contender("ThinLayer", "ThinLayer", ThinLayer(), ior="matched"),
-    Contender("ThinLayer, refracted", "ThinLayer", ThinLayer(), brief=False, ior="refracted"),
-    *_as_they_are(),
-    Contender(
-        "BackFaceDepth, unmarked",
-        "BackFaceDepth",
-        BackFaceDepth(),
-        "unmarked",
-        "counter-example",
-        pictured=("absorption", "emission"),
-    ),
-    Contender("SignedDepth", "SignedDepth", SignedDepth(), pictured=_ALL),
-    Contender(
-        "SignedDepth from the camera",
-        "SignedDepth",
-        SignedDepth(anchored=False),
-        kind="counter-example",
-        pictured=("absorption",),
-    ),
-    Contender(
-        "SignedDepth in float16", "SignedDepth", SignedDepth(), "half", "counter-example", pictured=("absorption",)
-    ),
-    *_ordered(),
-    *_light_points(),
-    *_marched(),
+    *_straight_lines(),
+    *_in_order(),
     *_with_interfaces(),
     *_with_scattering(),
     *_path_traced(),
-    Contender("cpu backend", "cpu backend", FragmentLists(), "cpu", "cpu", (*_ALL, "interfaces"), brief=False),
+    CpuContender(
+        name="cpu backend",
+        family="cpu backend",
+        method=FragmentLists(),
+        effects=(*_ALL, "interfaces"),
+        brief=False,
+    ),
 )
 
 
@@ -326,10 +567,10 @@ def contenders(effect: Effect, *, quick: bool, brief: bool = False, only: Iterab
 def check_names(names: Iterable[str]) -> None:
     """Raise `InputError` if a name is that of no contender and of no family: ``depth-peeling``, ``ThinLayer``."""
     known = {_slug(text) for one in CONTENDERS for text in (one.name, one.family)}
-    families = sorted({_slug(one.family) for one in CONTENDERS})
     for name in names:
         if _slug(name) not in known:
             close = difflib.get_close_matches(_slug(name), sorted(known), n=1)
+            families = sorted({_slug(one.family) for one in CONTENDERS})
             do = f"did you mean {close[0]}?" if close else f"use some of {', '.join(families)}"
             raise InputError(f"method {name!r}", "not one that is measured", do)
 

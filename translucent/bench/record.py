@@ -685,6 +685,14 @@ class Report:
         found += [(f"caustics, {case.name}", case.failure) for case in shadows.media]
         return tuple(f"{where}: {failure}" for where, failure in found if failure)
 
+    def plus(self, name: str, records: tuple[Any, ...]) -> Report:
+        """The report with more records in a field, or in one of its shadows: ``cases``, ``shadows.sky``."""
+        outer, _, inner = name.rpartition(".")
+        holder = getattr(self, outer) if outer else self
+        grown: Any = dataclasses.replace(holder, **{inner: (*getattr(holder, inner), *records)})
+        changes: dict[str, Any] = {outer: grown}
+        return dataclasses.replace(self, **changes) if outer else grown
+
     def without(self, parts: tuple[Part, ...]) -> Report:
         """The report without these parts, and without renewals of which nothing is left."""
         empty: dict[Part, dict[str, Any]] = {

@@ -1,26 +1,30 @@
-"""A whole report: cases, scaling and hard cases, with what is done kept on the way."""
+"""A whole report: all experiments, with finished scenes kept on the way, and its provenance."""
 
 from __future__ import annotations
 
 import dataclasses
+import os
+import platform
+import subprocess
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from typing import get_args
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, get_args
 
-from translucent.bench.cases import CASES, Case, Size
-from translucent.bench.claims import METHOD_CLAIMS, SCATTERING_CLAIMS, SHADOW_CLAIMS, SLAB_CLAIMS, hard_claim
-from translucent.bench.contenders import check_names, contenders
-from translucent.bench.drawing import Studio
-from translucent.bench.hard.measure import CASES as HARD_CASES
-from translucent.bench.hard.measure import measure_hard_cases
-from translucent.bench.machine import provenance
-from translucent.bench.measure import CaseRun
-from translucent.bench.record import Part, Renewal, Report
-from translucent.bench.scaling import ScalingRun
-from translucent.bench.scattering.slabs import measure_slabs
-from translucent.bench.shadows.part import ShadowsRun
-from translucent.bench.timing import STEADY, Pace
+from translucent.bench.cases import CASES, Case
+from translucent.bench.caustics import CAUSTIC_SCENES, GroundCaustics, MediumCaustics, SkyShadows
+from translucent.bench.contenders import check_names
+from translucent.bench.drawing import FULL, QUICK, BenchContext, Effort, Size
+from translucent.bench.experiment import Experiment
+from translucent.bench.hard_light import HardCases
+from translucent.bench.methods import MethodComparison
+from translucent.bench.record import Part, Provenance, Renewal, Report
+from translucent.bench.scaling import CostScaling
+from translucent.bench.shadows import SHADOW_SCENES, ShadowMapComparison
+from translucent.bench.slabs import SlabComparison
 from translucent.errors import RenderError
 from translucent.renderer import Renderer
 from translucent.scene.camera import check_size
@@ -29,38 +33,41 @@ from translucent.scene.camera import check_size
 FULL_SIZE: Size = (512, 512)
 QUICK_SIZE: Size = (256, 256)
 
+#: Packages on which results and times depend.
+PACKAGES = ("numpy", "moderngl", "scipy", "trimesh", "embreex")
 
-@dataclasses.dataclass(frozen=True)
-class Effort:
-    """Effort of a measurement.
-
-    Attributes
-    ----------
-    case_seconds, step_seconds : float
-        Of timing, for each case and for each step of a scaling axis.
-    compared : float
-        Width and height of the frames that are held against the reference, as a share of what the case wants.
-    pace : Pace
-        Of timing.
-    """
-
-    case_seconds: float
-    step_seconds: float
-    compared: float
-    pace: Pace = STEADY
-
-
-FULL = Effort(12.0, 2.5, 1.0, Pace(patience=3.0))
-QUICK = Effort(0.6, 0.15, 0.4, Pace(long=0.1))
-
-#: Everything that a report claims, judged by its numbers.
-CLAIMS = (
-    *(*METHOD_CLAIMS, *SCATTERING_CLAIMS, *SLAB_CLAIMS, *SHADOW_CLAIMS),
-    hard_claim([case.id for case in HARD_CASES]),
-)
+#: Seed of all random numbers: those of ray marching, which every frame starts anew.
+SEED = 0
 
 #: Callback with what is being measured, the number of steps done, and their total.
 Progress = Callable[[str, int, int], None]
+
+
+def experiments(quick: bool, extra: Sequence[Case] = (), methods: Sequence[str] = ()) -> tuple[Experiment[Any], ...]:
+    """All experiments of a report, in its order; in haste where `quick`, as `measure_all` has it."""
+    if not quick:
+        return (
+            MethodComparison((*extra, *CASES), methods),
+            CostScaling(),
+            SlabComparison(),
+            ShadowMapComparison(),
+            SkyShadows(),
+            GroundCaustics(),
+            MediumCaustics(),
+            HardCases(),
+        )
+    slabs = SlabComparison()
+    return (
+        MethodComparison((*extra, *(case for case in CASES if case.quick)), methods, quick=True),
+        CostScaling(quick=True),
+        dataclasses.replace(slabs, albedos=slabs.albedos[::2], anisotropies=slabs.anisotropies[:1]),
+        ShadowMapComparison(
+            [one for one in SHADOW_SCENES if one.quick], (512, 1024), texels=128, pixels=128, seconds=0.1
+        ),
+        SkyShadows(environments=("sky",), directions=(8, 32), size=(24, 18), strata=12),
+        GroundCaustics([one for one in CAUSTIC_SCENES if one.quick], (62_500,), 10_000, (80, 60)),
+        HardCases(),
+    )
 
 
 def measure_all(
@@ -102,7 +109,7 @@ def measure_all(
     progress : callable
         Hears what is being measured.
     keep : callable
-        Gets the unfinished report whenever a part is done.
+        Gets the unfinished report whenever a scene is done.
 
     Returns
     -------
@@ -118,104 +125,97 @@ def measure_all(
     """
     size = check_size(size or (QUICK_SIZE if quick else FULL_SIZE))
     check_names(methods)
-    effort = effort or (QUICK if quick else FULL)
+    parts = tuple(part for part in get_args(Part) if part in only or not only)
     with ExitStack() as stack:
         renderer = stack.enter_context(Renderer(backend))
         if renderer.provenance["backend"] == "cpu":
             raise RenderError("measuring", "there is no OpenGL here", "see 'translucent doctor'")
-        cpu = _cpu_renderer(stack)
-        stack.enter_context(renderer.gpu.context.current())
-        studio = Studio(renderer)
-        stack.callback(studio.release)
-        made = provenance(renderer, command, quick=quick)
-        parts = tuple(part for part in get_args(Part) if part in only or not only)
-        report = Report(made) if base is None else dataclasses.replace(base.without(parts), complete=False)
-        begin = time.perf_counter()
-
-        def stamped(report: Report, *, complete: bool) -> Report:
-            seconds = time.perf_counter() - begin
-            if base is None:
-                return dataclasses.replace(report, seconds=seconds, complete=complete)
-            renewals = (*base.without(parts).renewals, Renewal(parts, made, seconds))
-            return dataclasses.replace(report, renewals=renewals, complete=complete and base.complete)
-
         try:
-            cases = [*extra, *(case for case in CASES if case.quick or not quick)] if "scenes" in parts else []
-            for report in _measured(report, studio, cpu, cases, parts, size, methods, quick, effort, progress):  # noqa: B020
-                report = stamped(report, complete=False)
+            cpu = stack.enter_context(Renderer("cpu"))
+        except RenderError:  # Embree cannot be loaded
+            cpu = None
+        stack.enter_context(renderer.gpu.context.current())
+        bench = BenchContext(renderer, cpu, size, effort or (QUICK if quick else FULL))
+        stack.callback(bench.release)
+        made, begin = provenance(renderer, command, quick=quick), time.perf_counter()
+        every = experiments(quick, extra, methods)
+        report = Report(made) if base is None else base.without(parts)
+
+        def stamped(found: Report, *, complete: bool) -> Report:
+            seconds = time.perf_counter() - begin
+            claims = tuple(judge(found) for experiment in every for judge in experiment.claims)
+            if base is None:
+                return dataclasses.replace(found, claims=claims, seconds=seconds, complete=complete)
+            renewals = (*base.without(parts).renewals, Renewal(parts, made, seconds))
+            complete = complete and base.complete
+            return dataclasses.replace(found, claims=claims, renewals=renewals, complete=complete)
+
+        steps = [(one, scene) for one in every if one.part in parts for scene in one.scenes(bench)]
+        try:
+            for done, (experiment, scene) in enumerate(steps):
+                progress(f"{experiment.label}{scene.name}", done, len(steps))
+                report = stamped(experiment.added(report, experiment.measure(bench, scene)), complete=False)
+                renderer.gpu.context.drain()
                 keep(report)
         except KeyboardInterrupt:
-            return report
+            return dataclasses.replace(report, complete=False)
         report = stamped(report, complete=True)
     keep(report)
     return report
 
 
-def _measured(
-    report: Report,
-    studio: Studio,
-    cpu: Renderer | None,
-    cases: Sequence[Case],
-    wanted: Sequence[Part],
-    size: Size,
-    methods: Sequence[str],
-    quick: bool,
-    effort: Effort,
-    progress: Progress,
-) -> Iterator[Report]:
-    """The report after each step of it."""
-    scaling, shadows = ScalingRun(studio, effort.step_seconds, quick, effort.pace), ShadowsRun(studio, quick)
-    steps = {
-        "scaling": sum(len(ladder.steps) for ladder in scaling.ladders()),
-        "slabs": 1,
-        "shadows": len(shadows.steps()),
-        "hard-cases": len(HARD_CASES),
-    }
-    total, done = len(cases) + sum(steps[part] for part in wanted if part in steps), 0
-
-    def told(what: str) -> None:
-        nonlocal done
-        progress(what, done, total)
-        done += 1
-
-    for case in cases:
-        told(f"case {case.name}")
-        chosen = contenders(case.effect, quick=quick, brief=case.brief, only=methods)
-        run = CaseRun(studio, cpu, case, size, effort.case_seconds, effort.compared, effort.pace)
-        report = judged(dataclasses.replace(report, cases=(*report.cases, run.measure(chosen))))
-        studio.renderer.gpu.context.drain()
-        yield report
-    if "scaling" in wanted:
-        for name, series in scaling.steps():
-            told(f"scaling, {name}")
-            report = dataclasses.replace(report, scaling=series)
-            studio.renderer.gpu.context.drain()
-            yield report
-    if "slabs" in wanted:
-        told("slabs")
-        report = dataclasses.replace(report, slabs=measure_slabs(quick=quick))
-        yield report
-    if "shadows" in wanted:
-        for what, measure in shadows.steps().items():
-            told(what)
-            report = judged(dataclasses.replace(report, shadows=measure(report.shadows)))
-            studio.renderer.gpu.context.drain()
-            yield report
-    if "hard-cases" in wanted:
-        for found in measure_hard_cases(studio.renderer):
-            told(f"hard case {found.id}")
-            report = dataclasses.replace(report, hard_cases=(*report.hard_cases, found))
-    yield judged(report)
+def provenance(renderer: Renderer, command: str, *, quick: bool) -> Provenance:
+    """Provenance of a report that is begun now."""
+    found = renderer.provenance
+    commit, dirty = _commit(Path(__file__).parents[2])
+    return Provenance(
+        command=command,
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+        platform=platform.platform(),
+        processor=_processor(),
+        processors=os.cpu_count() or 1,
+        backend=found["backend"],
+        renderer=found["renderer"],
+        driver=found["driver"],
+        software="software" in found["renderer"],
+        versions={"translucent": found["translucent"], "python": found["python"], **_versions()},
+        commit=commit,
+        dirty=dirty,
+        seed=SEED,
+        quick=quick,
+    )
 
 
-def judged(report: Report) -> Report:
-    """The report with what its numbers say of the claims."""
-    return dataclasses.replace(report, claims=tuple(judge(report) for judge in CLAIMS))
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
 
 
-def _cpu_renderer(stack: ExitStack) -> Renderer | None:
-    """Renderer without OpenGL, if Embree can be loaded."""
+def _processor() -> str:
+    """Name of the CPU, from Linux, or as well as other systems tell it."""
     try:
-        return stack.enter_context(Renderer("cpu"))
-    except RenderError:
-        return None
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return platform.processor() or platform.machine()
+    names = [line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def _commit(root: Path) -> tuple[str | None, bool | None]:
+    """Commit of a checkout, and whether files that are part of it have changed since; None without one."""
+    if not (root / ".git").exists():
+        return None, None
+
+    def git(*arguments: str) -> str:
+        command = ["git", *arguments]
+        return subprocess.run(command, cwd=root, capture_output=True, text=True, check=True, timeout=30).stdout.strip()
+
+    try:
+        return git("rev-parse", "HEAD"), bool(git("status", "--porcelain", "--untracked-files=no"))
+    except (OSError, subprocess.SubprocessError):
+        return None, None

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from translucent.bench.contenders import CONTENDERS
-from translucent.bench.drawing import Floor, Planned, Size, Studio, is_software
-from translucent.bench.measure import one_line
-from translucent.bench.record import ScalePoint, Series
-from translucent.bench.shapes import lying_torus, plates
-from translucent.bench.timing import STEADY, Pace, Samples, interleaved, ratio, timing
+from translucent.bench.drawing import BenchContext, FloorDrawing, PlanDrawing, Size
+from translucent.bench.experiment import Experiment, one_line
+from translucent.bench.record import Part, Report, ScalePoint, Series
+from translucent.bench.shapes import lying_torus, placed, plates
+from translucent.bench.timing import Samples, interleaved, ratio, timing
 from translucent.errors import TranslucentError
 from translucent.geometry.solids import Sphere
 from translucent.gpu.targets import Targets
@@ -40,142 +40,118 @@ METHODS: dict[str, Method] = {
 #: Frames that a GPU shows on screens: 1080p and 4K.
 SCREENS: tuple[Size, ...] = ((1920, 1080), (3840, 2160))
 
+#: Number of the last step of each axis in a quick run, beside the first.
+_LAST = {"triangles": 2, "pixels": 1, "layers": 3, "media": 4}
+
 
 @dataclass(frozen=True)
-class Ladder:
-    """Ladder: the scenes along one axis.
-
-    Attributes
-    ----------
-    axis : str
-    fixed : str
-        What stays the same.
-    steps : mapping of int to callable
-        For each x, what makes the scene and its size.
-    """
+class ScalingStep:
+    """Scene of one value x along an axis; `fixed` says in words what stays the same along it."""
 
     axis: Axis
     fixed: str
-    steps: Mapping[int, Callable[[], tuple[Scene, Size]]]
+    x: int
+    make: Callable[[], tuple[Scene, Size]]
+
+    @property
+    def name(self) -> str:
+        """Axis and value."""
+        return f"{self.axis} {self.x}"
 
 
-@dataclass
-class ScalingRun:
-    """Measurement of all ladders, a step at a time.
+@dataclass(frozen=True)
+class CostScaling(Experiment[ScalingStep]):
+    """Times of four methods along four axes; `quick`: two steps of each, none of the longest."""
 
-    Parameters
-    ----------
-    studio : Studio
-    seconds : float
-        For each step.
-    quick : bool
-        Two steps of each ladder, none of the longest.
-    pace : Pace
-        Of timing.
-    """
+    part: ClassVar[Part] = "scaling"
+    label: ClassVar[str] = "scaling, "
+    into: ClassVar[str] = "scaling"
 
-    studio: Studio
-    seconds: float
-    quick: bool
-    pace: Pace = STEADY
-    _points: dict[tuple[Axis, str], list[ScalePoint]] = field(default_factory=dict)
+    quick: bool = False
 
-    def ladders(self) -> list[Ladder]:
-        """Ladders to be measured on this machine."""
-        ladders = _ladders(is_software(self.studio.renderer))
-        return [_thinned(ladder) for ladder in ladders] if self.quick else ladders
+    def scenes(self, bench: BenchContext) -> Sequence[ScalingStep]:
+        """Steps on this machine."""
+        found = []
+        for axis, (fixed, steps) in _axes(bench.software).items():
+            every = list(steps)
+            for x in (every[0], every[_LAST[axis]]) if self.quick else every:
+                found.append(ScalingStep(axis, fixed, x, steps[x]))
+        return found
 
-    def steps(self) -> Iterator[tuple[str, tuple[Series, ...]]]:
-        """Measure step by step: after each, its name and all series so far."""
-        ladders = self.ladders()
-        for ladder in ladders:
-            for x, make in ladder.steps.items():
-                self._measure(ladder, x, make)
-                yield f"{ladder.axis} {x}", self._series(ladders)
+    def added(self, report: Report, record: Sequence[Series]) -> Report:
+        """The report with a point more in each series."""
+        series = {(one.axis, one.method): one for one in report.scaling}
+        for new in record:
+            old = series.get((new.axis, new.method), dataclasses.replace(new, points=()))
+            series[new.axis, new.method] = dataclasses.replace(old, points=(*old.points, *new.points))
+        return dataclasses.replace(report, scaling=tuple(series.values()))
 
-    def _measure(self, ladder: Ladder, x: int, make: Callable[[], tuple[Scene, Size]]) -> None:
+    def measure(self, bench: BenchContext, step: ScalingStep) -> list[Series]:
+        """Series of one point each, the floor first."""
         failures: dict[str, Exception] = {}
         found: dict[str, Samples] = {}
         try:
-            scene, size = make()
-            found = self._timed(scene, size, failures)
+            found = _timed(bench, *step.make(), failures)
         except Exception as error:  # noqa: BLE001 - a step that cannot be measured leaves the others alone
             failures = dict.fromkeys(METHODS, error)
         floor = [seconds for samples in found.values() for seconds in samples.floor_wall]
-        points = {"depth only": ScalePoint(x, timing(floor), ratio(floor, floor))}
+        points = {"depth only": ScalePoint(step.x, timing(floor), ratio(floor, floor))}
         for name in METHODS:
-            samples = found.get(name)
-            if samples is not None:
-                points[name] = ScalePoint(x, timing(samples.wall), ratio(samples.part, samples.floor))
+            if (samples := found.get(name)) is not None:
+                points[name] = ScalePoint(step.x, timing(samples.wall), ratio(samples.part, samples.floor))
             elif isinstance(failures[name], TranslucentError):  # said on purpose: no room for so many surfaces
-                points[name] = ScalePoint(x, refusal=one_line(failures[name]))
+                points[name] = ScalePoint(step.x, refusal=one_line(failures[name]))
             else:
-                points[name] = ScalePoint(x, failure=one_line(failures[name]))
-        for name, point in points.items():
-            self._points.setdefault((ladder.axis, name), []).append(point)
+                points[name] = ScalePoint(step.x, failure=one_line(failures[name]))
+        # As in the rows of cases.
+        rows = [one for one in CONTENDERS if one.kind == "method"]
+        labels = {
+            name: next((one.name for one in rows if one.method == method), name) for name, method in METHODS.items()
+        }
+        return [Series(step.axis, labels.get(name, name), name, step.fixed, (at,)) for name, at in points.items()]
 
-    def _timed(self, scene: Scene, size: Size, failures: dict[str, Exception]) -> dict[str, Samples]:
-        targets = Targets(self.studio.gl, size)
-        floor = Floor(self.studio, scene, targets)
-        drawings: dict[str, Planned] = {}
-        try:
-            for name, method in METHODS.items():
-                try:
-                    plan = self.studio.renderer.plan(scene, method)
-                    drawings[name] = Planned(self.studio, scene, targets, plan)
-                except Exception as error:  # noqa: BLE001 - the other methods go on
-                    failures[name] = error
-            return interleaved(
-                floor.draw,
-                {name: drawn.draw for name, drawn in drawings.items()},
-                self.seconds,
-                lambda name, error: failures.update({name: error}),
-                self.pace,
-            )
-        finally:
-            for drawn in drawings.values():
-                drawn.release()
-            floor.release()
-            targets.release()
 
-    def _series(self, ladders: list[Ladder]) -> tuple[Series, ...]:
-        fixed = {ladder.axis: ladder.fixed for ladder in ladders}
-        return tuple(
-            Series(axis, name if name == "depth only" else _label(METHODS[name]), name, fixed[axis], tuple(points))
-            for (axis, name), points in self._points.items()
+def _timed(bench: BenchContext, scene: Scene, size: Size, failures: dict[str, Exception]) -> dict[str, Samples]:
+    targets = Targets(bench.gl, size)
+    floor = FloorDrawing(bench, scene, targets)
+    drawings: dict[str, PlanDrawing] = {}
+    try:
+        for name, method in METHODS.items():
+            try:
+                drawings[name] = PlanDrawing(bench, scene, targets, bench.renderer.plan(scene, method))
+            except Exception as error:  # noqa: BLE001 - the other methods go on
+                failures[name] = error
+        return interleaved(
+            floor.draw,
+            {name: drawing.draw for name, drawing in drawings.items()},
+            bench.effort.step_seconds,
+            failures.__setitem__,
+            bench.effort.patience,
+            bench.effort.long,
         )
+    finally:
+        for drawing in drawings.values():
+            drawing.release()
+        floor.release()
+        targets.release()
 
 
-def _label(method: Method) -> str:
-    """Label of the method, as in its row."""
-    return next((row.name for row in CONTENDERS if row.method == method), type(method).__name__)
-
-
-def _ladders(software: bool) -> list[Ladder]:
+def _axes(software: bool) -> dict[Axis, tuple[str, Mapping[int, Callable[[], tuple[Scene, Size]]]]]:
+    """For each axis, what stays the same along it, and its scenes by their values."""
     small, torus = (512, 512), 316
     pixels = [(n, n) for n in (256, 512, 1024, 2048)] + ([] if software else list(SCREENS))
-    return [
-        Ladder(
-            "triangles",
-            "a torus at 512 x 512",
-            {2 * (n // 2) * n: _torus(n, small) for n in (32, 100, 316, 1000)},
-        ),
-        Ladder(
-            "pixels",
+    return {
+        "triangles": ("a torus at 512 x 512", {2 * (n // 2) * n: _torus(n, small) for n in (32, 100, 316, 1000)}),
+        "pixels": (
             "a torus of 100,000 triangles",
             {width * height: _torus(torus, (width, height)) for width, height in sorted(pixels, key=np.prod)},
         ),
-        Ladder(
-            "layers", "plates over the whole picture, 256 x 256", {n: _plates(n) for n in (2, 4, 8, 16, 32, 64, 100)}
+        "layers": (
+            "plates over the whole picture, 256 x 256",
+            {n: _plates(n) for n in (2, 4, 8, 16, 32, 64, 100)},
         ),
-        Ladder("media", "16 spheres at 512 x 512", {n: _media(n, small) for n in (1, 2, 4, 8, MAX_SLOTS)}),
-    ]
-
-
-def _thinned(ladder: Ladder) -> Ladder:
-    steps = list(ladder.steps)
-    last = {"triangles": 2, "pixels": 1, "layers": 3, "media": 4}[ladder.axis]
-    return dataclasses.replace(ladder, steps={x: ladder.steps[x] for x in (steps[0], steps[last])})
+        "media": ("16 spheres at 512 x 512", {n: _media(n, small) for n in (1, 2, 4, 8, MAX_SLOTS)}),
+    }
 
 
 def _torus(segments: int, size: Size) -> Callable[[], tuple[Scene, Size]]:
@@ -183,27 +159,22 @@ def _torus(segments: int, size: Size) -> Callable[[], tuple[Scene, Size]]:
 
 
 def _plates(layers: int) -> Callable[[], tuple[Scene, Size]]:
-    size = (256, 256)
-
     def make() -> tuple[Scene, Size]:
         camera = Camera.orthographic((0, 0, 2), (0, 0, 0), height=1.0)
         body = Object(plates(layers), Medium.from_color((0.5, 0.7, 0.9), 1.0))
-        return Scene([body], camera, environment=Environment.constant((1, 1, 1))), size
+        return Scene([body], camera, environment=Environment.constant((1, 1, 1))), (256, 256)
 
     return make
 
 
 def _media(count: int, size: Size) -> Callable[[], tuple[Scene, Size]]:
-    """Scene of 16 balls with as many media as asked for."""
+    """Scene of 16 balls of a number of media."""
 
     def make() -> tuple[Scene, Size]:
         ball = Sphere(radius=0.6).tessellate(80)
         media = [Medium(absorption=np.roll((0.2, 0.5, 1.0), i) * (1 + i / count)) for i in range(count)]
-        objects = []
-        for i in range(MAX_SLOTS):
-            matrix = np.eye(4)
-            matrix[:3, 3] = (i % 4, i // 4, 0.3 * (i % 3))
-            objects.append(Object(ball, media[i % count], matrix))
+        grid = [(i % 4, i // 4, 0.3 * (i % 3)) for i in range(MAX_SLOTS)]
+        objects = [placed(ball, media[i % count], place) for i, place in enumerate(grid)]
         return Scene(objects, framing(objects, size)), size
 
     return make

@@ -1,8 +1,10 @@
-"""Meshes that only measurements need, made here."""
+"""Meshes and bodies that only measurements need, made here."""
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,17 +12,36 @@ import numpy.typing as npt
 from translucent.assets import mesh_path
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Ellipsoid, Sphere, Torus
+from translucent.media.medium import Medium
 from translucent.mesh_files import load_mesh
+from translucent.scene.scene import Object
 
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]
+
+
+def placed(mesh: Mesh, medium: Medium | None, place: Sequence[float], **more: Any) -> Object:
+    """An object whose origin is at a place."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = place
+    return Object(mesh, medium, matrix, **more)
+
+
+def across(mesh: Mesh, *depths: float) -> npt.NDArray[np.float64]:
+    """Coefficients of a medium, in 1/m, with these optical depths across the diagonal of a mesh."""
+    return np.array(depths) / mesh.diagonal
+
+
+def toolkit(name: str) -> Mesh:
+    """A mesh of the toolkit."""
+    return load_mesh(mesh_path(name))
 
 
 def subdivided(name: str, triangles: int) -> Mesh:
     """A mesh of the toolkit with each face cut in four until it has at least this many."""
     from trimesh.remesh import subdivide
 
-    mesh = load_mesh(mesh_path(name))
+    mesh = toolkit(name)
     vertices, faces = mesh.vertices, mesh.faces
     while len(faces) < triangles:
         vertices, faces = subdivide(vertices, faces)

@@ -22,8 +22,8 @@ from translucent.bench.record import Ratio, TimeStatistics
 #: Rounds that even the slowest takes part in, and that the fastest needs no more than.
 FEWEST, MOST = 3, 60
 
-#: A drawing of `Pace.long` seconds needs no more rounds than this, and less from `LONGEST` on: its own noise averages
-#: out within it.
+#: A drawing that is called long needs no more rounds than this, and less from `LONGEST` seconds on: its own noise
+#: averages out within it.
 FEWEST_LONG = 2
 FEWEST_LONGEST, LONGEST = 1, 2.0
 
@@ -41,37 +41,17 @@ UNSURE = 0.03
 FLOOR_SHARE, MOST_FLOORS = 0.3, 10
 
 
-@dataclass(frozen=True)
-class Pace:
-    """Pace of measurements: what they may take beyond their share of the time.
-
-    Attributes
-    ----------
-    patience : float
-        How many times its share a drawing is timed at most where its rounds differ much.
-    long : float
-        Seconds of a drawing from which on `FEWEST_LONG` rounds do.
-    """
-
-    patience: float = 1.0
-    long: float = 0.3
-
-
-#: Pace where nobody waits.
-STEADY = Pace()
-
-
 class Sample(NamedTuple):
     """Sample: seconds of one drawing.
 
     Attributes
     ----------
     wall, frame : float
-        By the clock: until the part that finds thickness is done, and until all is.
+        By the clock: until the passes that find thickness are done, and until all are.
     gpu : float or None
-        Of that part, by the GPU's timer.
+        Of those passes, by the GPU's timer.
     part, whole : float
-        The same two, by the clock that drawings are compared by: see `translucent.bench.drawing.Studio`.
+        The same two, by the clock that drawings are compared by: see `translucent.bench.drawing.BenchContext`.
     """
 
     wall: float
@@ -88,7 +68,7 @@ class Samples:
     Attributes
     ----------
     wall, frame, gpu, part, whole : list of float
-        As `Sample`.
+        As in `Sample`.
     floor, floor_wall : list of float
         Of the floor around each: `Sample.part` and `Sample.wall`.
     times, floor_times : int
@@ -112,7 +92,7 @@ class Samples:
 
     @property
     def of_whole_frames(self) -> Samples:
-        """Samples of whole frames alone, for what has no part that finds thickness; the GPU's timer had only that."""
+        """Samples of whole frames, for cases without passes that find thickness; the GPU's timer had only these."""
         return replace(self, wall=self.frame, gpu=[], part=self.whole)
 
     def add(self, sample: Sample, floor: float, floor_wall: float) -> None:
@@ -132,12 +112,24 @@ def interleaved(
     drawings: Mapping[str, Callable[[], Sample]],
     seconds: float,
     failed: Callable[[str, Exception], None],
-    pace: Pace = STEADY,
+    patience: float = 1.0,
+    long: float = 0.3,
 ) -> dict[str, Samples]:
     """Measure all drawings, in turns, for about as many seconds; each gets an equal share, and at least a few rounds.
 
-    One whose ratio to the floor is `UNSURE` gets up to `pace.patience` times its share. What raises is left out of the
-    other rounds, and `failed` hears of it.
+    Parameters
+    ----------
+    floor : callable
+        Draws the floor.
+    drawings : mapping of str to callable
+    seconds : float
+        In all.
+    failed : callable
+        Called with the name and the error of a drawing that raises, which is left out of the other rounds.
+    patience : float
+        How many times its share a drawing is timed at most while its ratio to the floor is `UNSURE`.
+    long : float
+        Seconds of a drawing from which on `FEWEST_LONG` rounds do.
     """
     warming = seconds / 8 / max(len(drawings), 1)
     warmed = {name: draw for name, draw in drawings.items() if _warm_up(name, draw, warming, failed)}
@@ -147,7 +139,7 @@ def interleaved(
     found = {name: Samples() for name in warmed}
     share = 0.85 * seconds / max(len(warmed), 1)
     typical = float(np.median([base.sample().wall for _ in range(5)]))
-    while running := [name for name in warmed if not _enough(found[name], share, pace)]:
+    while running := [name for name in warmed if not _enough(found[name], share, patience, long)]:
         before = _floor(base, typical, 0.0)
         for name in running:
             try:
@@ -210,16 +202,16 @@ def _mean(samples: list[Sample]) -> Sample:
     return Sample(wall, frame, float(np.mean(gpu)) if gpu else None, part, whole)
 
 
-def _enough(samples: Samples, share: float, pace: Pace) -> bool:
+def _enough(samples: Samples, share: float, patience: float, long: float) -> bool:
     rounds = len(samples.wall)
     first = samples.frame[0] if rounds else 0.0
-    fewest = FEWEST_LONGEST if first > LONGEST else FEWEST_LONG if first > pace.long else FEWEST
-    most = MOST * pace.patience
+    fewest = FEWEST_LONGEST if first > LONGEST else FEWEST_LONG if first > long else FEWEST
+    most = MOST * patience
     if rounds >= most or rounds < fewest or samples.spent < share:
         return rounds >= most
     if rounds < FEWEST_UNSURE and samples.spent < CHEAP and _unsure(samples):
         return False
-    return samples.spent >= pace.patience * share or not _unsure(samples)
+    return samples.spent >= patience * share or not _unsure(samples)
 
 
 def _unsure(samples: Samples) -> bool:

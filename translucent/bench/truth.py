@@ -1,4 +1,4 @@
-"""Ground truth of a case, and errors of frames against it."""
+"""Ground truth of a case, traced here or path traced beforehand, and errors of frames against it."""
 
 from __future__ import annotations
 
@@ -8,25 +8,26 @@ import io
 import math
 import time
 from dataclasses import dataclass
+from importlib.resources import files
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
 from translucent import reference
-from translucent.arrays import Array
+from translucent.arrays import Array, Mask
 from translucent.bench.codec import Packed
 from translucent.bench.drawing import Size
 from translucent.bench.judgement import color_difference
 from translucent.bench.record import ColorDifference, ErrorStatistics, LightErrors, Quantity, ReportPicture
-from translucent.bench.scattering.stored import stored_truth
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
 from translucent.frames.metrics import compare, interior
+from translucent.scene.lights import DirectionalLight, SpotLight
 from translucent.scene.scene import Scene
 
-#: Number of interfaces at which the reference follows rays. What goes around inside of a knot, reflected totally, comes
-#: out after a hundred of them: with 48, its picture would be wrong by 6 %.
+#: Number of interfaces at which the reference follows rays. Light that goes around inside of a knot, reflected totally,
+#: comes out after a hundred of them: with 48, its picture would be wrong by 6 %.
 BOUNCES = 128
 
 #: Number of rays through each pixel of each of two references before rough interfaces, whose spread is their noise.
@@ -41,13 +42,15 @@ BLOCK = 4
 #: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
 INVISIBLE = 5e-8
 
-
 #: Radiance below which a picture is black, and relative errors are meaningless.
 DARK = 1e-6
 
+#: Relative and absolute difference of parameters up to which a scene is the one whose truth is stored: rounding.
+SAME, SAME_ZERO = 1e-6, 1e-9
+
 
 @dataclass(frozen=True)
-class Truth:
+class CaseTruth:
     """Ground truth of a case.
 
     Attributes
@@ -59,20 +62,20 @@ class Truth:
     layers : int
         The most surfaces on one ray.
     diagonal : float
-        Of the bounds of what light enters, in metres.
+        Of the bounds of all bodies, in metres.
     seconds : float
-        That the frame took.
+        Time of the frame.
     halves : two (h, w, 3) arrays, optional
-        Radiances with noise that has nothing to do with each other's, where interfaces are rough or radiance is a mean
-        over pixels; the frame has the mean.
+        Radiances with independent noise, where interfaces are rough or radiance is a mean over pixels; the frame has
+        the mean.
     noise : float, optional
-        Of a stored truth: root mean square of its standard error, as a share of its mean.
+        Of a stored truth: root mean square of its standard error, as a fraction of its mean.
     rays : int
         Through each pixel that is compared, spread over it, whose mean is its radiance; 1 along its center.
     """
 
     frame: Frame
-    inside: npt.NDArray[np.bool_]
+    inside: Mask
     layers: int
     diagonal: float
     seconds: float
@@ -81,7 +84,7 @@ class Truth:
     rays: int = 1
 
     @classmethod
-    def over_pixels(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
+    def over_pixels(cls, scene: Scene, size: Size, tolerance: float) -> CaseTruth:
         """Trace the radiance that a camera with a box filter takes, where errors are taken; elsewhere along centers."""
         along = cls.of(scene, size, tolerance)
         begin = time.perf_counter()
@@ -97,7 +100,7 @@ class Truth:
         return dataclasses.replace(along, frame=frame, seconds=seconds, halves=halves, rays=2 * rays)
 
     @classmethod
-    def of(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
+    def of(cls, scene: Scene, size: Size, tolerance: float) -> CaseTruth:
         """Trace the ground truth of a scene, along the centers of pixels."""
         begin = time.perf_counter()
         rough = any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies)
@@ -112,7 +115,7 @@ class Truth:
         return cls._of_frame(scene, frame, time.perf_counter() - begin, halves)
 
     @classmethod
-    def stored(cls, name: str, scene: Scene) -> Truth:
+    def stored(cls, name: str, scene: Scene) -> CaseTruth:
         """Truth of a scene that the package brings; raises `InputError` where it is that of another scene."""
         found = stored_truth(name, scene)
         size = found.mask.shape[1], found.mask.shape[0]
@@ -127,31 +130,30 @@ class Truth:
         return dataclasses.replace(cls._of_frame(scene, frame, found.seconds, halves), noise=found.noise)
 
     @classmethod
-    def _of_frame(cls, scene: Scene, frame: Frame, seconds: float, halves: tuple[Array, Array] | None) -> Truth:
-        size = frame.size
-        counts = reference.hit_counts(scene, size)
+    def _of_frame(cls, scene: Scene, frame: Frame, seconds: float, halves: tuple[Array, Array] | None) -> CaseTruth:
+        counts = reference.hit_counts(scene, frame.size)
         inside = interior(counts)
-        for seen in reference.opaque_counts(scene, size):
-            inside &= interior(seen)
+        for found in reference.opaque_counts(scene, frame.size):
+            inside &= interior(found)
         low, high = np.transpose([body.bounds for body in scene.bodies], (1, 0, 2))
         diagonal = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
         return cls(frame, inside, int(counts.max()), diagonal, seconds, halves)
 
     @property
     def spread(self) -> float:
-        """Standard error of the radiance of pixels, root mean square, as a share of the radiance's own."""
+        """Standard error of the radiance of pixels, root mean square, as a fraction of the radiance's own."""
         if self.halves is None:
             return 0.0
         one, other = (half[self.compared] for half in self.halves)
         return float(np.sqrt(np.mean((one - other) ** 2))) / 2.0 / self.scale("radiance")
 
     @property
-    def compared(self) -> npt.NDArray[np.bool_]:
+    def compared(self) -> Mask:
         """(h, w) pixels that errors are taken over, as far as a method calls them valid."""
         return self.inside & self.frame.coverage & self.frame.valid
 
     def scale(self, quantity: Quantity) -> float:
-        """Scale of errors in a quantity, of which they are shares."""
+        """Normalisation of errors in a quantity."""
         if quantity == "radiance":
             with np.errstate(under="ignore"):
                 rms = float(np.sqrt(np.mean(self.frame.radiance[self.compared] ** 2)))
@@ -159,45 +161,40 @@ class Truth:
         return self.diagonal if quantity == "thickness" else 1.0
 
     def errors(self, frame: Frame, quantity: Quantity) -> tuple[ErrorStatistics, float, float] | None:
-        """Errors of a frame; and the shares of the invalid and of the wrongly covered pixels. None: none to compare."""
+        """Errors of a frame, and fractions of invalid and of wrongly covered pixels; None without any to compare."""
         try:
             found = compare(frame, self.frame, quantity, mask=self.inside)
         except InputError:
             return None
         scale = self.scale(quantity)
-        values = {
-            field.name: float(getattr(found, field.name)) / scale for field in dataclasses.fields(ErrorStatistics)
-        }
+        values = {name: float(getattr(found, name)) / scale for name in ErrorStatistics.__dataclass_fields__}
         if self.halves is not None and quantity == "radiance":
-            values["rms"] = self._rms_without_noise(frame, *self.halves) / scale
+            values["rms"] = self._rms_without_noise(frame) / scale
         return ErrorStatistics(**values), found.invalid, found.coverage_mismatch
 
-    def _rms_without_noise(self, frame: Frame, one: Array, other: Array) -> float:
-        """Root mean square error in radiance: noise of the two halves is not correlated, so their product has none."""
+    def _rms_without_noise(self, frame: Frame) -> float:
+        """Root mean square error in radiance, freed of the noise of the truth."""
+        assert self.halves is not None
         used = self.compared & frame.coverage & frame.valid
-        shown = np.asarray(frame.radiance, np.float64)
-        products = ((shown - one) * (shown - other))[used].mean(axis=1)
+        one, other = (half[used] for half in self.halves)
+        square, uncertainty = noise_free_square(np.asarray(frame.radiance[used], np.float64), one, other)
         # Over pixels the error may be less than noise can tell: then the standard error of its square is told.
-        least = float(products.std()) * max(len(products), 1) ** -0.5 if self.rays > 1 else 0.0
-        return math.sqrt(max(float(products.mean()), least))
+        return math.sqrt(max(square, uncertainty if self.rays > 1 else 0.0))
 
     def light_errors(self, frame: Frame, solve_seconds: float | None) -> LightErrors | None:
-        """Errors of a frame as shares of the mean of a path traced truth; None if there is no such truth."""
+        """Errors of a frame as fractions of the mean of a path traced truth; None if there is no such truth."""
         used = self.compared & frame.coverage & frame.valid
         if self.halves is None or not used.any():
             return None
         mean = float(self.frame.radiance[used].mean())
         shown = np.asarray(frame.radiance, np.float64)
-        off = [shown - half for half in self.halves]
         whole = _blocks(used.astype(np.float64)[..., None])[..., 0] == 1.0
-        coarse = (_blocks(off[0]) * _blocks(off[1]))[whole]
-        bias = shown[used].mean(axis=0) / self.frame.radiance[used].mean(axis=0) - 1.0
-        return LightErrors(
-            self._rms_without_noise(frame, *self.halves) / mean,
-            math.sqrt(max(float(coarse.mean()), 0.0)) / mean if whole.any() else 0.0,
-            (float(bias[0]), float(bias[1]), float(bias[2])),
-            solve_seconds,
-        )
+        block = 0.0
+        if whole.any():
+            parts = (_blocks(picture)[whole] for picture in (shown, *self.halves))
+            block = math.sqrt(max(noise_free_square(*parts)[0], 0.0)) / mean
+        red, green, blue = (shown[used].mean(axis=0) / self.frame.radiance[used].mean(axis=0) - 1.0).tolist()
+        return LightErrors(self._rms_without_noise(frame) / mean, block, (red, green, blue), solve_seconds)
 
     def color_difference(self, frame: Frame, quantity: Quantity) -> ColorDifference | None:
         """Visible color difference of a frame; None if there is no pixel to compare."""
@@ -209,25 +206,158 @@ class Truth:
 
     def picture(self, method: str, frame: Frame, quantity: Quantity) -> ReportPicture:
         """Picture of a frame with its errors; the reference has none."""
-        stream = io.BytesIO()
-        Image.fromarray(frame.to_srgb8()).save(stream, format="PNG", optimize=True)
-        png = base64.b64encode(stream.getvalue()).decode("ascii")
         if frame is self.frame:
-            return ReportPicture(method, png)
-        result, right = (np.asarray(getattr(f, quantity), np.float64) for f in (frame, self.frame))
-        error = result - right
-        if error.ndim == 3:
-            worst = np.abs(error).argmax(axis=-1)[..., None]
-            error = np.take_along_axis(error, worst, axis=-1)[..., 0]
-        error = error / self.scale(quantity)
-        error = np.where(np.abs(error) < INVISIBLE, 0.0, error)
+            return picture_of(method, frame.to_srgb8())
+        result, right = (np.asarray(getattr(one, quantity), np.float64) for one in (frame, self.frame))
         covered = frame.coverage | self.frame.coverage
-        error = np.where(covered & frame.valid & self.frame.valid, error, np.nan)
-        return ReportPicture(method, png, Packed.of(error), Packed.of(covered & ~frame.valid))
+        error = (result - right) / self.scale(quantity)
+        known = covered & frame.valid & self.frame.valid
+        return picture_of(method, frame.to_srgb8(), error, known, covered & ~frame.valid)
 
 
 def _blocks(picture: Array) -> Array:
-    """Means over blocks of 4 x 4 pixels, without what is left over at the right and below."""
+    """Means over blocks of 4 x 4 pixels, without the rest at the right and below."""
     h, w = (side // BLOCK for side in picture.shape[:2])
     cut = picture[: h * BLOCK, : w * BLOCK]
     return np.asarray(cut.reshape(h, BLOCK, w, BLOCK, -1).mean(axis=(1, 3)))
+
+
+def noise_free_square(shown: Array, one: Array, other: Array) -> tuple[float, float]:
+    """Mean square error against two truths, and its standard error.
+
+    The noise of the truths is not correlated, so it is not in their product (shown - one)(shown - other).
+    """
+    squares = ((shown - one) * (shown - other)).mean(axis=-1)
+    return float(squares.mean()), float(squares.std()) * max(squares.size, 1) ** -0.5
+
+
+def picture_of(
+    method: str,
+    shown: npt.NDArray[np.uint8],
+    error: Array | None = None,
+    known: Mask | bool = True,
+    marked: Mask | None = None,
+) -> ReportPicture:
+    """Picture (h, w, 3) for the record, with its signed error (h, w) or (h, w, 3), where that is known, and marks."""
+    stream = io.BytesIO()
+    Image.fromarray(shown).save(stream, format="PNG", optimize=True)
+    png = base64.b64encode(stream.getvalue()).decode("ascii")
+    if error is None:
+        return ReportPicture(method, png)
+    if error.ndim == 3:
+        worst = np.abs(error).argmax(axis=-1)[..., None]
+        error = np.take_along_axis(error, worst, axis=-1)[..., 0]
+    error = np.where(known, np.where(np.abs(error) < INVISIBLE, 0.0, error), np.nan)
+    return ReportPicture(method, png, Packed.of(error), None if marked is None else Packed.of(marked))
+
+
+@dataclass(frozen=True)
+class StoredTruth:
+    """Truth of a scene as the package brings it: two independent estimates of its radiance, with noise.
+
+    Attributes
+    ----------
+    halves : (2, k, 3) float64
+        Radiance of the pixels of the mask, row by row.
+    error : (k, 3) float64
+        Standard error of the mean of the two.
+    mask : (h, w) bool
+        Pixels that bodies cover.
+    parameters : (n,) float64
+        See `scene_parameters`.
+    paths : int
+        Of each pixel, in both halves together.
+    seconds : float
+        Time of both.
+    """
+
+    halves: Array
+    error: Array
+    mask: Mask
+    parameters: Array
+    paths: int
+    seconds: float
+
+    @property
+    def noise(self) -> float:
+        """Root mean square of the standard error, as a fraction of the mean radiance."""
+        return float(np.sqrt((self.error**2).mean()) / self.halves.mean())
+
+    def to_bytes(self) -> bytes:
+        """Contents of its file: radiance in float16."""
+        stream = io.BytesIO()
+        np.savez_compressed(
+            stream,
+            halves=self.halves.astype(np.float16),
+            error=self.error.astype(np.float16),
+            mask=np.packbits(self.mask),
+            size=np.array(self.mask.shape),
+            parameters=self.parameters,
+            paths=self.paths,
+            seconds=self.seconds,
+        )
+        return stream.getvalue()
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> StoredTruth:
+        """Truth of the contents of a file."""
+        with np.load(io.BytesIO(content)) as found:
+            size = tuple(found["size"].tolist())
+            mask = np.unpackbits(found["mask"], count=int(np.prod(size))).reshape(size).astype(bool)
+            halves, error = (found[name].astype(np.float64) for name in ("halves", "error"))
+            return cls(halves, error, mask, found["parameters"], int(found["paths"]), float(found["seconds"]))
+
+
+def truth_file(scene: str) -> str:
+    """Name of the file with the truth of a scene, beside this module."""
+    return f"scattering_truth/{scene.replace(' ', '_')}.npz"
+
+
+def stored_truth(name: str, scene: Scene) -> StoredTruth:
+    """Stored truth of a scene.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is of another scene than this one.
+    """
+    file = files("translucent.bench").joinpath(truth_file(name))
+    if not file.is_file():
+        raise InputError(f"truth of {name!r}", "none is stored", "run tools/scattering_truth.py")
+    truth = StoredTruth.from_bytes(file.read_bytes())
+    now = scene_parameters(scene)
+    if now.shape != truth.parameters.shape or not np.allclose(now, truth.parameters, SAME, SAME_ZERO):
+        raise InputError(
+            f"truth of {name!r}",
+            "the scene has changed since its truth was path traced",
+            "run tools/scattering_truth.py",
+        )
+    return truth
+
+
+def scene_parameters(scene: Scene) -> Array:
+    """Fingerprint of a scene in numbers, which are equal up to rounding where its light is.
+
+    Meshes go in by their number of faces, volume and moments. Of a mesh with other faces in the same place little
+    would show.
+    """
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    found: list[npt.ArrayLike] = [
+        scene.camera.pose,
+        scene.camera.fov_y or scene.camera.height or 0.0,
+        scene.environment.radiance(axes, np.zeros((6, 2))),
+    ]
+    for body in scene.objects:
+        mesh, medium = body.mesh, body.medium
+        found += [len(mesh.faces), len(mesh.vertices), mesh.volume, mesh.vertices.mean(axis=0)]
+        found += [mesh.vertices.std(axis=0), (mesh.vertices**3).mean(axis=0), body.matrix]
+        found += [0.0 if body.surface is None else body.surface.roughness]
+        if medium is not None:
+            found += [medium.absorption, medium.scattering, medium.emission, medium.anisotropy, medium.ior]
+    for light in scene.lights:
+        if isinstance(light, DirectionalLight):
+            found += [light.direction, light.irradiance]
+        else:
+            found += [light.position, light.intensity]
+            found += [light.cone] if isinstance(light, SpotLight) else []
+    return np.concatenate([np.ravel(np.asarray(one, np.float64)) for one in found])

@@ -151,7 +151,7 @@ def _measured(
     allow_outside: bool,
 ) -> Report:
     """Measure, with a bar that tells how far it is; each finished scene is in ``report.json`` at once."""
-    from translucent.bench.models import model_cases
+    from translucent.bench.cases import model_cases
     from translucent.bench.output import write_report
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
 

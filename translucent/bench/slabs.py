@@ -1,15 +1,21 @@
-"""Slabs in diffuse light: what diffusion and the layer make of them, against adding and doubling."""
+"""Slabs in diffuse light: diffusion and the layer against adding and doubling."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy import sparse
 
 from translucent.arrays import Array
-from translucent.bench.record import Slab
+from translucent.bench.claims import SLAB_CLAIMS, Judge
+from translucent.bench.drawing import BenchContext
+from translucent.bench.experiment import Experiment, Whole
+from translucent.bench.record import Part, Report, Slab
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.solution import BodySystem
 from translucent.formulas import optics
@@ -32,28 +38,37 @@ from translucent.reference import slabs
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 
-#: What the table has: a medium holds three optical depths, one in each channel.
-ALBEDOS = (0.5, 0.8, 0.9, 0.99, 0.999, 0.9999)
-DEPTHS = ((0.5, 1.0, 2.0), (4.0, 8.0, 16.0), (32.0, 64.0, 100.0))
-ANISOTROPIES = (0.0, 0.5, 0.9)
-INDICES = (1.0, 1.5)
-
-_Way = Literal["diffusion", "layer", "volume", "none"]
-
 #: Half of the width of the slab, and of the part in its middle that is looked at, in thicknesses.
 HALF_WIDTH, MIDDLE = 4.0, 1.0
 
 
-def measure_slabs(*, quick: bool) -> tuple[Slab, ...]:
-    """Slabs of all parameters; `quick` every other albedo, and those that scatter isotropically alone."""
-    return tuple(
-        one
-        for ior in INDICES
-        for anisotropy in (ANISOTROPIES[:1] if quick else ANISOTROPIES)
-        for albedo in (ALBEDOS[::2] if quick else ALBEDOS)
-        for depths in DEPTHS
-        for one in _measured(albedo, np.array(depths), anisotropy, ior)
-    )
+@dataclass(frozen=True)
+class SlabComparison(Experiment[Whole]):
+    """Slabs of all combinations; a medium holds three optical depths, one in each channel."""
+
+    part: ClassVar[Part] = "slabs"
+    label: ClassVar[str] = "slabs"
+    into: ClassVar[str] = "slabs"
+    claims: ClassVar[tuple[Judge, ...]] = SLAB_CLAIMS
+
+    shown: Sequence[Whole] = (Whole(),)
+    albedos: Sequence[float] = (0.5, 0.8, 0.9, 0.99, 0.999, 0.9999)
+    depths: Sequence[tuple[float, float, float]] = ((0.5, 1.0, 2.0), (4.0, 8.0, 16.0), (32.0, 64.0, 100.0))
+    anisotropies: Sequence[float] = (0.0, 0.5, 0.9)
+    indices: Sequence[float] = (1.0, 1.5)
+
+    def added(self, report: Report, record: tuple[Slab, ...]) -> Report:
+        """The report with the slabs."""
+        return report.plus(self.into, record)
+
+    def measure(self, bench: BenchContext | None, scene: Whole) -> tuple[Slab, ...]:
+        """Measure all slabs; no OpenGL takes part."""
+        every = itertools.product(self.indices, self.anisotropies, self.albedos, self.depths)
+        return tuple(
+            one
+            for ior, anisotropy, albedo, depths in every
+            for one in _measured(albedo, np.array(depths), anisotropy, ior)
+        )
 
 
 @np.errstate(under="ignore")
@@ -63,15 +78,19 @@ def _measured(albedo: float, depths: Array, anisotropy: float, ior: float) -> li
     layer, diffused = _layer(medium), _diffused(medium)
     found = []
     for i, depth in enumerate(depths.tolist()):
-        whole = slabs.whole_shares(albedo, depth, ior, anisotropy)
         passing = slabs.unscattered_shares(depth, ior)
-        hazy = _hazy_shares(albedo, depth, anisotropy, ior)
-        ways = [
-            (float(way[0, i]) + passing[0] + more[0], float(way[1, i]) + passing[1] + more[1])
-            for way, more in ((diffused, hazy), (layer, (0.0, 0.0)))
-        ]
-        planned = _planned(albedo, depth, anisotropy, ior)
-        found.append(Slab(albedo, depth, anisotropy, ior, *whole, passing, ways[0], ways[1], planned))
+        hazy = _ahead(albedo, depth, anisotropy, ior)
+        by_diffusion, by_layer = (
+            (float(model[0, i]) + passing[0] + more[0], float(model[1, i]) + passing[1] + more[1])
+            for model, more in ((diffused, hazy), (layer, (0.0, 0.0)))
+        )
+        body = Object(_mesh(), Medium((1.0 - albedo) * depth, albedo * depth, anisotropy=anisotropy, ior=ior))
+        back = given_back(Scene([body], Camera.look_at((0.0, 5.0, 5.0), (0.0, 0.0, 0.0))), None)
+        whole = slabs.whole_shares(albedo, depth, ior, anisotropy)
+        planned: Literal["diffusion", "layer", "volume", "none"] = (
+            "diffusion" if back.diffused else "layer" if back.layered else "volume" if back.volumes else "none"
+        )
+        found.append(Slab(albedo, depth, anisotropy, ior, *whole, passing, by_diffusion, by_layer, planned))
     return found
 
 
@@ -83,10 +102,10 @@ def _layer(medium: Medium) -> Array:
     bare = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
     back, through = two_stream_reflectance(*bare), two_stream_transmittance(*bare)
     mirror = diffuse_interface(medium.ior).reflected
-    all_back, all_through = (share(back, through, mirror) for share in (mirrored_reflectance, mirrored_transmittance))
+    whole_back, whole_through = (find(back, through, mirror) for find in (mirrored_reflectance, mirrored_transmittance))
     seen = np.minimum([slabs.entering_transmittance(float(depth), medium.ior) for depth in medium.extinction], through)
     return np.maximum(
-        [all_back - seen * mirror * all_through, all_through - seen * (1.0 - mirror + mirror * all_back)], 0.0
+        [whole_back - seen * mirror * whole_through, whole_through - seen * (1.0 - mirror + mirror * whole_back)], 0.0
     )
 
 
@@ -102,10 +121,10 @@ def _diffused(medium: Medium) -> Array:
     return diffuse_interface(medium.ior).exit_share * leaving
 
 
-def _hazy_shares(albedo: float, depth: float, anisotropy: float, ior: float) -> tuple[float, float]:
-    """Light in pictures with `Diffusion` beside the unscattered: what is scattered ahead on each way across.
+def _ahead(albedo: float, depth: float, anisotropy: float, ior: float) -> tuple[float, float]:
+    """Reflectance and transmittance of light that is scattered ahead, which pictures with `Diffusion` have in rays.
 
-    The same as in ``shaders/transport/traced_interfaces.frag``: it leaves where the way ends, or is mirrored there.
+    The same as in ``shaders/transport/traced_interfaces.frag``: it leaves where the ray ends, or is reflected there.
     """
     mu, weight = slabs.cosines(ior)
     mirror = optics.fresnel_dielectric(mu, 1 / ior) if ior > 1 else np.zeros_like(mu)
@@ -113,14 +132,10 @@ def _hazy_shares(albedo: float, depth: float, anisotropy: float, ior: float) -> 
     ahead = np.exp(-depth * (1.0 - albedo * anisotropy) / mu) - np.exp(-depth / mu)
     again = mirror * np.exp(-depth / mu)
     across = ahead / (1.0 - again**2)
-    back, on = (float((flux * way).sum() / flux.sum()) for way in (across * again, across))
-    # On the mean way of diffuse light across a slab, twice its thickness.
+    back, on = (float((flux * part).sum() / flux.sum()) for part in (across * again, across))
+    # On the mean path of diffuse light across a slab, twice its thickness.
     far, near = map(float, haze_shares(diffuse_interface(ior).reflected, np.exp(-2.0 * depth * (1.0 - albedo))))
     return far * back + near * on, far * on + near * back
-
-
-def _body(medium: Medium) -> Object:
-    return Object(_mesh(), medium)
 
 
 @cache
@@ -130,13 +145,5 @@ def _mesh() -> Mesh:
 
 @cache
 def _grid() -> BodyGrid:
-    body = _body(Medium(scattering=1.0))
+    body = Object(_mesh(), Medium(scattering=1.0))
     return body_grid(body, Diffusion().cell_size(body))
-
-
-def _planned(albedo: float, depth: float, anisotropy: float, ior: float) -> _Way:
-    """Method that the planner takes for such a slab of one optical depth."""
-    body = _body(Medium((1.0 - albedo) * depth, albedo * depth, anisotropy=anisotropy, ior=ior))
-    scene = Scene([body], Camera.look_at((0.0, 5.0, 5.0), (0.0, 0.0, 0.0)))
-    back = given_back(scene, None)
-    return "diffusion" if back.diffused else "layer" if back.layered else "volume" if back.volumes else "none"

@@ -1,1 +1,0 @@
-"""The hard cases: inputs that break renderers, each measured against what is promised for it."""

@@ -1,0 +1,275 @@
+"""Methods and shortcuts on scenes: every contender drawn, compared with the reference, and timed in turns."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, get_args
+
+from translucent.bench.cases import CASES, Case
+from translucent.bench.claims import METHOD_CLAIMS, SCATTERING_CLAIMS, Judge
+from translucent.bench.contenders import Contender, Drawn, contenders, drawn_once
+from translucent.bench.drawing import BenchContext, Drawing, FloorDrawing
+from translucent.bench.experiment import Experiment, one_line
+from translucent.bench.judgement import mark_frontier
+from translucent.bench.record import CaseRecord, MethodRow, Part, Quantity
+from translucent.bench.timing import Samples, interleaved, ratio, timing
+from translucent.bench.truth import CaseTruth
+from translucent.errors import InputError, TranslucentError
+from translucent.frames.frame import Frame
+from translucent.gpu.targets import Targets
+from translucent.planning.render_plan import RenderPlan
+from translucent.scene.scene import Scene
+
+#: Samples of each pixel of the pictures that show the gain of more samples on interfaces.
+SAMPLES = 16
+
+#: Effects of scenes whose methods are ranked by thickness, and effects without passes that find thickness alone.
+_BY_THICKNESS = ("absorption", "sheet")
+_WHOLE_FRAMES = ("interfaces", "multiple scattering")
+
+
+@dataclass
+class MeasuredScene:
+    """Scene of a case with its truth, and its record without rows."""
+
+    case: Case
+    scene: Scene
+    truth: CaseTruth
+    record: CaseRecord
+
+
+@dataclass
+class Trial:
+    """Contender under measurement: its row so far, the scene as it draws it, and its frame where that is shown."""
+
+    contender: Contender
+    scene: Scene
+    row: MethodRow
+    frame: Frame | None = None
+
+
+@dataclass(frozen=True)
+class MethodComparison(Experiment[Case]):
+    """All methods that fit the effect of each scene, and the shortcuts of other renderers.
+
+    Parameters
+    ----------
+    shown : sequence of Case
+    methods : sequence of str
+        Names or families of contenders; default: all.
+    quick : bool
+        Fewer contenders.
+    """
+
+    part: ClassVar[Part] = "scenes"
+    label: ClassVar[str] = "case "
+    into: ClassVar[str] = "cases"
+    claims: ClassVar[tuple[Judge, ...]] = (*METHOD_CLAIMS, *SCATTERING_CLAIMS)
+
+    shown: Sequence[Case] = CASES
+    methods: Sequence[str] = ()
+    quick: bool = False
+
+    def blank(self, bench: BenchContext, case: Case) -> CaseRecord:
+        """Record of a case without numbers."""
+        quantity: Quantity = "thickness" if case.effect in _BY_THICKNESS else "radiance"
+        size = bench.size[0] // case.shrink or 1, bench.size[1] // case.shrink or 1
+        return CaseRecord(case.name, case.title, case.why, quantity, size=size)
+
+    def truth(self, bench: BenchContext, case: Case) -> MeasuredScene:
+        """Trace the truth of a case, or take the stored one."""
+        blank = self.blank(bench, case)
+        size, scene = blank.size, case.scene(blank.size)
+        part = min(1.0, round(case.compared * bench.effort.compared) / max(size))
+        small = max(1, round(size[0] * part)), max(1, round(size[1] * part))
+        if case.paths:
+            truth = CaseTruth.stored(case.name, scene)
+        else:
+            trace = CaseTruth.over_pixels if case.effect == "interfaces" else CaseTruth.of
+            truth = trace(scene, small, case.tolerance)
+        diagnoses = [body.mesh.diagnosis for body in scene.bodies]
+        media = [body.medium for body in scene.bodies if body.medium is not None]
+        record = dataclasses.replace(
+            blank,
+            convex=len(diagnoses) == 1 and diagnoses[0].convex,
+            closed=all(found.solid for found in diagnoses),
+            absorption_only=not any(medium.emits or medium.scatters for medium in media)
+            and not any(body.has_interface for body in scene.bodies)
+            and all(body.density is None for body in scene.bodies),
+            triangles=sum(len(item.mesh.faces) for item in scene.objects),
+            bodies=len(scene.bodies),
+            layers=truth.layers,
+            compared_size=truth.frame.size,
+            diagonal=truth.diagonal,
+            compared_pixels=int(truth.compared.sum()),
+            reference_seconds=truth.seconds,
+            truth_noise=truth.noise,
+            truth_rays=truth.rays,
+            truth_spread=truth.spread if truth.rays > 1 else 0.0,
+        )
+        return MeasuredScene(case, scene, truth, record)
+
+    def contenders(self, on: MeasuredScene) -> Sequence[Contender]:
+        """Contenders that fit the effect of a case; none where there is nothing to compare."""
+        case = on.case
+        if not on.record.compared_pixels:
+            return ()
+        return contenders(case.effect, quick=self.quick, brief=case.brief, only=self.methods)
+
+    def row(self, bench: BenchContext, on: MeasuredScene, contender: Contender) -> Trial:
+        """Draw the contender once, small, and compare it with the truth."""
+        scene = contender.scene(on.scene)
+        row = MethodRow(contender.name, contender.family, contender.parameters(None), contender.kind, "", False)
+        if (refusal := contender.refusal(on.scene)) is not None:
+            return Trial(contender, scene, dataclasses.replace(row, refusal=refusal))
+        try:
+            contender.plan(bench, scene)
+            contender = contender.fitted(bench, scene, on.truth.frame)
+            plan = contender.plan(bench, scene)
+            row = dataclasses.replace(row, parameters=contender.parameters(plan))
+            drawn = drawn_once(bench, contender, scene, plan, on.truth.frame.size)
+            row = _compared(row, contender, scene, plan, drawn, on)
+            if on.case.effect == "interfaces" and contender.samplable:
+                found = on.truth.errors(contender.sampled(bench, scene, drawn.frame.size, SAMPLES), "radiance")
+                row = dataclasses.replace(row, sampled=None if found is None else found[0])
+        except InputError as error:  # the planner's answer
+            return Trial(contender, scene, dataclasses.replace(row, refusal=one_line(error)))
+        except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row
+            return Trial(contender, scene, dataclasses.replace(row, failure=one_line(error)))
+        return Trial(contender, scene, row, drawn.frame if on.case.effect in contender.pictured else None)
+
+    def record(self, bench: BenchContext, blank: Any, on: MeasuredScene, rows: Sequence[Trial]) -> CaseRecord:
+        """Record of a case, with the times of all rows, the floor first."""
+        if not on.record.compared_pixels:
+            return dataclasses.replace(on.record, failure=_untrusted(on.scene))
+        quantity = on.record.quantity
+        shown = [("reference", on.truth.frame), *((one.row.method, one.frame) for one in rows if one.frame is not None)]
+        pictures = tuple(on.truth.picture(name, frame, quantity) for name, frame in shown)
+        found, failures = _timed(bench, on, rows)
+        if on.case.effect in _WHOLE_FRAMES:
+            found = {name: one.of_whole_frames for name, one in found.items()}
+        timed = [_with_times(one, found.get(one.row.method), failures.get(one.row.method)) for one in rows]
+        bench.forget_light()
+        marked = mark_frontier([_floor_row(list(found.values())), *timed], quantity)
+        return dataclasses.replace(on.record, rows=marked, pictures=pictures)
+
+
+def _untrusted(scene: Scene) -> str:
+    """Reason why there is nothing to compare."""
+    if not any(body.mesh.diagnosis.problems for body in scene.bodies):
+        return "no pixel is away from silhouettes; ask for a larger --size"
+    problems = ", ".join(f"{body.mesh.name!r}: {'; '.join(body.mesh.diagnosis.problems)}" for body in scene.bodies)
+    return f"no pixel of the reference can be trusted; {problems}; close the mesh, or declare it a sheet"
+
+
+def _compared(
+    row: MethodRow, contender: Contender, scene: Scene, plan: RenderPlan, drawn: Drawn, on: MeasuredScene
+) -> MethodRow:
+    """The row with its promise and errors."""
+    frame = drawn.frame
+    promise, exact = contender.promise(plan, scene, on.record.quantity)
+    found: dict[str, Any] = {}
+    for quantity in get_args(Quantity):
+        if (errors := on.truth.errors(frame, quantity)) is not None:
+            found[quantity], found["invalid"], found["coverage_mismatch"] = errors
+    if on.truth.noise is None:
+        found["color_difference"] = on.truth.color_difference(frame, on.record.quantity)
+    else:  # its noise would be all that is seen
+        found["light"] = on.truth.light_errors(frame, drawn.solve_seconds)
+    if "invalid" not in found:
+        covered = (frame.coverage | on.truth.frame.coverage).sum()
+        found["invalid"] = float((~frame.valid).sum() / max(covered, 1))
+    return dataclasses.replace(
+        row,
+        promise=promise,
+        exact=exact,
+        passes=contender.passes_of(plan),
+        layers=_layers(frame),
+        bytes_per_pixel=drawn.bytes_per_pixel,
+        **found,
+    )
+
+
+def _layers(frame: Frame) -> int | None:
+    """The most surfaces that a method found on a ray, of those that put them in order."""
+    return None if frame.layers is None or frame.truncated is None else int((frame.layers - frame.truncated).max())
+
+
+def _timed(
+    bench: BenchContext, on: MeasuredScene, entries: Sequence[Trial]
+) -> tuple[dict[str, Samples], dict[str, Exception]]:
+    """Samples of all rows that have worked so far, in turns, and the errors of those that work no longer."""
+    targets = Targets(bench.gl, on.record.size)
+    floor = FloorDrawing(bench, on.scene, targets)
+    failures: dict[str, Exception] = {}
+    drawings: dict[str, Drawing] = {}
+    try:
+        for one in entries:
+            if one.row.failure is None and one.row.refusal is None:
+                try:
+                    plan = one.contender.plan(bench, one.scene)
+                    drawings[one.row.method] = one.contender.drawing(bench, one.scene, plan, targets)
+                except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row
+                    failures[one.row.method] = error
+        effort = bench.effort
+        found = interleaved(
+            floor.draw,
+            {name: drawing.draw for name, drawing in drawings.items()},
+            effort.case_seconds,
+            failures.__setitem__,
+            effort.patience,
+            effort.long,
+        )
+        for one in entries:
+            if one.contender.method.peels and one.row.method in found:
+                one.row = _peeled(one.row, drawings[one.row.method])
+        return found, failures
+    finally:
+        for drawing in drawings.values():
+            drawing.release()
+        floor.release()
+        targets.release()
+
+
+def _peeled(row: MethodRow, drawing: Drawing) -> MethodRow:
+    """The row with the layers and passes of the timed frame: few pixels may need most of them."""
+    drawing.draw()
+    frame = drawing.read()
+    layers = _layers(frame)
+    assert layers is not None
+    assert frame.truncated is not None
+    return dataclasses.replace(row, layers=layers, passes=-(-layers // 2) + bool(frame.truncated.any()))
+
+
+def _with_times(entry: Trial, samples: Samples | None, error: Exception | None) -> MethodRow:
+    row = entry.row
+    if samples is None:
+        if error is None:
+            return row
+        # It has worked in a smaller frame: what the renderer says on purpose is a limit of this machine.
+        if isinstance(error, TranslucentError):
+            return dataclasses.replace(row, refusal=one_line(error))
+        return dataclasses.replace(row, failure=one_line(error))
+    wall = timing(samples.wall)
+    peeled = entry.contender.method.peels and wall is not None and row.layers is not None
+    return dataclasses.replace(
+        row,
+        wall=wall,
+        gpu=timing(samples.gpu),
+        frame=timing(samples.frame),
+        ratio=ratio(samples.part, samples.floor),
+        frame_ratio=ratio(samples.whole, samples.floor),
+        ms_per_layer=wall.median / row.layers if peeled else None,  # type: ignore[union-attr,operator]
+    )
+
+
+def _floor_row(found: Sequence[Samples]) -> MethodRow:
+    """The floor; its time is over all draws of it beside the others."""
+    floor = [seconds for samples in found for seconds in samples.floor_wall]
+    promise = "the cost of drawing the geometry: no thickness"
+    row = MethodRow("depth only", "depth only", "", "floor", promise, False, passes=1)
+    if not floor:
+        return dataclasses.replace(row, refusal="nothing else has been timed on this scene")
+    return dataclasses.replace(row, wall=timing(floor), ratio=ratio(floor, floor))

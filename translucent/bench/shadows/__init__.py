@@ -1,1 +1,0 @@
-"""Shadows and caustics in the report: what lights throw through things, against the reference."""
