@@ -10,10 +10,9 @@ import pytest
 import translucent as tl
 from translucent.arrays import Array
 from translucent.assets import mesh_path
-from translucent.cpu import footprints
-from translucent.cpu.caster import Caster
+from translucent.cpu import surroundings
+from translucent.cpu.caster import Caster, dot, unit
 from translucent.cpu.renderer import CpuRenderer
-from translucent.cpu.vectors import dot, unit
 from translucent.formulas.interface import reflected_direction, refracted_direction
 from translucent.geometry.solids import Sphere
 from translucent.scene.showcase import framing
@@ -36,9 +35,9 @@ def test_differentials_are_those_of_the_formulas(ior: float | None) -> None:
         reflected_direction if ior is None else lambda d, n: np.asarray(refracted_direction(d, n, iors))
     )
     found = (
-        footprints.reflected_differentials(INCIDENT, TURNS, DIRECTIONS, NORMALS)
+        surroundings.reflected_differentials(INCIDENT, TURNS, DIRECTIONS, NORMALS)
         if ior is None
-        else footprints.refracted_differentials(INCIDENT, TURNS, DIRECTIONS, NORMALS, iors)
+        else surroundings.refracted_differentials(INCIDENT, TURNS, DIRECTIONS, NORMALS, iors)
     )
     # Where little is left to total reflection, differentials are bounded.
     cosine = dot(DIRECTIONS, NORMALS)
@@ -55,15 +54,15 @@ def test_normals_change_as_they_are_interpolated() -> None:
     face = np.arange(0, len(caster.faces.number), 601)
     middle = caster.faces.corner[face] + caster.faces.edges[face].mean(axis=1) * 2.0 / 3.0
     points = np.cross(caster.faces.outward[face], np.eye(3)[:2, None]).transpose(1, 0, 2)
-    found = footprints.normal_differentials(caster, face, middle, points, caster.faces.outward[face])
+    found = surroundings.normal_differentials(caster, face, middle, points, caster.faces.outward[face])
     # A ball's normals turn by as much as a point moves on it, in radii of the ball.
     np.testing.assert_allclose(found, points, atol=0.02)
-    onwards = footprints.onto_planes(points + 0.3, -middle, caster.faces.outward[face])
+    onwards = surroundings.onto_planes(points + 0.3, -middle, caster.faces.outward[face])
     np.testing.assert_allclose(np.einsum("kij,kj->ki", onwards, caster.faces.outward[face]), 0.0, atol=1e-12)
 
 
 def test_an_ellipse_has_the_moments_of_the_footprint() -> None:
-    axis, breadth = footprints.ellipses(INCIDENT)
+    axis, breadth = surroundings.ellipses(INCIDENT)
     moments = np.linalg.eigvalsh(np.einsum("kij,kil->kjl", INCIDENT, INCIDENT) / 12.0)
     np.testing.assert_allclose(dot(axis, axis), moments[:, 2], rtol=1e-9)
     np.testing.assert_allclose(breadth**2, moments[:, 1], atol=1e-12)

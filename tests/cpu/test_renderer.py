@@ -15,7 +15,7 @@ import pytest
 
 import translucent as tl
 from tools.cpu_throughput import throughput
-from translucent.cpu import light_paths, picture, shading, traced
+from translucent.cpu import light_paths, picture, ray_tree, shading
 from translucent.cpu import threads as pool
 from translucent.cpu.renderer import CpuRenderer
 from translucent.formulas.sampling import sample_shifts
@@ -139,7 +139,7 @@ def test_threads_and_pieces_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal to one thread")
 @pytest.mark.parametrize(
-    ("where", "method"), [(light_paths._EmbreeObject, "_candidates"), (traced._Growth, "_correct")]
+    ("where", "method"), [(light_paths._EmbreeObject, "_candidates"), (ray_tree._Growth, "_correct")]
 )
 def test_ctrl_c_ends_the_threads_within_a_picture(monkeypatch: pytest.MonkeyPatch, where: type, method: str) -> None:
     """Its step of the work is not begun again once the picture has been interrupted."""

@@ -12,12 +12,11 @@ import pytest
 import translucent as tl
 from translucent.arrays import Array
 from translucent.assets import mesh_path
-from translucent.cpu import traced
+from translucent.cpu import ray_tree
 from translucent.cpu.caster import Caster
-from translucent.cpu.diffused import DiffusedLight
-from translucent.cpu.facets import Spread
+from translucent.cpu.interactions import Spread
+from translucent.cpu.ray_tree import DiffusedLight, RayTree, TracedLight
 from translucent.cpu.renderer import CpuRenderer
-from translucent.cpu.traced import RayTree, TracedLight
 from translucent.formulas.interface import slab_reflectance, slab_transmittance
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.notes import NoteKind
@@ -128,7 +127,7 @@ SCENES = {
 
 @pytest.mark.parametrize("name", SCENES)
 def test_deep_trees_are_those_of_the_reference(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(traced, "FAINTEST", 1e-5)
+    monkeypatch.setattr(ray_tree, "FAINTEST", 1e-5)
     scene, bounces = SCENES[name](), 24
     light = traced_light(scene, depth=bounces + 1, forks=bounces + 1)
     truth = tl.reference.render(scene, SIZE, bounces=bounces)
@@ -152,7 +151,7 @@ def test_lossless_bodies_vanish_in_a_furnace(depth: int, roughness: float) -> No
 
 
 def test_a_slab_is_that_of_stokes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(traced, "FAINTEST", 1e-9)
+    monkeypatch.setattr(ray_tree, "FAINTEST", 1e-9)
     box, tau = Box((-9.0, -9.0, 0.0), (9.0, 9.0, 0.5)), np.array([0.5, 0.25, 0.1])
     backdrop, light = np.array([1.0, 2.0, 3.0]), np.array([0.7, 0.2, 0.4])
     environment = tl.Environment.constant(light).with_background(tl.Environment.constant(backdrop))

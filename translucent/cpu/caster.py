@@ -13,11 +13,30 @@ from functools import cached_property
 import numpy as np
 
 from translucent.arrays import Array, Integers
-from translucent.cpu.vectors import dot
 from translucent.geometry.embree import STEP, embree_scene
 from translucent.geometry.normals import drawn_normals
 from translucent.reference.tracer import Lines, TracedObject, center_from
 from translucent.scene.scene import Object
+
+
+def dot(a: Array, b: Array) -> Array:
+    """(k,): scalar products of vectors (k, 3)."""
+    return np.asarray(np.einsum("ki,ki->k", a, b))
+
+
+def unit(vectors: Array) -> Array:
+    """Vectors (k, 3) with their length made 1, or left at 0."""
+    length = np.sqrt(dot(vectors, vectors))
+    return np.asarray(vectors / np.where(length > 0.0, length, 1.0)[:, None])
+
+
+def largest(values: Array) -> Array:
+    """(k,): largest of the columns of (k, n), n at least 1."""
+    found = values[:, 0]
+    for column in values.T[1:]:
+        found = np.maximum(found, column)
+    return np.asarray(found)
+
 
 #: Shortest way from a surface to the next, in radii of the scene: anything nearer counts as behind.
 NEAREST = 1e-13

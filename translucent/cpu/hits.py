@@ -7,20 +7,244 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers, Mask
-from translucent.cpu.outline import Edges, Outline
 from translucent.cpu.picture import Band, Picture
-from translucent.cpu.projection import PAIRS, ProjectedObject
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
-from translucent.reference.hits import Hits, from_eye
+from translucent.reference.hits import Hits, camera_vertices, cross_triangles, from_eye, pixel_span, sorted_hits
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object
+
+_Pairs = tuple[Integers, Integers]
+
+#: Largest ratio of sideways distance to depth of a vertex that is projected; beyond, it is too near the eye's plane.
+STEEPEST = 1e6
+
+#: Pairs of a pixel and a face that are decided at a time: the working arrays stay in the processor's cache.
+PAIRS = 1 << 13
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectedObject:
+    """One object, projected into one picture."""
+
+    body: Object
+    picture: Picture
+
+    @cached_property
+    def vertices(self) -> Array:
+        """(n, 3): vertices right of, above and in front of the eye, in metres."""
+        return camera_vertices(self.body.mesh, self.body.matrix, self.picture.camera)
+
+    @cached_property
+    def corners(self) -> Array:
+        """(m, 3, 3): `vertices` of each face."""
+        return self.vertices[self.body.mesh.faces]
+
+    @cached_property
+    def weight(self) -> Array:
+        """(m, 3): perspective divisors of the corners."""
+        return self.corners[..., 2] if self.picture.perspective else np.ones(self.corners.shape[:2])
+
+    @cached_property
+    def beside(self) -> Mask:
+        """(n,): vertices in the plane of the eye, or nearly; they have no place in the picture."""
+        if not self.picture.perspective:
+            return np.zeros(len(self.vertices), dtype=bool)
+        return np.asarray(np.abs(self.vertices[:, :2]).max(axis=1) >= STEEPEST * np.abs(self.vertices[:, 2]))
+
+    @cached_property
+    def passing(self) -> Mask:
+        """(m,): faces that pass the plane of the eye, or nearly; in the picture they are no triangles."""
+        front = self.weight > 0
+        return np.asarray(self.beside[self.body.mesh.faces].any(axis=1) | (front.any(axis=1) != front.all(axis=1)))
+
+    @cached_property
+    def any_passing(self) -> bool:
+        """True if any faces are `passing`."""
+        return bool(self.passing.any())
+
+    @cached_property
+    def projected(self) -> Array:
+        """(n, 2): column and row of the vertices; meaningless for those `beside` the eye."""
+        depth = self.vertices[:, 2] if self.picture.perspective else np.ones(len(self.vertices))
+        weight = np.where(self.beside, 1.0, depth)
+        return np.asarray(self.picture.grid.pixels(self.vertices[:, :2], weight) / weight[:, None])
+
+    def interact(self, band: Band, pairs: Iterator[_Pairs]) -> Hits:
+        """Pairs of a pixel and a face in which the ray meets the face, each once, sorted as by `line_hits`."""
+        parts = []
+        for pixel, face in pairs:
+            points = self.picture.points(band, pixel)
+            keep, *found = cross_triangles(self.corners[face], self.weight[face], points, self.picture.perspective)
+            parts.append((pixel[keep], face[keep], *found))
+        return sorted_hits(parts, -1 if self.body.faces_inwards else 1)
+
+    def boxed_pairs(self, band: Band, wanted: Mask, chosen: Mask | None = None) -> Iterator[_Pairs]:
+        """Candidate pairs of a `wanted` pixel (pixels,) and a face, or a `chosen` one (m,), by the faces' bounding
+        boxes.
+        """
+        face, top, rows, left, columns = self._boxes
+        pixels = np.flatnonzero(wanted)
+        before = np.concatenate([[0], np.cumsum(wanted)])
+        start = np.clip(top - band.first_row, 0, band.rows)
+        stop = np.clip(top + rows - band.first_row, 0, band.rows)
+        keep = before[start * band.width] < before[stop * band.width]
+        if chosen is not None:
+            keep &= chosen[face]
+        box = np.flatnonzero(keep)
+        part, row = expand(start[box], stop[box] - start[box])
+        box = box[part]
+        first = row * band.width + left[box]
+        low, high = before[first], before[first + columns[box]]
+        for some in slices(high - low, PAIRS):
+            part, index = expand(low[some], high[some] - low[some])
+            yield pixels[index], face[box[some][part]]
+
+    @cached_property
+    def _boxes(self) -> tuple[Integers, ...]:
+        """Face, first row, rows, first column and columns of the pixels that faces may cover, ahead or behind."""
+        parts = []
+        # What is behind the eye appears in the picture as well, turned around.
+        for side in (1, -1) if self.picture.perspective else (1,):
+            pixels = self.picture.grid.pixels(side * self.corners[..., :2], side * self.weight)
+            left, columns = pixel_span(pixels[..., 0], side * self.weight, self.picture.size[0])
+            top, rows = pixel_span(pixels[..., 1], side * self.weight, self.picture.size[1])
+            face = np.flatnonzero((columns > 0) & (rows > 0))
+            parts.append((face, *(array[face] for array in (top, rows, left, columns))))
+        return tuple(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+
+
+def expand(first: Integers, count: Integers) -> tuple[Integers, Integers]:
+    """Ranges first, first + 1, ... of `count` numbers each, one after the other: index of the range, and number."""
+    ends = np.cumsum(count)
+    part = np.repeat(np.arange(len(count)), count)
+    return part, np.arange(len(part)) + np.repeat(first - (ends - count), count)
+
+
+def slices(count: Integers, most: int) -> Iterator[slice]:
+    """Slices of items with a sum of `count` (n,) up to `most`, or of one item."""
+    ends = np.cumsum(count)
+    begin = 0
+    while begin < len(ends):
+        before = int(ends[begin - 1]) if begin else 0
+        end = max(int(np.searchsorted(ends, before + most, side="right")), begin + 1)
+        yield slice(begin, end)
+        begin = end
+
+
+#: Generous bound of the relative rounding of positions in the picture: doubt costs time, and errors lose surfaces.
+ROUNDING = 1e-11
+
+#: Pairs of an edge and a row that are handled at a time: the working arrays stay below 10 MB.
+CROSSINGS = 1 << 16
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Unique edges of a mesh.
+
+    Attributes
+    ----------
+    ends : (e, 2) int64
+        Vertices, the lower number first.
+    edge : (m, 3) int64
+        Number of the edge that follows each corner of a face.
+    turn : (m, 3) int8
+        1 where the face runs along it from the first vertex to the second, -1 where against it.
+    """
+
+    ends: Integers
+    edge: Integers
+    turn: npt.NDArray[np.int8]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> Edges:
+        """The edges of a mesh."""
+        start = mesh.faces.astype(np.int64)
+        end = np.roll(start, -1, axis=1)
+        key = np.minimum(start, end) * len(mesh.vertices) + np.maximum(start, end)
+        keys, edge = np.unique(key, return_inverse=True)
+        ends = np.stack(np.divmod(keys, len(mesh.vertices)), axis=1)
+        return cls(ends, edge.reshape(-1, 3), np.where(start < end, 1, -1).astype(np.int8))
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """Outline of a mesh: edges across which the number of faces changes.
+
+    Attributes
+    ----------
+    start, end : (e, 2) float64
+        Column and row; `start` is the upper one.
+    change : (e,) float64
+        How many faces more there are to the right of the edge than to the left.
+    """
+
+    start: Array
+    end: Array
+    change: Array
+
+    @classmethod
+    def of(cls, seen: ProjectedObject, edges: Edges) -> Outline:
+        """Outline of the object in the picture, without the faces that pass the eye."""
+        a, b, c = seen.projected[seen.body.mesh.faces].transpose(1, 2, 0)
+        with np.errstate(under="ignore"):
+            clockwise = np.sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).astype(np.int8)
+        clockwise[seen.passing] = 0
+        net = np.bincount(edges.edge.ravel(), (clockwise[:, None] * edges.turn).ravel(), len(edges.ends))
+        chosen = np.flatnonzero(net)
+        first, second = seen.projected[edges.ends[chosen]].transpose(1, 0, 2)
+        # Rows count downwards: a face that appears clockwise lies to the right of its sides that go up.
+        upwards = second[:, 1] < first[:, 1]
+        start, end = np.where(upwards[:, None], (second, first), (first, second))
+        return cls(start, end, np.where(upwards, net[chosen], -net[chosen]))
+
+    def counts(self, band: Band) -> tuple[Integers, Mask]:
+        """(pixels,), (pixels,): number of faces over each pixel, and mask of pixels next to the outline, where it is in
+        doubt.
+        """
+        tolerance = ROUNDING * (band.width + np.abs(self.start).max(axis=1) + np.abs(self.end).max(axis=1))
+        past = band.first_row + band.rows
+        first = np.ceil(np.clip(self.start[:, 1] - tolerance, band.first_row, past)).astype(np.int64)
+        last = np.floor(np.clip(self.end[:, 1] + tolerance, band.first_row - 1, past - 1)).astype(np.int64)
+        rows = np.maximum(last - first + 1, 0)
+        # A column more, for what changes to the right of the picture.
+        change = np.zeros((2, band.rows * (band.width + 1)))
+        for some in slices(rows, CROSSINGS):
+            edge, row = expand(first[some], rows[some])
+            self._add_changes(change, band, edge + some.start, row, tolerance[some][edge])
+        number, doubt = np.cumsum(change.reshape(2, band.rows, band.width + 1), axis=2)[..., :-1].reshape(2, -1)
+        return number.astype(np.int64), doubt > 0
+
+    def _add_changes(self, change: Array, band: Band, edge: Integers, row: Integers, tolerance: Array) -> None:
+        """Add what changes at each column from that to the left of it, where edges (k,) cross rows (k,)."""
+        line = (row - band.first_row) * (band.width + 1)
+        size = change.shape[1]
+        crossed = (self.start[edge, 1] <= row) & (row < self.end[edge, 1])
+        column = np.ceil(np.clip(self._column(edge, row), 0, band.width)).astype(np.int64)
+        change[0] += np.bincount((line + column)[crossed], self.change[edge[crossed]], size)
+        level = self.start[edge, 1] == self.end[edge, 1]
+        near = self._column(edge, row - tolerance), self._column(edge, row + tolerance)
+        left, right = np.sort([near[0], np.where(level, self.end[edge, 0], near[1])], axis=0)
+        first = np.ceil(np.clip(left - tolerance, 0, band.width)).astype(np.int64)
+        past = np.floor(np.clip(right + tolerance, -1, band.width - 1)).astype(np.int64) + 1
+        some = first < past
+        change[1] += np.bincount((line + first)[some], minlength=size)
+        change[1] -= np.bincount((line + past)[some], minlength=size)
+
+    def _column(self, edge: Integers, row: Array | Integers) -> Array:
+        """(k,): where edges are at rows (k,), or at the end that is nearest to there."""
+        start, end = self.start[edge], self.end[edge]
+        height = end[:, 1] - start[:, 1]
+        share = (np.clip(row, start[:, 1], end[:, 1]) - start[:, 1]) / np.where(height > 0, height, 1.0)
+        return np.asarray(start[:, 0] + share * (end[:, 0] - start[:, 0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +283,7 @@ class Tracer:
         if not incomplete.any():
             return found
         # Where the proof fails, every face that may cover the pixel is tried.
-        rest = self._seen.meet(band, self._seen.boxed_pairs(band, incomplete))
+        rest = self._seen.interact(band, self._seen.boxed_pairs(band, incomplete))
         both = _joined([found.where(~incomplete[found.pixel]), rest])
         return both.where(np.argsort(both.pixel, kind="stable"))
 
@@ -75,7 +299,7 @@ class Tracer:
             proper = ~passing[face]
             everywhere = np.ones(band.pixels, dtype=bool)
             pairs = chain(_sliced(pixel[ray[proper]], face[proper]), self._seen.boxed_pairs(band, everywhere, passing))
-        hits = self._seen.meet(band, pairs)
+        hits = self._seen.interact(band, pairs)
         found = np.bincount(hits.pixel[~passing[hits.face]], minlength=band.pixels)
         return hits, incomplete | (found != expected)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -11,13 +12,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from translucent.cpu.bending import BentLight
+from translucent.arrays import Integers
 from translucent.cpu.caster import Caster
-from translucent.cpu.diffused import DiffusedLight
-from translucent.cpu.facets import Spread
 from translucent.cpu.hits import TracedMesh, Tracer
+from translucent.cpu.interactions import Spread
 from translucent.cpu.picture import Band, Picture
-from translucent.cpu.shading import Arrays, Shader
+from translucent.cpu.ray_tree import DiffusedLight, RayTree
+from translucent.cpu.shading import Arrays, Shader, on_rays
 from translucent.cpu.threads import in_threads, processors
 from translucent.diffusion.cache import FieldCache
 from translucent.errors import RenderError
@@ -28,8 +29,58 @@ from translucent.geometry.mesh import Mesh
 from translucent.planning.choices import RenderChoices
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering.choice import shown
+from translucent.reference.hits import Hits
+from translucent.reference.rays import Rays
 from translucent.reference.refraction import bends
 from translucent.scene.scene import Scene
+
+#: Rays of the picture that are followed together: the working arrays stay below 100 MB.
+BATCH = 1 << 14
+
+
+@dataclass(frozen=True, eq=False)
+class BentLight:
+    """Light along rays that bend at the interfaces of a scene.
+
+    Attributes
+    ----------
+    tree : RayTree
+    bending : tuple of int
+        Objects with interfaces.
+    """
+
+    tree: RayTree
+    bending: tuple[int, ...]
+
+    @classmethod
+    def of(
+        cls, shader: Shader, caster: Caster, size: tuple[int, int], tree: tuple[int, int], diffused: DiffusedLight
+    ) -> BentLight:
+        """Light for pictures of this size; `caster` has the objects of the shader's scene.
+
+        `tree`: depth and forks, as of `TracedInterfaces`.
+        """
+        scene = shader.scene
+        pixel = 2.0 * scene.camera.half_extent(size)[1] / size[1]
+        rays = RayTree(shader.light, caster, size[0] / size[1], *tree, diffused, pixel)
+        return cls(rays, tuple(i for i, body in enumerate(scene.objects) if body.has_interface))
+
+    def put_into(self, shaded: Arrays, rays: Rays, hits: Sequence[Hits], band: Band, spread: Spread | None) -> None:
+        """Replace radiance and validity of those rays that bend; parameters as for `Shader.shade` and `RayTree.see`."""
+        touched = np.zeros(len(rays), dtype=bool)
+        for i in self.bending:
+            touched[hits[i].pixel[hits[i].distance >= 0]] = True
+        chosen = np.flatnonzero(touched & shaded["valid"])
+        for begin in range(0, len(chosen), BATCH):
+            self._put(shaded, rays, hits, chosen[begin : begin + BATCH], band.first_row * band.width, spread)
+
+    def _put(
+        self, shaded: Arrays, rays: Rays, hits: Sequence[Hits], some: Integers, first: int, spread: Spread | None
+    ) -> None:
+        own = [on_rays(line, some, len(rays)) for line in hits]
+        light = self.tree.see(rays.where(some), own, some + first, spread)
+        shaded["radiance"][some], shaded["valid"][some] = light.radiance, light.valid
+
 
 Seconds = dict[str, float]
 

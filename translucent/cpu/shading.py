@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from translucent.arrays import Integers
 from translucent.cpu.caustics import CausticLight
+from translucent.cpu.hits import slices
 from translucent.cpu.light_paths import EmbreeLightPaths
-from translucent.cpu.projection import slices
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.planning.assembly import FALLBACK_SHEET

@@ -1,4 +1,4 @@
-"""Records of the bodies that rays are inside, and what fills the places that they stand for."""
+"""Interior lists of the bodies that rays are inside, and what fills the places that they stand for."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
-from translucent.cpu.media_record import MOST, RecordedMedia, empty_records, enter, has, leave
+from translucent.cpu.interior_list import MOST, InteriorMedia, empty_interior_lists, enter, has, leave
 from translucent.geometry.solids import Box
 from translucent.reference.interfaces import AIR, Optics
 from translucent.reference.segments import mix
@@ -28,49 +28,49 @@ def scene_of(*priorities: int, overlap: str = "add") -> tl.Scene:
 
 
 def test_bodies_are_left_in_any_order() -> None:
-    record = empty_records(1)
+    interior = empty_interior_lists(1)
     for item in (3, 1, 2):
-        assert not enter(record, RAY, at(item)).any()
-    assert record[0, :4].tolist() == [3, 1, 2, -1]
-    assert has(record, at(1)).all()
-    assert not leave(record, RAY, at(1)).any()
-    assert record[0, :4].tolist() == [3, 2, -1, -1]
-    assert leave(record, RAY, at(1)).all(), "it is not there"
-    assert record[0, :4].tolist() == [3, 2, -1, -1]
+        assert not enter(interior, RAY, at(item)).any()
+    assert interior[0, :4].tolist() == [3, 1, 2, -1]
+    assert has(interior, at(1)).all()
+    assert not leave(interior, RAY, at(1)).any()
+    assert interior[0, :4].tolist() == [3, 2, -1, -1]
+    assert leave(interior, RAY, at(1)).all(), "it is not there"
+    assert interior[0, :4].tolist() == [3, 2, -1, -1]
 
 
 def test_a_body_that_winds_twice_is_left_twice_and_keeps_its_turn() -> None:
-    record, media = empty_records(1), RecordedMedia(*(scene := scene_of(0, 0),), Optics(scene, (None, None)))
+    interior, media = empty_interior_lists(1), InteriorMedia(*(scene := scene_of(0, 0),), Optics(scene, (None, None)))
     for item in (0, 1, 0):
-        enter(record, RAY, at(item))
-    assert media.dominant(record).tolist() == [1], "of equal ones that which was entered last"
-    leave(record, RAY, at(0))
-    assert has(record, at(0)).all()
-    leave(record, RAY, at(1))
-    assert media.dominant(record).tolist() == [0]
-    leave(record, RAY, at(0))
-    assert media.dominant(record).tolist() == [AIR]
+        enter(interior, RAY, at(item))
+    assert media.effective(interior).tolist() == [1], "of equal ones that which was entered last"
+    leave(interior, RAY, at(0))
+    assert has(interior, at(0)).all()
+    leave(interior, RAY, at(1))
+    assert media.effective(interior).tolist() == [0]
+    leave(interior, RAY, at(0))
+    assert media.effective(interior).tolist() == [AIR]
 
 
 def test_a_full_record_says_so() -> None:
-    record = empty_records(1)
+    interior = empty_interior_lists(1)
     for item in range(MOST):
-        assert not enter(record, RAY, at(item)).any()
-    assert enter(record, RAY, at(MOST)).all()
-    assert enter(record, RAY, at(0)).all()
-    assert record[0].tolist() == list(range(MOST))
+        assert not enter(interior, RAY, at(item)).any()
+    assert enter(interior, RAY, at(MOST)).all()
+    assert enter(interior, RAY, at(0)).all()
+    assert interior[0].tolist() == list(range(MOST))
 
 
 @pytest.mark.parametrize("overlap", ["add", "union", "priority"])
 def test_mixtures_are_those_of_the_reference(overlap: str, rng: np.random.Generator) -> None:
     scene = scene_of(2, 1, 3, 0, overlap=overlap)
     windings = rng.integers(0, 3, (4, 200)).astype(np.int32)
-    record = empty_records(200)
+    interior = empty_interior_lists(200)
     for item in rng.permutation(4):
         for again in range(2):
             rays = np.flatnonzero(windings[item] > again)
-            enter(record, rays, np.full(len(rays), item, dtype=np.int16))
-    found = RecordedMedia(scene, Optics(scene, (None,) * 4)).coefficients(record)
+            enter(interior, rays, np.full(len(rays), item, dtype=np.int16))
+    found = InteriorMedia(scene, Optics(scene, (None,) * 4)).coefficients(interior)
     expected = mix(scene, np.arange(4), windings)
     for own, other in zip(found, expected[:2], strict=True):
         np.testing.assert_allclose(own, other, rtol=1e-14)
@@ -78,9 +78,9 @@ def test_mixtures_are_those_of_the_reference(overlap: str, rng: np.random.Genera
 
 def test_priority_decides_and_then_the_later_entry() -> None:
     scene = scene_of(5, 1, 5, overlap="priority")
-    media = RecordedMedia(scene, Optics(scene, (None,) * 3))
+    media = InteriorMedia(scene, Optics(scene, (None,) * 3))
     for order, expected in (((0, 1, 2), 2), ((2, 1, 0), 0), ((0, 1), 0), ((1,), 1), ((), AIR)):
-        record = empty_records(1)
+        interior = empty_interior_lists(1)
         for item in order:
-            enter(record, RAY, at(item))
-        assert media.dominant(record).tolist() == [expected]
+            enter(interior, RAY, at(item))
+        assert media.effective(interior).tolist() == [expected]

@@ -1,0 +1,520 @@
+"""Radiance along rays that bend: a ray tree through the meshes of a scene, all segments of a level at once.
+
+Nested dielectrics are those of Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images". All radiance is
+basic radiance L / n^2, which does not change where light enters a denser medium; emission counts as it would in a
+medium that is index-matched. `translucent.reference.refracted` follows all branches, and this tree those that matter
+most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from translucent.arrays import Array, Integers, Mask
+from translucent.cpu.caster import Caster, dot, largest, unit
+from translucent.cpu.interactions import InterfaceHits, InterfaceInteractions, InterfaceLight, Interfaces, Spread
+from translucent.cpu.interior_list import (
+    NOTHING,
+    Branches,
+    InteriorList,
+    InteriorMedia,
+    Items,
+    empty_interior_lists,
+    enter,
+    has,
+    joined,
+    leave,
+)
+from translucent.cpu.surroundings import Surroundings, first_footprints, moved_on, parted
+from translucent.cpu.threads import end_if_stopped
+from translucent.diffusion.field import DiffusionField
+from translucent.formulas import optics
+from translucent.formulas.diffusion import HAZE_ROUGHNESS
+from translucent.formulas.interface import reflected_direction
+from translucent.reference.compositing import composite
+from translucent.reference.emission import emission_of_mixtures
+from translucent.reference.hits import Hits
+from translucent.reference.interfaces import Optics
+from translucent.reference.intervals import Intervals
+from translucent.reference.opaque import OpaqueHits, reflected_radiance
+from translucent.reference.rays import Rays
+from translucent.reference.sheets import scene_crossings
+from translucent.reference.surface_light import SurfaceLight
+from translucent.reference.volume import Volume, volume_segments
+from translucent.scene.scene import Scene
+
+
+class SegmentMedia:
+    """Media of a scene, as segments of rays cross them.
+
+    Parameters
+    ----------
+    scene : Scene
+    own : Optics
+    media : InteriorMedia
+    light : SurfaceLight
+        On layers.
+    """
+
+    def __init__(self, scene: Scene, own: Optics, media: InteriorMedia, light: SurfaceLight) -> None:
+        self.scene, self.media, self.light, self.volume = scene, media, light, Volume(scene)
+        #: Sheets without an interface.
+        self.films = tuple(None if i in own.walls else metres for i, metres in enumerate(own.sheets))
+
+    def along(self, rays: Rays, interior: InteriorList, length: Array) -> tuple[Array | None, Array]:
+        """Emitted radiance, None if there is none, and transmittance (k, 3) over `length` metres (k,) of rays."""
+        if self.scene.varies:
+            return self._varied(rays, interior, length)
+        extinction, emission = self.media.coefficients(interior)
+        with np.errstate(over="ignore", under="ignore"):
+            passed = np.exp(-extinction * length[:, None])
+            if not self.media.emits:
+                return None, passed
+            return optics.emitted_radiance(emission, extinction, length[:, None]), passed
+
+    def _varied(self, rays: Rays, interior: InteriorList, length: Array) -> tuple[Array, Array]:
+        """The same where densities vary."""
+        ray, entry = np.nonzero(interior != NOTHING)
+        # One interval for each entry, however often a body winds around the segment.
+        intervals = Intervals(
+            ray,
+            np.zeros(len(ray)),
+            length[ray],
+            interior[ray, entry].astype(np.int64),
+            np.ones(len(ray), dtype=np.int64),
+        )
+        return self._composited(rays, intervals, [_no_hits()] * len(self.films), (None,) * len(self.films))
+
+    def through_films(self, rays: Rays, item: Integers, seen: Hits) -> tuple[Array, Array]:
+        """Emitted radiance and transmittance (k, 3) of sheets, item (k,), at the origins of rays; a hit on each."""
+        hits = [_no_hits()] * len(self.films)
+        for i in np.unique(item):
+            hits[i] = seen.where(item == i)
+        none = np.empty(0, np.int64)
+        return self._composited(rays, Intervals(none, np.empty(0), np.empty(0), none, none), hits, self.films)
+
+    def _composited(
+        self, rays: Rays, intervals: Intervals, hits: Sequence[Hits], sheets: Sequence[float | None]
+    ) -> tuple[Array, Array]:
+        end = np.full(len(rays), np.inf)
+        crossings = scene_crossings(self.scene, rays, hits, sheets, end, self.light.on_interfaces)
+        segments, filling = volume_segments(self.scene, self.volume, rays, intervals, crossings)
+        emitted, depth = composite(emission_of_mixtures(self.volume, rays, segments, filling), len(rays))
+        return emitted, optics.transmittance(depth)
+
+
+def _no_hits() -> Hits:
+    none = np.empty(0, np.int64)
+    return Hits(none, np.empty(0), np.empty(0, np.int8), none, np.empty((0, 3)))
+
+
+class DiffusedLight:
+    """Diffused light of the bodies of a scene.
+
+    Parameters
+    ----------
+    fields : mapping of int to DiffusionField
+        By the number of the object.
+    """
+
+    def __init__(self, fields: Mapping[int, DiffusionField]) -> None:
+        self._fields = dict(fields)
+
+    def __bool__(self) -> bool:
+        """True if there is any."""
+        return bool(self._fields)
+
+    def leaves(self, before: Integers, after: Integers) -> Mask:
+        """(k,): whether it leaves one of two bodies where they meet, bent or not."""
+        return np.asarray(np.isin(np.stack([before, after]), list(self._fields)).any(axis=0))
+
+    def haze(self, body: Integers) -> Array:
+        """(k, 3, 3): shares of the extinction around rays in bodies (k,) by light that is scattered ahead, and of that
+        light which leave on the far side and on the near one.
+        """
+        found = np.zeros((len(body), 3, 3))
+        for number, field in self._fields.items():
+            found[body == number] = np.stack([field.ahead, *field.haze])
+        return found
+
+    def radiance(self, body: Integers, points: Array, directions: Array, normals: Array) -> Array:
+        """(k, 3): basic radiance against rays that start at points (k, 3) of surfaces, inside `body` (k,)."""
+        found = np.zeros(points.shape)
+        cosine = np.abs(dot(directions, normals))
+        for number, field in self._fields.items():
+            own = np.flatnonzero(body == number)
+            if own.size:
+                found[own] = field.radiance(points[own], cosine[own])
+        return found
+
+
+#: Share of each color below which a branch is not followed: it sees the environment at once.
+FAINTEST = 1.0 / 1024.0
+
+#: Largest distance between surfaces in one place, in radii of the scene.
+TOGETHER = 1e-7
+
+#: Luminance of linear RGB (Rec. 709).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+#: Distance from the center of the scene, in radii, at which rays from afar begin.
+BEFORE = 1.01
+
+
+@dataclass(frozen=True, eq=False)
+class TracedLight:
+    """Radiance (n, 3) of rays, and whether (n,) all parts of them left the bodies that they entered."""
+
+    radiance: Array
+    valid: Mask
+
+
+class RayTree:
+    """Tracer of the camera's rays through the interfaces of a scene.
+
+    At an interface that reflects and refracts, the stronger branch is followed. The weaker one is followed, too, where
+    the path has forks left, of which it uses up one; else it sees the environment in its direction, as if nothing were
+    ahead. So do both at the last interface.
+
+    Parameters
+    ----------
+    light : SurfaceLight
+        On the surfaces of the scene.
+    caster : Caster
+        Of the objects of the scene.
+    aspect : float
+        Width of the picture divided by its height.
+    depth : int
+        Interfaces that a path meets, at most.
+    forks : int
+        How often a path takes the weaker branch, at most.
+    diffused : DiffusedLight
+        Of the bodies of the scene.
+    pixel : float
+        Extent of a pixel in metres, or in metres at distance 1, over which the environment is averaged; 0 for points.
+    """
+
+    def __init__(
+        self,
+        light: SurfaceLight,
+        caster: Caster,
+        aspect: float,
+        depth: int,
+        forks: int,
+        diffused: DiffusedLight,
+        pixel: float = 0.0,
+    ) -> None:
+        scene = light.scene
+        self.light, self.scene, self.caster, self.depth, self.forks = light, scene, caster, depth, forks
+        self.diffused, self.pixel = diffused, pixel
+        self.surroundings = Surroundings(scene, aspect)
+        dispersed = any(body.surface is not None and body.surface.dispersion > 0 for body in scene.bodies)
+        self._channels = [
+            Optics(scene, light.paths.sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))
+        ]
+
+    def see(self, rays: Rays, hits: Sequence[Hits], pixel: Integers, spread: Spread | None) -> TracedLight:
+        """Trace rays of the camera.
+
+        Parameters
+        ----------
+        rays : Rays
+        hits : sequence of Hits
+            Of each object, as `line_hits` gives them: those behind the origins tell what these are inside.
+        pixel : (n,) int64
+            Each takes other points of `spread`.
+        spread : Spread, optional
+            For the microfacets of rough interfaces. Without it all that they do is to blur the environment.
+        """
+        found = TracedLight(np.zeros((len(rays), 3)), np.ones(len(rays), dtype=bool))
+        for channel, own in enumerate(self._channels):
+            carried = np.eye(3)[channel] if len(self._channels) > 1 else np.ones(3)
+            _Growth(self, own, found, rays.backdrop, pixel, spread).grow(rays, hits, carried)
+        return found
+
+
+class _Growth:
+    """Growth of a ray tree, for light with the same indices of refraction."""
+
+    def __init__(
+        self, tree: RayTree, own: Optics, found: TracedLight, backdrop: Array, pixel: Integers, spread: Spread | None
+    ) -> None:
+        self.tree, self.own, self.found = tree, own, found
+        self.backdrop, self.pixel, self.spread = backdrop, pixel, spread
+        self.scene, self.caster = tree.scene, tree.caster
+        self.media = InteriorMedia(tree.scene, own)
+        self.segments = SegmentMedia(tree.scene, own, self.media, tree.light)
+        self.interfaces, self.light = Interfaces(tree.caster, own), InterfaceLight(own, tree.light)
+        self.shift = tree.scene.camera.eye - tree.caster.center
+        # One entry more, at index -1, for nothing.
+        kinds = np.zeros((3, len(tree.scene.objects) + 1), dtype=bool)
+        kinds[0, own.solids] = kinds[1, own.walls] = True
+        kinds[2, [i for i, body in enumerate(tree.scene.objects) if body.medium is None]] = True
+        self.is_solid, self.is_wall, self.is_opaque = kinds
+        self.is_open = self.is_solid.copy()
+        self.is_open[own.solids] = [not tree.scene.objects[i].mesh.diagnosis.solid for i in own.solids]
+        self.is_film = np.append(~kinds[:, :-1].any(axis=0), False)
+
+    def grow(self, rays: Rays, hits: Sequence[Hits], carried: Array) -> None:
+        """Follow rays of the camera along their branches; each starts with the light `carried` (3,)."""
+        count = len(rays)
+        with np.errstate(under="ignore"):
+            origins = (rays.origins + self.shift) / self.caster.radius
+        branches = Branches(
+            origins,
+            rays.directions,
+            np.tile(carried, (count, 1)),
+            np.arange(count),
+            self._records(hits, count),
+            np.zeros(count, np.int64),
+            np.full(count, self.tree.forks),
+            np.full((count, self.caster.groups), -1),
+            np.zeros(count, dtype=bool),
+            np.zeros(count),
+            self._pixel_footprints(rays.directions),
+        )
+        # The eye may be far away, where float32 is coarse.
+        start = np.maximum(-dot(origins, rays.directions) - BEFORE, 0.0)
+        branches = self._step(branches, start)
+        while len(branches):
+            branches = self._step(branches)
+
+    def _pixel_footprints(self, directions: Array) -> Array:
+        """Footprints of rays of the camera; none where the environment is smooth, no picture."""
+        seen = self.scene.environment.map is not None
+        samples = 1 if self.spread is None else self.spread.samples
+        return first_footprints(self.scene.camera, directions, seen * self.tree.pixel, samples, self.caster.radius)
+
+    def _records(self, hits: Sequence[Hits], count: int) -> InteriorList:
+        """Interior lists of rays at their origins, from all surfaces behind them."""
+        interior = empty_interior_lists(count)
+        behind = [(i, hits[i].where(hits[i].distance < 0)) for i in self.own.solids]
+        pixel, distance, sign, item = (
+            np.concatenate([np.empty(0, np.int64), *parts])
+            for parts in (
+                [line.pixel for _, line in behind],
+                [line.distance for _, line in behind],
+                [line.sign for _, line in behind],
+                [np.full(len(line.pixel), i) for i, line in behind],
+            )
+        )
+        order = np.lexsort((distance, pixel))
+        ray = pixel[order].astype(np.int64)
+        rank = np.arange(len(ray)) - np.searchsorted(ray, ray)
+        for level in range(int(rank.max(initial=-1)) + 1):
+            now = order[rank == level]
+            self._cross(interior, ray[rank == level], item[now].astype(np.int16), sign[now] > 0, ray[rank == level])
+        return interior
+
+    def _cross(self, interior: InteriorList, ray: Integers, item: Items, entering: Mask, owner: Integers) -> None:
+        """Cross surfaces of solids, each ray (k,) one of them; where this cannot be, the pixel is not valid."""
+        on, off = np.flatnonzero(entering), np.flatnonzero(~entering)
+        self.found.valid[owner[on[enter(interior, ray[on], item[on])]]] = False
+        self.found.valid[owner[off[leave(interior, ray[off], item[off])]]] = False
+
+    def _step(self, branches: Branches, start: Array | None = None) -> Branches:
+        """Follow branches to the next surfaces; what continues from there."""
+        end_if_stopped()
+        face, distance = self.caster.nearest(branches.origins, branches.directions, branches.last, start)
+        self._correct(branches, face, distance)
+        place = -largest(-distance)
+        free = np.isinf(place)
+        self._look_up(branches.where(free))
+        open_ended = branches.interior[free, 0] != NOTHING
+        self.found.valid[branches.owner[free][open_ended]] = False
+        met = np.flatnonzero(~free)
+        face = np.where(distance[met] <= place[met, None] + TOGETHER, face[met], -1)
+        branches = self._through_media(branches.where(met), place[met])
+        points = branches.origins + place[met, None] * branches.directions
+        footprint = moved_on(branches.footprint, place[met])
+        return self._at_surfaces(replace(branches, origins=points, last=face, footprint=footprint))
+
+    def _correct(self, branches: Branches, face: Integers, distance: Array) -> None:
+        """Search in float64 where hits contradict interior lists: a branch leaves a body it is not in, or stays in."""
+        place = -largest(-distance)
+        doubt: Mask = np.isinf(place) & (branches.interior[:, 0] != NOTHING)
+        for own, at in zip(face.T, distance.T, strict=True):
+            ray = np.flatnonzero((own >= 0) & (at <= place + TOGETHER))
+            item = self.caster.faces.item[own[ray]]
+            leaves = self.is_solid[item] & ~self._enters(own[ray], branches.directions[ray])
+            doubt[ray[leaves & ~has(branches.interior[ray], item)]] = True
+        some = np.flatnonzero(doubt)
+        if some.size:
+            face[some], distance[some] = self.caster.nearest_exactly(branches.origins[some], branches.directions[some])
+
+    def _enters(self, face: Integers, directions: Array) -> Mask:
+        return np.asarray(dot(self.caster.faces.outward[face], directions) < 0)
+
+    def _through_media(self, branches: Branches, length: Array) -> Branches:
+        """Attenuate branches over the distances (n,) to the next surface, in radii, and add what media emit."""
+        inside = np.flatnonzero(branches.interior[:, 0] != NOTHING)
+        if not inside.size:
+            return branches
+        own = branches.where(inside)
+        emitted, passed = self.segments.along(self._rays(own), own.interior, length[inside] * self.caster.radius)
+        if emitted is not None:
+            self._add(own, emitted)
+        if self.tree.diffused:
+            self._add_haze(own, passed)
+        throughput = branches.throughput.copy()
+        with np.errstate(under="ignore"):
+            throughput[inside] *= passed
+        return replace(branches, throughput=throughput)
+
+    def _add_haze(self, branches: Branches, passed: Array) -> None:
+        """Add what is scattered ahead, where diffusion takes it for unscattered."""
+        ahead, far, near = np.moveaxis(self.tree.diffused.haze(self.media.effective(branches.interior)), 1, 0)
+        hazy = np.flatnonzero(ahead.any(axis=1))
+        if hazy.size:
+            own, ahead, far, near = branches.where(hazy), ahead[hazy], far[hazy], near[hazy]
+            # Of the optical depth, which varies as the density does, the part by such events does not count.
+            with np.errstate(under="ignore"):
+                through = passed[hazy] ** (1.0 - ahead)
+            behind, before = (
+                self.tree.surroundings.blurred(own, sign * own.directions, HAZE_ROUGHNESS) for sign in (1.0, -1.0)
+            )
+            self._add(own, (through - passed[hazy]) * (far * behind + near * before))
+
+    def _at_surfaces(self, branches: Branches) -> Branches:
+        """Cross the surfaces that branches, with their origins there, have come to; what continues from there."""
+        item = np.where(branches.last >= 0, self.caster.faces.item[branches.last], NOTHING)
+        branches = self._through_films(branches, item)
+        opaque = self.is_opaque[item]
+        stopped = np.asarray(opaque.any(axis=1))
+        if stopped.any():
+            # Whether a ray is rightly in an open body, what is behind the opaque object would tell.
+            astray = self.is_open[branches.interior[stopped]].any(axis=1)
+            self.found.valid[branches.owner[stopped][astray]] = False
+            self._end(branches.where(stopped), item[stopped], opaque[stopped].argmax(axis=1))
+            branches, item = branches.where(~stopped), item[~stopped]
+        before, interior = self.media.effective(branches.interior), branches.interior.copy()
+        for own, face in zip(item.T, branches.last.T, strict=True):
+            ray = np.flatnonzero(self.is_solid[own])
+            entering = self._enters(face[ray], branches.directions[ray])
+            self._cross(interior, ray, own[ray].astype(np.int16), entering, branches.owner[ray])
+        after = self.media.effective(interior)
+        changed = self.own.matters(before, after) | (before != after) & self.tree.diffused.leaves(before, after)
+        wall = self.is_wall[item]
+        # With a wall of a body at the same place, the wall goes first.
+        sheet = ~changed & wall.any(axis=1)
+        # The interface is that of the body that is entered; where the ray only leaves one, of that.
+        entered = (item == after[:, None]) & (item != NOTHING)
+        column = np.where(entered.any(axis=1), entered.argmax(axis=1), (item == before[:, None]).argmax(axis=1))
+        column = np.where(sheet, wall.argmax(axis=1), column)
+        met = np.flatnonzero(changed | sheet)
+        places = InterfaceHits(
+            item[met, column[met]], branches.last[met, column[met]], before[met], np.where(sheet, before, after)[met]
+        )
+        onwards = np.flatnonzero(~changed & ~sheet)
+        straight = replace(branches.where(onwards), interior=interior[onwards])
+        return joined([straight, *self._branches(branches.where(met), interior[met], places)])
+
+    def _through_films(self, branches: Branches, item: Integers) -> Branches:
+        """Dim branches by sheets without an interface, and add what these emit or show."""
+        for column in np.flatnonzero(self.is_film[item].any(axis=0)):
+            chosen = np.flatnonzero(self.is_film[item[:, column]])
+            own = branches.where(chosen)
+            face, ray = own.last[:, column], np.arange(len(own))
+            sign = np.where(self._enters(face, own.directions), 1, -1).astype(np.int8)
+            weights = self.caster.barycentric(face, own.origins)
+            seen = Hits(ray, np.zeros(len(own)), sign, self.caster.faces.number[face], weights)
+            shown, passed = self.segments.through_films(self._rays(own), item[chosen, column], seen)
+            self._add(own, shown)
+            throughput = branches.throughput.copy()
+            with np.errstate(under="ignore"):
+                throughput[chosen] *= passed
+            branches = replace(branches, throughput=throughput)
+        return branches
+
+    def _branches(self, branches: Branches, there: InteriorList, places: InterfaceHits) -> list[Branches]:
+        """Branches that are followed from interfaces; `there` are the interior lists behind these."""
+        met = self.interfaces.interact(branches, places, self.pixel[branches.owner], self.spread)
+        self._add(branches, self.light.radiance(self._rays(branches), met))
+        self._add_coats(branches, met)
+        branches = replace(branches, met=branches.met + 1)
+        back, on = self._both(branches, there, met, places.before == places.after)
+        if branches.footprint.size:
+            ways = parted(self.caster, branches, places, met)
+            back, on = (replace(branch, footprint=way) for branch, way in zip((back, on), ways, strict=True))
+        if self.tree.diffused:
+            for branch in (back, on):
+                points = self._rays(branch).origins + self.scene.camera.eye
+                body = self.media.effective(branch.interior)
+                self._add(branch, self.tree.diffused.radiance(body, points, branch.directions, met.normals))
+        brightness = largest(back.throughput), largest(on.throughput)
+        is_back, is_on = (bright > 0.0 for bright in brightness)
+        stronger = back.throughput @ LUMINANCE > on.throughput @ LUMINANCE
+        more = branches.met < self.tree.depth
+        forks = branches.forks > 0
+        back = replace(back, forks=np.where(stronger, branches.forks, branches.forks - (is_on & forks)))
+        on = replace(on, forks=np.where(stronger, branches.forks - (is_back & forks), branches.forks))
+        kept = []
+        firsts = stronger | ~is_on, ~stronger | ~is_back
+        for branch, bright, first in zip((back, on), brightness, firsts, strict=True):
+            exists = bright > 0.0
+            follow = more & (first | forks) & (bright >= FAINTEST)
+            self._look_up(branch.where(exists & ~follow))
+            kept.append(branch.where(follow))
+        return kept
+
+    def _add_coats(self, branches: Branches, met: InterfaceInteractions) -> None:
+        """Add the environment as clear coats mirror it that are not as rough as what is below."""
+        coated = np.flatnonzero(met.coated)
+        if coated.size:
+            own = branches.where(coated)
+            ways = reflected_direction(own.directions, met.normals[coated])
+            mirrored = self.tree.surroundings.blurred(own, ways, met.coat_roughness[coated])
+            self._add(own, met.coated[coated, None] * mirrored)
+
+    def _both(
+        self, branches: Branches, there: InteriorList, met: InterfaceInteractions, sheet: Mask
+    ) -> tuple[Branches, Branches]:
+        """Reflected and refracted branches at interfaces, those of sheets included; some carry no light."""
+        with np.errstate(under="ignore"):
+            back, on = branches.throughput * met.reflectance, branches.throughput * met.passing
+        ways = met.reflected.copy()
+        # A path that ends under total reflection is taken to leave straight on: of all that it might see, this is
+        # nearest to the truth.
+        trapped = (branches.met >= self.tree.depth) & (largest(met.passed) == 0.0) & ~sheet
+        ways[trapped] = branches.directions[trapped]
+        mirrored = np.ones(len(branches), dtype=bool)
+        reflected = replace(
+            branches,
+            directions=unit(ways),
+            throughput=back,
+            reflected=mirrored,
+            blur=branches.blur + met.blur_reflected,
+        )
+        refracted = replace(
+            branches,
+            directions=unit(met.refracted),
+            throughput=on,
+            interior=np.where(sheet[:, None], branches.interior, there),
+            blur=branches.blur + met.blur_refracted,
+        )
+        return reflected, refracted
+
+    def _end(self, branches: Branches, item: Integers, column: Integers) -> None:
+        """Add what opaque surfaces reflect at which branches end, those in the `column` (n,) of `item`."""
+        ray = np.arange(len(branches))
+        number = self.caster.faces.number[branches.last[ray, column]]
+        wall = OpaqueHits(np.zeros(len(branches)), item[ray, column], number)
+        self._add(branches, reflected_radiance(self.scene, self._rays(branches), wall, self.tree.light.on_opaque))
+
+    def _look_up(self, branches: Branches) -> None:
+        if len(branches):
+            self._add(branches, self.tree.surroundings.radiance(branches, self._rays(branches)))
+
+    def _rays(self, branches: Branches) -> Rays:
+        """The branches in metres from the eye."""
+        points = branches.origins * self.caster.radius - self.shift
+        return Rays(points, branches.directions, self.backdrop[branches.owner])
+
+    def _add(self, branches: Branches, radiance: Array) -> None:
+        with np.errstate(under="ignore", over="ignore"):
+            light = branches.throughput * radiance
+        for channel in range(3):
+            self.found.radiance[:, channel] += np.bincount(branches.owner, light[:, channel], len(self.found.valid))
