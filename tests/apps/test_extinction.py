@@ -19,8 +19,9 @@ from PIL import Image
 import translucent as tl
 from tests.command_line import Run, one_error_line
 from translucent.assets import mesh_path
-from translucent.commands.extinction import SIZE, TARGETS
+from translucent.commands.extinction import SIZE
 from translucent.formulas.color import linear_to_srgb
+from translucent.materials import TARGETS
 from translucent.media.batch import MOST_SHOWN, convert_table
 from translucent.media.colors import parse_color
 

@@ -15,7 +15,7 @@ from PIL import Image
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Result, Run, one_error_line, strict_json
-from translucent.commands.options import read_roughness
+from translucent.commands.options import MediumOptions
 from translucent.planning.methods import METHODS
 
 GREEN = "linear(0.18,0.62,0.35)"
@@ -468,6 +468,7 @@ def test_a_preset_brings_its_roughness_unless_one_is_given(run: Run, tmp_path: P
     assert rough not in run(*command, "jade", "--roughness", "0", *SMALL).out
     assert rough in run("explain", "bear", "--preset", "jade").out
     assert rough not in run("explain", "bear", "--preset", "marble").out
-    assert (read_roughness(0.5, "jade"), read_roughness(0.0, "jade"), read_roughness(None, "jade")) == (0.5, 0.0, 0.15)
+    jade, marble = MediumOptions(preset="jade"), MediumOptions(preset="marble")
+    assert [jade.surface_roughness(one) for one in (0.5, 0.0, None)] == [0.5, 0.0, 0.15]
     # A preset that says nothing of surfaces leaves a file's as they are.
-    assert (read_roughness(None, "marble"), read_roughness(None, None)) == (None, None)
+    assert (marble.surface_roughness(), MediumOptions().surface_roughness()) == (None, None)

@@ -12,8 +12,7 @@ from PIL import Image
 
 import translucent as tl
 from tests.command_line import Run, one_error_line
-from translucent.commands.options import TONE_NAMES, read_environment
-from translucent.formulas.tone import TONES
+from translucent.commands.options import LookOptions
 from translucent.scene.showcase import LIGHT_TABLE
 
 SMALL = ("--size", "32x24", "--samples", "1")
@@ -32,27 +31,23 @@ def pixels(path: Path) -> np.ndarray:
 
 
 def test_environments_have_names_colors_and_files(panorama: Path) -> None:
-    assert read_environment(None, None) is None
-    assert read_environment("light-table", None) is LIGHT_TABLE
-    studio = read_environment("studio,-30.5", None)
+    assert LookOptions().lighting() is None
+    assert LookOptions(environment="light-table").lighting() is LIGHT_TABLE
+    studio = LookOptions(environment="studio,-30.5").lighting()
     assert studio is not None
     assert (studio.kind, studio.rotation) == ("image", -30.5)
-    image = read_environment(f"{panorama},90", None)
+    image = LookOptions(environment=f"{panorama},90").lighting()
     assert image is not None
     assert (image.kind, image.rotation) == ("image", 90.0)
-    color = read_environment("linear(1,0.5,0.25)", None)
+    color = LookOptions(environment="linear(1,0.5,0.25)").lighting()
     assert color is not None
     assert (color.kind, color.first.tolist()) == ("constant", [1.0, 0.5, 0.25])
-    both = read_environment("studio", "checker")
+    both = LookOptions(environment="studio", background="checker").lighting()
     assert both is not None
     assert (both.kind, both.seen.kind) == ("image", "checkerboard")
-    behind = read_environment(None, "teal")
+    behind = LookOptions(background="teal").lighting()
     assert behind is not None
     assert behind.lighting(np.array([0.0, 1.0, 0.0])) == pytest.approx(LIGHT_TABLE.second)
-
-
-def test_the_names_of_tone_curves_are_those_there_are() -> None:
-    assert TONE_NAMES == TONES
 
 
 @pytest.mark.parametrize(

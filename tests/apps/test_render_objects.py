@@ -12,7 +12,7 @@ import translucent as tl
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Result, Run, one_error_line
-from translucent.commands.model import FileLook, NamedMedium, _grouped, read_scene
+from translucent.commands.model import NamedMedium, SceneRequest, _grouped, read_scene
 from translucent.gltf.file import read_gltf, write_gltf
 
 MERLOT, JADE = tl.preset("merlot").medium, tl.preset("jade").medium
@@ -70,8 +70,8 @@ def media(scene: tl.Scene) -> dict[str, tl.Medium | None]:
 
 
 def test_named_objects_have_their_media_and_roughness(bar: Path) -> None:
-    look = FileLook([NamedMedium("Box 0", MERLOT, None), NamedMedium("Box 2", JADE, 0.15)])
-    scene = read_scene(str(bar), "m", None, roughness=0.5, look=look)
+    named = [NamedMedium("Box 0", MERLOT, None), NamedMedium("Box 2", JADE, 0.15)]
+    scene = read_scene(str(bar), SceneRequest(roughness=0.5, media=named))
     found = media(scene)
     assert (found["Box 0"], found["Box 2"]) == (MERLOT, JADE)
     assert found["Box 1"] not in (None, MERLOT, JADE)
@@ -82,7 +82,7 @@ def test_named_objects_have_their_media_and_roughness(bar: Path) -> None:
 
 
 def test_others_have_the_medium_that_is_said_first(bar: Path) -> None:
-    found = media(read_scene(str(bar), "m", JADE, look=FileLook([NamedMedium("Box 0", MERLOT, None)])))
+    found = media(read_scene(str(bar), SceneRequest(medium=JADE, media=[NamedMedium("Box 0", MERLOT, None)])))
     assert found == {"Box 0": MERLOT, "Box 1": JADE, "Box 2": None}
 
 
@@ -91,15 +91,15 @@ def test_parts_of_an_object_are_meant_by_its_name(bar: Path) -> None:
     primitives = file.tree["meshes"][0]["primitives"]
     primitives.append(dict(primitives[0]))
     write_gltf(file, bar)
-    found = media(read_scene(str(bar), "m", None, look=FileLook([NamedMedium("Box 0", MERLOT, None)])))
+    found = media(read_scene(str(bar), SceneRequest(media=[NamedMedium("Box 0", MERLOT, None)])))
     assert (found["Box 0[0]"], found["Box 0[1]"]) == (MERLOT, MERLOT)
-    found = media(read_scene(str(bar), "m", None, look=FileLook([NamedMedium("Box 0[1]", MERLOT, None)])))
+    found = media(read_scene(str(bar), SceneRequest(media=[NamedMedium("Box 0[1]", MERLOT, None)])))
     assert found["Box 0[0]"] != found["Box 0[1]"] == MERLOT
 
 
 def test_a_mesh_has_one_object(cube: Path) -> None:
-    name = read_scene(str(cube), "m", None).objects[0].mesh.name
-    found = media(read_scene(str(cube), "m", None, look=FileLook([NamedMedium(name, MERLOT, None)])))
+    name = read_scene(str(cube), SceneRequest()).objects[0].mesh.name
+    found = media(read_scene(str(cube), SceneRequest(media=[NamedMedium(name, MERLOT, None)])))
     assert found == {name: MERLOT}
 
 

@@ -11,7 +11,8 @@ from PIL import Image
 
 import translucent as tl
 from tests.command_line import Run, one_error_line
-from translucent.commands.model import CameraOptions, read_scene
+from translucent.commands.model import SceneRequest, read_scene
+from translucent.commands.options import CameraOptions
 from translucent.scene.showcase import LIGHT_TABLE
 
 SMALL = ("--size", "48x27", "--samples", "1")
@@ -92,14 +93,14 @@ def test_turntables_have_a_stage(run: Run, tmp_path: Path) -> None:
 
 def test_files_with_cameras_lights_or_grounds_keep_to_them(tmp_path: Path) -> None:
     bare = write_gltf(tmp_path / "bare.gltf")
-    assert len(read_scene(str(bare), "m", None, stage=None).objects) == 2
-    assert len(read_scene(str(bare), "m", None).objects) == 1
+    assert len(read_scene(str(bare), SceneRequest(stage=None)).objects) == 2
+    assert len(read_scene(str(bare), SceneRequest()).objects) == 1
     camera = {"cameras": [{"type": "perspective", "perspective": {"yfov": 0.6, "znear": 0.1}}]}
     seen = write_gltf(tmp_path / "seen.gltf", **camera, nodes=[{"mesh": 0}, {"camera": 0, "translation": [0, 0, 5]}])
-    scene = read_scene(str(seen), "m", None, stage=None)
+    scene = read_scene(str(seen), SceneRequest(stage=None))
     assert len(scene.objects) == 1
     assert scene.camera.eye.tolist() == [0, 0, 5]
-    scene = read_scene(str(seen), "m", None, stage="studio")
+    scene = read_scene(str(seen), SceneRequest(stage="studio"))
     assert len(scene.objects) == 2
     assert scene.camera.eye.tolist() == [0, 0, 5]
     sun = {"extensions": {"KHR_lights_punctual": {"lights": [{"type": "directional"}]}}}
@@ -109,11 +110,11 @@ def test_files_with_cameras_lights_or_grounds_keep_to_them(tmp_path: Path) -> No
         nodes=[{"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}}],
         extensionsUsed=["KHR_lights_punctual", "KHR_materials_transmission"],
     )
-    assert len(read_scene(str(lit), "m", None, stage=None).objects) == 1
-    scene = read_scene(str(lit), "m", None, stage="night")
+    assert len(read_scene(str(lit), SceneRequest(stage=None)).objects) == 1
+    scene = read_scene(str(lit), SceneRequest(stage="night"))
     assert len(scene.lights) == 1
     opaque = write_gltf(tmp_path / "opaque.gltf", materials=[{}])
-    assert len(read_scene(str(opaque), "m", None, stage=None).objects) == 1, "nothing to be rendered"
+    assert len(read_scene(str(opaque), SceneRequest(stage=None)).objects) == 1, "nothing to be rendered"
 
 
 def test_what_is_up_stands_upright(tmp_path: Path) -> None:
@@ -121,16 +122,18 @@ def test_what_is_up_stands_upright(tmp_path: Path) -> None:
     path = tmp_path / "up.obj"
     lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices]
     path.write_text("\n".join([*lines, "f 1 2 3", ""]))
-    scene = read_scene(str(path), "m", None, CameraOptions(up="0,0,1"), stage=None)
+    scene = read_scene(str(path), SceneRequest(camera=CameraOptions(up="0,0,1"), stage=None))
     assert np.ptp(scene.objects[0].bounds, axis=0) == pytest.approx([1, 3, 0], abs=1e-9)
     assert scene.camera.up[1] > 0.5
-    eyed = read_scene(str(path), "m", None, CameraOptions(up="0,0,1", eye="0,-9,2", target="0,0,2"), stage=None)
+    eyed = read_scene(
+        str(path), SceneRequest(camera=CameraOptions(up="0,0,1", eye="0,-9,2", target="0,0,2"), stage=None)
+    )
     assert eyed.camera.eye == pytest.approx([0, 2, 9], abs=1e-9)
     assert eyed.camera.forward == pytest.approx([0, 0, -1], abs=1e-9)
 
 
 def test_thickness_needs_no_stage() -> None:
-    scene = read_scene("sphere", "m", None)
+    scene = read_scene("sphere", SceneRequest())
     assert len(scene.objects) == 1
     assert scene.environment is LIGHT_TABLE
 

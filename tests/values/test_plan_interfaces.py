@@ -10,7 +10,6 @@ import pytest
 
 import translucent as tl
 from tests.values.plan_scenes import DIAMOND, NO_STORAGE, OPEN, ORDERED, SCENES, TORUS, WINE, body, scene, sheet
-from translucent.commands.options import INTERFACE_NAMES
 from translucent.planning.interfaces import INTERFACES, Interfaces
 from translucent.planning.interfaces.front import ONE_INTERFACE
 from translucent.planning.interfaces.traced import TRACE_COST
@@ -171,7 +170,6 @@ def test_scenes_without_interfaces_have_one_plan(kind: str) -> None:
 
 def test_each_way_of_finding_interfaces_has_a_name_and_traits_of_its_own() -> None:
     assert [type(one) for one in CHOICES] == list(INTERFACES.values())
-    assert list(INTERFACES) == list(INTERFACE_NAMES)
     for one in CHOICES:
         assert all(step.reason and step.cost > 0 for step in one.passes(scene(body(DIAMOND)), straight=False))
     assert [(one.traced, one.finds_exits, one.one_interface) for one in CHOICES] == [

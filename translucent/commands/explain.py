@@ -3,33 +3,21 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from translucent.commands.console import echo
-from translucent.commands.model import is_scene_file, medium_lines, read_scene
+from translucent.commands.model import SceneRequest, is_scene_file, medium_lines, read_scene
 from translucent.commands.options import (
-    caustics_option,
-    common_options,
-    draft_option,
-    interface_options,
-    medium_options,
-    outside_option,
-    paths_option,
-    read_any_medium,
-    read_caustics,
-    read_interfaces,
-    read_method,
-    read_roughness,
-    read_scattering,
-    read_shadows,
-    scattering_medium_options,
-    scattering_options,
-    shadow_options,
+    AnyMediumOptions,
+    ChoiceOptions,
+    FileOptions,
+    group,
+    option,
     stage_option,
-    unit_option,
-    with_environment_shadows,
+    takes,
 )
 
 if TYPE_CHECKING:
@@ -39,70 +27,40 @@ if TYPE_CHECKING:
     from translucent.scene.scene import Object, Scene
 
 
+@dataclass(frozen=True, kw_only=True)
+class _ExplainedChoices(ChoiceOptions):
+    method: str | None = option(metavar="NAME", help="Explain this method instead of the planner's choice.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExplainOptions:
+    """Options of ``translucent explain``."""
+
+    medium: AnyMediumOptions = group(AnyMediumOptions)
+    file: FileOptions = group(FileOptions)
+    stage: str | None = stage_option()
+    choices: _ExplainedChoices = group(_ExplainedChoices, without=("thickness",))
+
+
 @click.command(epilog="Example: translucent explain goblet")
 @click.argument("model")
-@medium_options
-@scattering_medium_options
-@unit_option
-@outside_option
-@draft_option
-@stage_option
-@click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
-@paths_option
-@interface_options
-@scattering_options
-@caustics_option
-@shadow_options
-@common_options
-def explain(
-    model: str,
-    color: str | None,
-    distance: str | None,
-    preset_name: str | None,
-    clamp: bool | None,
-    scattering_color: str | None,
-    mean_free_path: str | None,
-    unit: str,
-    allow_outside: bool,
-    draft_extensions: bool,
-    stage: str | None,
-    method_name: str | None,
-    paths: int | None,
-    interfaces_name: str | None,
-    interface_depth: int | None,
-    interface_forks: int | None,
-    scattering_name: str | None,
-    diffusion_resolution: int | None,
-    caustics: int | None,
-    shadow_size: int | None,
-    environment_shadows: int | None,
-    as_json: bool,
-) -> None:
+@takes(ExplainOptions)
+def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
     """Say what is known about MODEL, which passes would render it, and why.
 
     Of a .glb or .gltf file, the scene that it is, with the media of its materials.
     """
     from translucent.planning.plan import plan
 
-    medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
-    roughness = read_roughness(None, preset_name)
-    scene = read_scene(
-        model,
-        unit,
-        medium,
-        roughness=roughness,
-        stage=stage,
-        allow_outside=allow_outside,
-        draft_extensions=draft_extensions,
+    asked = SceneRequest(
+        medium=given.medium.read(),
+        file=given.file,
+        environment_shadows=given.choices.environment_shadows,
+        roughness=given.medium.surface_roughness(),
+        stage=given.stage,
     )
-    scene = with_environment_shadows(scene, environment_shadows)
-    method = read_method(method_name, None, paths)
-    interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
-    scattering = read_scattering(scattering_name, diffusion_resolution)
-    asked, shadows = read_caustics(caustics), read_shadows(shadow_size)
-    chosen = None
-    if scene.bodies:
-        chosen = plan(scene, method, interfaces=interfaces, scattering=scattering, caustics=asked, shadows=shadows)
+    scene, choices = read_scene(model, asked), given.choices.read()
+    chosen = plan(scene, **vars(choices)) if scene.bodies else None
     if as_json:
         found = None if chosen is None else {**chosen.summary(), "traffic": _traffic(scene, chosen).summary()}
         echo(json.dumps({**_summary(model, scene), "plan": found}))
@@ -111,7 +69,11 @@ def explain(
         _tell_scene(model, scene)
     else:
         _tell_mesh(scene.objects[0].mesh)
-    _tell_plan(scene, chosen)
+    if chosen is None:
+        echo("plan: none, since no object is translucent; see with --preset NAME, or --color C and --distance D")
+    else:
+        echo(f"plan: {chosen}")
+        echo(str(_traffic(scene, chosen)))
 
 
 def _summary(model: str, scene: Scene) -> dict[str, Any]:
@@ -173,11 +135,3 @@ def _traffic(scene: Scene, chosen: RenderPlan) -> FrameTraffic:
     from translucent.planning.scattering.choice import shown
 
     return frame_traffic(shown(scene, chosen.given_back).with_ambient_emitted, chosen)
-
-
-def _tell_plan(scene: Scene, chosen: RenderPlan | None) -> None:
-    if chosen is None:
-        echo("plan: none, since no object is translucent; see with --preset NAME, or --color C and --distance D")
-    else:
-        echo(f"plan: {chosen}")
-        echo(str(_traffic(scene, chosen)))

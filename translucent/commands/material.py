@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,20 +11,21 @@ import click
 
 from translucent.commands.console import echo
 from translucent.commands.options import (
-    common_options,
-    draft_option,
-    medium_options,
+    FileOptions,
+    MediumOptions,
+    group,
+    option,
     outside_option,
     overwrite_option,
-    read_medium,
     refuse_overwriting,
+    takes,
     triple_text,
 )
 from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
     from translucent.bake.audit.rules import MaterialCheck
-    from translucent.gltf.materials import Draft, GltfMaterial
+    from translucent.gltf.materials import GltfMaterial
 
 
 @click.group(epilog="Example: translucent material show model.glb")
@@ -31,15 +33,21 @@ def material() -> None:
     """Show, replace or check the materials of a glTF file that light passes."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class ShowOptions:
+    """Options of ``translucent material show``."""
+
+    file: FileOptions = group(FileOptions, without=("unit", "allow_outside"))
+
+
 @material.command(epilog="Example: translucent material show model.glb")
 @click.argument("model")
-@draft_option
-@common_options
-def show(model: str, draft_extensions: bool, as_json: bool) -> None:
+@takes(ShowOptions)
+def show(model: str, given: ShowOptions, as_json: bool) -> None:
     """List the materials of MODEL, a .glb or .gltf file, with the volume that each of them states."""
     from translucent.gltf.materials import read_materials
 
-    found = read_materials(model, draft_extensions=draft_extensions)
+    found = read_materials(model, draft_extensions=given.file.draft_extensions)
     if as_json:
         echo(json.dumps({"model": model, "materials": [entry.summary() for entry in found]}))
         return
@@ -78,77 +86,76 @@ def _texture_text(entry: GltfMaterial) -> str:
     return f" times texture {entry.thickness_texture} at TEXCOORD_{transform.tex_coord}{changed}"
 
 
+@dataclass(frozen=True, kw_only=True)
+class ApplyOptions:
+    """Options of ``translucent material apply``."""
+
+    output: Path = option(names=("-o", "--output"), required=True, help="A .glb or .gltf file.")
+    medium: MediumOptions = group(MediumOptions)
+    object: str | None = option(
+        metavar="NAME", help="Only the objects of this name. Default: all that light enters, or all."
+    )
+    thickness: str | None = option(
+        metavar="T", help="In the mesh's own units, as glTF has it. Default: the smallest side."
+    )
+    draft_extensions: str | None = option(
+        is_flag=False,
+        flag_value="scatter",
+        type=click.Choice(["scatter", "volume-scatter"]),
+        help="Write scattering, too, by a draft: KHR_materials_scatter, or KHR_materials_volume_scatter.",
+    )
+    overwrite: bool = overwrite_option()
+    allow_outside: bool = outside_option()
+
+
 @material.command(
     epilog="Example: translucent material apply model.glb --color '#7b1e3a' --distance 1cm --object Wine -o out.glb"
 )
 @click.argument("model")
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="A .glb or .gltf file.")
-@medium_options
-@click.option(
-    "--object",
-    "object_name",
-    metavar="NAME",
-    help="Only the objects of this name. Default: all that light enters, or all.",
-)
-@click.option("--thickness", metavar="T", help="In the mesh's own units, as glTF has it. Default: the smallest side.")
-@click.option(
-    "--draft-extensions",
-    is_flag=False,
-    flag_value="scatter",
-    type=click.Choice(["scatter", "volume-scatter"]),
-    help="Write scattering, too, by a draft: KHR_materials_scatter, or KHR_materials_volume_scatter.",
-)
-@overwrite_option
-@outside_option
-@common_options
-def apply(
-    model: str,
-    output: Path,
-    color: str | None,
-    distance: str | None,
-    preset_name: str | None,
-    clamp: bool | None,
-    object_name: str | None,
-    thickness: str | None,
-    draft_extensions: Draft | None,
-    allow_outside: bool,
-    as_json: bool,
-) -> None:
+@takes(ApplyOptions)
+def apply(model: str, given: ApplyOptions, as_json: bool) -> None:
     """Write a medium into MODEL's materials; a color leaves them their index of refraction, a preset brings its own."""
     from translucent.gltf.write import write_medium
     from translucent.units import parse_length
 
-    medium = read_medium(color, distance, preset_name, clamp, shows_scattering=draft_extensions is not None)
+    draft: Any = given.draft_extensions  # one of those that the type lists
+    medium = given.medium.read(shows_scattering=draft is not None)
     if medium is None:
         raise InputError("material apply", "no medium is given", "add --color and --distance, or --preset")
-    refuse_overwriting(output, model)
+    refuse_overwriting(given.output, model)
     changed = write_medium(
         model,
-        output,
+        given.output,
         medium,
-        distance=None if distance is None else parse_length(distance),
-        object_name=object_name,
-        thickness=None if thickness is None else parse_length(thickness),
-        keep_ior=preset_name is None,
-        draft_extensions=draft_extensions,
-        allow_outside=allow_outside,
+        distance=None if given.medium.distance is None else parse_length(given.medium.distance),
+        object_name=given.object,
+        thickness=None if given.thickness is None else parse_length(given.thickness),
+        keep_ior=given.medium.preset is None,
+        draft_extensions=draft,
+        allow_outside=given.allow_outside,
     )
     if as_json:
-        echo(json.dumps({"output": str(output), "materials": changed}))
+        echo(json.dumps({"output": str(given.output), "materials": changed}))
         return
-    echo(f"{output}: material{'' if len(changed) == 1 else 's'} {', '.join(map(str, changed))} changed")
+    echo(f"{given.output}: material{'' if len(changed) == 1 else 's'} {', '.join(map(str, changed))} changed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckOptions:
+    """Options of ``translucent material check``."""
+
+    fix: bool = option(False, help="Bake the thickness where it is wrong, into OUTPUT, and check that.")
+    output: Path | None = option(names=("-o", "--output"), help="Of --fix: a .glb file.")
+    size: int = option(512, metavar="N", help="Of --fix: texels along a side.")
+    rays: int = option(64, metavar="N", help="Of --fix: rays from each texel.")
+    overwrite: bool = overwrite_option()
+    allow_outside: bool = outside_option()
 
 
 @material.command(epilog="Example: translucent material check model.glb --fix -o fixed.glb")
 @click.argument("model")
-@click.option("--fix", is_flag=True, help="Bake the thickness where it is wrong, into OUTPUT, and check that.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Of --fix: a .glb file.")
-@click.option("--size", type=int, default=512, show_default=True, metavar="N", help="Of --fix: texels along a side.")
-@click.option("--rays", type=int, default=64, show_default=True, metavar="N", help="Of --fix: rays from each texel.")
-@overwrite_option
-@outside_option
-@common_options
-def check(model: str, fix: bool, output: Path | None, size: int, rays: int, allow_outside: bool, as_json: bool) -> None:
+@takes(CheckOptions)
+def check(model: str, given: CheckOptions, as_json: bool) -> None:
     """Check whether the thickness and attenuation that MODEL, a .glb or .gltf file, states are those of its meshes.
 
     Told are errors, warnings and notes, each with what to change, and the color that passes each body in truth and in
@@ -159,13 +166,14 @@ def check(model: str, fix: bool, output: Path | None, size: int, rays: int, allo
     """
     from translucent.bake.audit.check import check_materials, fix_materials
 
-    if fix != (output is not None):
-        given, missing = ("--fix", "-o OUTPUT is missing") if fix else (f"-o {output}", "--fix is missing")
-        raise InputError(given, missing, "give both, or neither")
-    found = left = check_materials(model, allow_outside=allow_outside)
+    output, outside = given.output, given.allow_outside
+    if given.fix != (output is not None):
+        asked, missing = ("--fix", "-o OUTPUT is missing") if given.fix else (f"-o {output}", "--fix is missing")
+        raise InputError(asked, missing, "give both, or neither")
+    found = left = check_materials(model, allow_outside=outside)
     if output is not None:
         refuse_overwriting(output, model)
-        left = fix_materials(model, output, size=size, rays=rays, allow_outside=allow_outside)
+        left = fix_materials(model, output, size=given.size, rays=given.rays, allow_outside=outside)
     if as_json:
         fixed = {} if output is None else {"fixed": left.summary()}
         echo(json.dumps({**found.summary(), **fixed}))

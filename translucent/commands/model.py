@@ -8,18 +8,22 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from translucent.commands.options import (
-    medium_options,
-    read_any_medium,
-    read_roughness,
+    DEFAULT_FOV,
+    DEFAULT_UP,
+    AnyMediumOptions,
+    CameraOptions,
+    FileOptions,
+    collected,
     roughness_option,
-    scattering_medium_options,
+    takes,
 )
 from translucent.errors import InputError
 
@@ -32,50 +36,53 @@ if TYPE_CHECKING:
     from translucent.scene.showcase import AnyScene
     from translucent.scene.stages import Stage
 
+#: Key under which a verb finds the options that stand behind each ``--object``.
+_GROUPS = "translucent.objects"
 
-#: Default field of view in degrees, and up vector, of a camera that options define.
-DEFAULT_FOV, DEFAULT_UP = 30.0, "0,1,0"
-
-
-F = TypeVar("F", bound=Callable[..., Any])
+_OBJECT = "--object"
 
 
-def camera_options(command: F) -> F:
-    """Options that choose a camera, as `CameraOptions` holds them."""
-    for option in (
-        click.option("--fov", type=float, metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}."),
-        click.option("--up", metavar="X,Y,Z", help=f"What is up in the picture. Default: {DEFAULT_UP}."),
-        click.option("--target", metavar="X,Y,Z", help="What the camera looks at. Default: the model's center."),
-        click.option(
-            "--eye", metavar="X,Y,Z", help="Position of the camera in metres. Default: the whole model in view."
-        ),
-        click.option(
-            "--camera", type=int, metavar="N", help="Camera of a glTF file, counted from 0. Default: 0, if it has any."
-        ),
-    ):
-        command = option(command)
-    return command
+@dataclass(frozen=True)
+class NamedMedium:
+    """Medium of the objects of a name, and the roughness of their surfaces, if any is requested."""
+
+    name: str
+    medium: Medium
+    roughness: float | None
 
 
-class CameraOptions(NamedTuple):
-    """The options that choose a camera, as they were given."""
+@dataclass(frozen=True)
+class SceneRequest:
+    """Scene that is requested of a model.
 
-    camera: int | None = None
-    eye: str | None = None
-    target: str | None = None
-    up: str | None = None
-    fov: float | None = None
+    Attributes
+    ----------
+    medium : Medium, optional
+        In all translucent objects; None: those of the file.
+    camera, file : CameraOptions, FileOptions
+    size : (width, height)
+        Of the picture that the scene is framed for.
+    environment : Environment, optional
+    environment_shadows : int, optional
+        Directions of it that throw shadows.
+    roughness : float, optional
+        Of the interfaces of media.
+    stage : str, optional
+        None is the default one, where it suits what the model and the options bring with them.
+    media : sequence of NamedMedium
+        Media and roughness of single objects.
+    variant, time : optional
+        Of a glTF file.
+    """
 
-    @property
-    def defining(self) -> list[str]:
-        """The options among these that define a camera, rather than choose one of the file."""
-        options = {"--eye": self.eye, "--target": self.target, "--up": self.up, "--fov": self.fov}
-        return [option for option, value in options.items() if value is not None]
-
-
-class FileLook(NamedTuple):
-    """Choice of a file's looks, and media for single objects: the options of `translucent.commands.model`."""
-
+    medium: Medium | None = None
+    camera: CameraOptions = field(default_factory=CameraOptions)
+    file: FileOptions = field(default_factory=FileOptions)
+    size: tuple[int, int] = (1280, 720)
+    environment: Environment | None = None
+    environment_shadows: int | None = None
+    roughness: float | None = None
+    stage: str | None = "none"
     media: Sequence[NamedMedium] = ()
     variant: str | None = None
     time: float | None = None
@@ -88,49 +95,31 @@ def is_scene_file(model: str) -> bool:
     return Path(model).suffix.lower() in SUFFIXES
 
 
-def read_scene(
-    model: str,
-    unit: str,
-    medium: Medium | None,
-    options: CameraOptions | None = None,
-    size: tuple[int, int] = (1280, 720),
-    environment: Environment | None = None,
-    roughness: float | None = None,
-    stage: str | None = "none",
-    *,
-    allow_outside: bool = False,
-    look: FileLook | None = None,
-    draft_extensions: bool = False,
-) -> Scene:
-    """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show.
-
-    Objects that `look` names have media and roughness of their own. A stage of None is the default one, where it suits
-    what the model and the options bring with them.
-    """
+def read_scene(model: str, asked: SceneRequest) -> Scene:
+    """The scene of a glTF file, or one mesh on show, as it is requested."""
     from translucent.scene.showcase import framing, objects_named, with_roughness
     from translucent.scene.stages import staged, upright
 
-    stage, turn = _turned(stage)
-    options, look = options or CameraOptions(), look or FileLook()
+    options, (stage, turn) = asked.camera, _turned(asked.stage)
     if options.camera is not None and options.defining:
         raise InputError(
             f"--camera {options.camera}", f"{', '.join(options.defining)} given, too", "give one or the other"
         )
-    asked = _Asked(model, unit, medium, options, size, environment, stage, look, allow_outside)
-    scene, chosen = _file_scene(asked, draft_extensions) if is_scene_file(model) else _mesh_scene(asked)
-    named = {id(item) for one in look.media for item in objects_named(scene, one.name)}
-    scene = with_roughness(scene, roughness, [item for item in scene.objects if id(item) not in named])
-    for one in look.media:
+    scene, chosen = (_file_scene if is_scene_file(model) else _mesh_scene)(model, asked, stage)
+    named = {id(item) for one in asked.media for item in objects_named(scene, one.name)}
+    scene = with_roughness(scene, asked.roughness, [item for item in scene.objects if id(item) not in named])
+    for one in asked.media:
         scene = with_roughness(scene, one.roughness, objects_named(scene, one.name))
     if options.defining:
-        scene = dataclasses.replace(scene, camera=_defined_camera(scene, options, size, chosen))
-    if chosen is None:
-        return scene
-    scene = upright(scene, read_vector("--up", options.up or DEFAULT_UP))
-    if options.eye is None and not getattr(scene, "has_camera", False):
-        fov = DEFAULT_FOV if options.fov is None else options.fov
-        scene = dataclasses.replace(scene, camera=framing(scene.objects, size, fov_y=fov, stage=chosen))
-    return staged(scene, chosen, environment, turn)
+        scene = dataclasses.replace(scene, camera=_defined_camera(scene, options, asked.size, chosen))
+    if chosen is not None:
+        scene = upright(scene, read_vector("--up", options.up or DEFAULT_UP))
+        if options.eye is None and not getattr(scene, "has_camera", False):
+            fov = DEFAULT_FOV if options.fov is None else options.fov
+            scene = dataclasses.replace(scene, camera=framing(scene.objects, asked.size, fov_y=fov, stage=chosen))
+        scene = staged(scene, chosen, asked.environment, turn)
+    count = asked.environment_shadows
+    return scene if count is None else dataclasses.replace(scene, environment_shadows=count)
 
 
 def _turned(stage: str | None) -> tuple[str | None, float]:
@@ -143,66 +132,50 @@ def _turned(stage: str | None) -> tuple[str | None, float]:
     return (name if comma else stage), turn
 
 
-class _Asked(NamedTuple):
-    """Arguments of `read_scene` that both kinds of files take."""
-
-    model: str
-    unit: str
-    medium: Medium | None
-    options: CameraOptions
-    size: tuple[int, int]
-    environment: Environment | None
-    stage: str | None
-    look: FileLook
-    allow_outside: bool
-
-
-def _mesh_scene(asked: _Asked) -> tuple[Scene, Stage | None]:
+def _mesh_scene(model: str, asked: SceneRequest, stage: str | None) -> tuple[Scene, Stage | None]:
     from translucent.scene.showcase import default_medium, showcase
     from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, stage_named
 
-    model, look, environment = asked.model, asked.look, asked.environment
-    if (camera := asked.options.camera) is not None:
+    if (camera := asked.camera.camera) is not None:
         raise InputError(f"--camera {camera}", f"{model} is no glTF file and has no cameras", "use --eye")
-    for option, value in (("--variant", look.variant), ("--time", look.time)):
+    for option, value in (("--variant", asked.variant), ("--time", asked.time)):
         if value is not None:
             raise InputError(f"{option} {value}", f"{model} is no glTF file", "leave it out")
-    chosen = stage_named(asked.stage or (DEFAULT_STAGE if environment is None else NO_STAGE))
-    mesh = read_mesh(model, asked.unit, asked.allow_outside)
+    chosen = stage_named(stage or (DEFAULT_STAGE if asked.environment is None else NO_STAGE))
+    mesh = read_mesh(model, asked.file)
     filling = asked.medium or default_medium(mesh, chosen)
-    scene = showcase(mesh, filling, asked.size, environment=environment, stage=NO_STAGE)
-    return _with_media(scene, look), chosen
+    scene = showcase(mesh, filling, asked.size, environment=asked.environment, stage=NO_STAGE)
+    return _with_media(scene, asked.media), chosen
 
 
-def _file_scene(asked: _Asked, draft_extensions: bool) -> tuple[Scene, Stage | None]:
+def _file_scene(model: str, asked: SceneRequest, stage: str | None) -> tuple[Scene, Stage | None]:
     from translucent.gltf.load import load_scene
     from translucent.scene.showcase import filled
     from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, has_ground, stage_named
 
-    look, environment = asked.look, asked.environment
     scene = load_scene(
-        asked.model,
-        asked.unit,
-        None if asked.options.defining else asked.options.camera or 0,
+        model,
+        asked.file.unit,
+        None if asked.camera.defining else asked.camera.camera or 0,
         asked.size,
-        variant=look.variant,
-        time=look.time,
-        allow_outside=asked.allow_outside,
-        draft_extensions=draft_extensions,
+        variant=asked.variant,
+        time=asked.time,
+        allow_outside=asked.file.allow_outside,
+        draft_extensions=asked.file.draft_extensions,
     )
     if asked.medium is not None:
         scene = filled(scene, asked.medium)
-    scene = _with_media(scene, look)
-    bare = not (scene.has_camera or scene.lights or has_ground(scene)) and environment is None
-    chosen = stage_named(asked.stage or (DEFAULT_STAGE if bare and scene.bodies else NO_STAGE))
-    return scene if environment is None else dataclasses.replace(scene, environment=environment), chosen
+    scene = _with_media(scene, asked.media)
+    bare = not (scene.has_camera or scene.lights or has_ground(scene)) and asked.environment is None
+    chosen = stage_named(stage or (DEFAULT_STAGE if bare and scene.bodies else NO_STAGE))
+    return scene if asked.environment is None else dataclasses.replace(scene, environment=asked.environment), chosen
 
 
-def _with_media(scene: AnyScene, look: FileLook) -> AnyScene:
+def _with_media(scene: AnyScene, media: Sequence[NamedMedium]) -> AnyScene:
     """Scene with the media of the objects that are named."""
     from translucent.scene.showcase import filled, objects_named
 
-    for one in look.media:
+    for one in media:
         scene = filled(scene, one.medium, objects_named(scene, one.name))
     return scene
 
@@ -225,11 +198,11 @@ def is_own(model: str) -> bool:
     return not os.path.lexists(model) and model in mesh_names()
 
 
-def read_mesh(model: str, unit: str, allow_outside: bool = False) -> Mesh:
+def read_mesh(model: str, file: FileOptions) -> Mesh:
     """The mesh of a file, or of the toolkit's own by name."""
     from translucent.mesh_files import load_mesh
 
-    return load_mesh(mesh_file(model, unit), unit=unit, allow_outside=allow_outside)
+    return load_mesh(mesh_file(model, file.unit), unit=file.unit, allow_outside=file.allow_outside)
 
 
 def mesh_file(model: str, unit: str) -> str:
@@ -287,50 +260,37 @@ def medium_lines(scene: Scene, reach: Callable[[Object], float] | None = None) -
     reach : callable, optional
         Gives that way in metres for an object. Default: a tenth of its diagonal.
     """
+    from translucent.formulas.color import to_hex
+
     users: dict[Medium, list[Object]] = {}
     for body in scene.bodies:
         if body.medium is not None and not body.covers:
             users.setdefault(body.medium, []).append(body)
-    way = reach or _tenth
-    return [_medium_text(medium, bodies, way(bodies[0]), several=len(users) > 1) for medium, bodies in users.items()]
+    lines = []
+    for medium, bodies in users.items():
+        names = ", ".join(sorted({repr(body.mesh.name) for body in bodies}))
+        whose, first = f"{names}: " if len(users) > 1 else "", bodies[0]
+        if (sheet := first.sheet_thickness) is not None:
+            lines.append(f"{whose}thin, white light is {to_hex(medium.transmittance(sheet))} behind it")
+            continue
+        way = reach(first) if reach is not None else 0.1 * float(np.linalg.norm(first.bounds[1] - first.bounds[0]))
+        sigma = ", ".join(f"{value:.4g}" for value in medium.extinction)
+        color = to_hex(medium.transmittance(way))
+        lines.append(f"{whose}extinction {sigma} 1/m: white light is {color} after {way:.3g} m")
+    return lines
 
 
-def _tenth(body: Object) -> float:
-    return 0.1 * float(np.linalg.norm(body.bounds[1] - body.bounds[0]))
+@dataclass(frozen=True, kw_only=True)
+class _ObjectOptions(AnyMediumOptions):
+    """The options that may stand behind an --object."""
 
-
-def _medium_text(medium: Medium, bodies: list[Object], reach: float, *, several: bool) -> str:
-    from translucent.formulas.color import to_hex
-
-    names = ", ".join(sorted({repr(body.mesh.name) for body in bodies}))
-    whose = f"{names}: " if several else ""
-    if (sheet := bodies[0].sheet_thickness) is not None:
-        return f"{whose}thin, white light is {to_hex(medium.transmittance(sheet))} behind it"
-    sigma = ", ".join(f"{value:.4g}" for value in medium.extinction)
-    seen = to_hex(medium.transmittance(reach))
-    return f"{whose}extinction {sigma} 1/m: white light is {seen} after {reach:.3g} m"
-
-
-#: Key under which a verb finds the options that stand behind each ``--object``.
-_GROUPS = "translucent.objects"
-
-_OBJECT = "--object"
-
-
-class NamedMedium(NamedTuple):
-    """Medium of the objects of a name, and the roughness of their surfaces, if any is asked for."""
-
-    name: str
-    medium: Medium
-    roughness: float | None
+    roughness: float | None = roughness_option()
 
 
 @click.command()
-@medium_options
-@scattering_medium_options
-@roughness_option
+@takes(_ObjectOptions)
 def _of_one_object(**_: Any) -> None:
-    """The options that may stand behind an --object."""
+    """Parser of these options, which is never run."""
 
 
 class ObjectCommand(click.Command):
@@ -355,19 +315,18 @@ def read_objects(names: Sequence[str]) -> list[NamedMedium]:
     for name, options in zip(names, click.get_current_context().meta[_GROUPS], strict=True):
         if name in [one.name for one in found]:
             raise InputError(f"{_OBJECT} {name!r}", "it is named twice", "give it one medium")
-        given = _of_one_object.make_context("render", options).params
-        roughness, preset_name = given.pop("roughness"), given["preset_name"]
-        medium = read_any_medium(**given)
-        if medium is None:
+        given = collected(_ObjectOptions, _of_one_object.make_context("render", options).params)
+        if (medium := given.read()) is None:
             do = "add --preset NAME, or --color C and --distance D, behind it"
             raise InputError(f"{_OBJECT} {name!r}", "no medium is named for it", do)
-        found.append(NamedMedium(name, medium, read_roughness(roughness, preset_name)))
+        found.append(NamedMedium(name, medium, given.surface_roughness(given.roughness)))
     return found
 
 
 def _grouped(arguments: list[str]) -> tuple[list[str], list[list[str]]]:
     """Arguments without the options of single objects, and those options, for each ``--object``."""
-    takes_value = {name: not option.is_flag for option in _options() for name in (*option.opts, *option.secondary_opts)}
+    options = [one for one in _of_one_object.params if isinstance(one, click.Option)]
+    takes_value = {name: not one.is_flag for one in options for name in (*one.opts, *one.secondary_opts)}
     rest: list[str] = []
     groups: list[list[str]] = []
     words = iter(arguments)
@@ -386,7 +345,3 @@ def _grouped(arguments: list[str]) -> tuple[list[str], list[list[str]]]:
                 if not sign:
                     rest += [value for value in [next(words, None)] if value is not None]
     return rest, groups
-
-
-def _options() -> list[click.Option]:
-    return [one for one in _of_one_object.params if isinstance(one, click.Option)]

@@ -4,43 +4,42 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
 from translucent.commands.console import echo
-from translucent.commands.options import STAGE_NAMES, common_options, outside_option, read_size, unit_option
+from translucent.commands.options import FileOptions, group, option, read_size, takes
 from translucent.errors import InputError, RenderError, TranslucentError, message_of
+
+
+def _stage_words() -> str:
+    from translucent.scene.stages import STAGES
+
+    return (
+        f"What the model stands on: {', '.join(STAGES)}, none, or auto, as render. Default: that of the last window; "
+        "at first auto; with a script none."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PreviewOptions:
+    """Options of ``translucent preview``."""
+
+    file: FileOptions = group(FileOptions, without=("draft_extensions",))
+    session: Path | None = option(metavar="FILE", help="Begin with a session, a .toml file.")
+    stage: str | None = option(metavar="S", help=_stage_words)
+    size: str = option("1600x1000", metavar="WxH", help="Size of the window.")
+    scale: float = option(1.0, help="Makes letters and fields larger.")
+    script: Path | None = option(metavar="FILE", help="Do what a .toml file says; close.")
+    screenshot: Path | None = option(metavar="PNG", help="Of the window, at the end.")
 
 
 @click.command(epilog="Example: translucent preview goblet")
 @click.argument("model", required=False)
-@unit_option
-@outside_option
-@click.option("--session", type=click.Path(path_type=Path), metavar="FILE", help="Begin with a session, a .toml file.")
-@click.option(
-    "--stage",
-    metavar="S",
-    help=f"What the model stands on: {', '.join(STAGE_NAMES)}, none, or auto, as render. Default: that of the last "
-    "window; at first auto; with a script none.",
-)
-@click.option("--size", default="1600x1000", show_default=True, metavar="WxH", help="Size of the window.")
-@click.option("--scale", type=float, default=1.0, show_default=True, help="Makes letters and fields larger.")
-@click.option("--script", type=click.Path(path_type=Path), metavar="FILE", help="Do what a .toml file says; close.")
-@click.option("--screenshot", type=click.Path(path_type=Path), metavar="PNG", help="Of the window, at the end.")
-@common_options
-def preview(
-    model: str | None,
-    unit: str,
-    allow_outside: bool,
-    session: Path | None,
-    stage: str | None,
-    size: str,
-    scale: float,
-    script: Path | None,
-    screenshot: Path | None,
-    as_json: bool,
-) -> None:
+@takes(PreviewOptions)
+def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
     """Open MODEL, a file or one of the toolkit's own meshes, in a window. Without it: a goblet.
 
     With --script, the window does what the script says, and closes; --screenshot keeps a picture of it. An action that
@@ -53,15 +52,16 @@ def preview(
     from translucent.preview.tasks import problem
     from translucent.scene.stages import stage_named
 
+    session, stage, script, screenshot = given.session, given.stage, given.script, given.screenshot
     if stage is not None and stage != AUTO:
         stage_named(stage)
     if session is not None and model is not None:
         raise InputError(f"--session {str(session)!r}", f"{model} is given, too", "give one of them")
-    if not 0.5 <= scale <= 4.0:
-        raise InputError(f"--scale {scale}", "not in 0.5 to 4", "give for example 2")
+    if not 0.5 <= given.scale <= 4.0:
+        raise InputError(f"--scale {given.scale}", "not in 0.5 to 4", "give for example 2")
     if screenshot is not None and (screenshot.suffix.lower() != ".png" or not screenshot.parent.is_dir()):
         raise InputError(f"--screenshot {str(screenshot)!r}", "no .png in a folder that is there", "give such a path")
-    pixels = read_size(size)
+    pixels = read_size(given.size)
     if session is not None:
         document = load_session(session)
     else:
@@ -69,11 +69,11 @@ def preview(
     if stage is not None:
         document = dataclasses.replace(document, look=dataclasses.replace(document.look, stage=stage))
     if model is not None:
-        document = dataclasses.replace(document, model=Model(model, unit))
+        document = dataclasses.replace(document, model=Model(model, given.file.unit))
     todo = read_script(script) if script is not None else Script.of([]) if screenshot is not None else None
     require_display()
     shot = str(screenshot) if screenshot is not None else None
-    work = run(document, pixels, scale, todo, shot, allow_outside)
+    work = run(document, pixels, given.scale, todo, shot, given.file.allow_outside)
     failure = None if todo is None else work.failure
     if as_json:
         told = [{"kind": message.kind, "text": message.text} for message in work.messages]

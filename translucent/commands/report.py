@@ -9,21 +9,15 @@ import json
 import shlex
 import sys
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
 from translucent.commands.console import echo, is_terminal
-from translucent.commands.model import read_scene, require_translucent
-from translucent.commands.options import (
-    common_options,
-    medium_options,
-    outside_option,
-    read_medium,
-    read_size,
-    unit_option,
-)
+from translucent.commands.model import SceneRequest, read_scene, require_translucent
+from translucent.commands.options import FileOptions, MediumOptions, group, option, read_size, takes
 from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
@@ -34,57 +28,36 @@ if TYPE_CHECKING:
 #: Prefix of the names of cases from users' models.
 MODEL_CASE = "model "
 
-PATH = click.Path(path_type=Path)
+
+@dataclass(frozen=True, kw_only=True)
+class ReportOptions:
+    """Options of ``translucent report``."""
+
+    output: Path | None = option(
+        names=("-o", "--output"), metavar="DIR", help="Folder for report.html, .svg, .json and .csv."
+    )
+    quick: bool = option(
+        False,
+        help="About a minute, more where nothing is compiled yet: fewer scenes, methods, pixels and repetitions.",
+    )
+    size: str | None = option(metavar="WxH", help="Size of the timed frames in pixels.")
+    methods: str | None = option(metavar="NAME,...", help="Only these: signed-depth, k-buffer, ray-marched, ...")
+    only: str | None = option(metavar="PART,...", help="Only these: scenes, scaling, slabs, shadows, hard-cases.")
+    source: Path | None = option(
+        names=("--from",),
+        metavar="JSON",
+        help="Measure nothing: take the report of this file; with --only, measure these parts of it anew.",
+    )
+    compare: Path | None = option(metavar="JSON", help="Tell what got worse since this; exit code 1 if so.")
+    medium: MediumOptions = group(MediumOptions)
+    file: FileOptions = group(FileOptions, without=("draft_extensions",))
+    backend: str | None = option(metavar="B", help="egl, window or osmesa. Default: what works here.")
 
 
 @click.command(epilog="Example: translucent report model.stl --unit mm -o out/report --quick")
 @click.argument("models", nargs=-1, metavar="[MODEL...]")
-@click.option("-o", "--output", type=PATH, metavar="DIR", help="Folder for report.html, .svg, .json and .csv.")
-@click.option(
-    "--quick",
-    is_flag=True,
-    help="About a minute, more where nothing is compiled yet: fewer scenes, methods, pixels and repetitions.",
-)
-@click.option("--size", metavar="WxH", help="Size of the timed frames in pixels.")
-@click.option("--methods", metavar="NAME,...", help="Only these: signed-depth, k-buffer, ray-marched, ...")
-@click.option("--only", metavar="PART,...", help="Only these: scenes, scaling, slabs, shadows, hard-cases.")
-@click.option(
-    "--from",
-    "source",
-    type=PATH,
-    metavar="JSON",
-    help="Measure nothing: take the report of this file; with --only, measure these parts of it anew.",
-)
-@click.option(
-    "--compare",
-    "old",
-    type=PATH,
-    metavar="JSON",
-    help="Tell what got worse since this; exit code 1 if so.",
-)
-@medium_options
-@unit_option
-@outside_option
-@click.option("--backend", metavar="B", help="egl, window or osmesa. Default: what works here.")
-@common_options
-def report(
-    models: tuple[str, ...],
-    output: Path | None,
-    quick: bool,
-    size: str | None,
-    methods: str | None,
-    only: str | None,
-    source: Path | None,
-    old: Path | None,
-    color: str | None,
-    distance: str | None,
-    preset_name: str | None,
-    clamp: bool | None,
-    unit: str,
-    allow_outside: bool,
-    backend: str | None,
-    as_json: bool,
-) -> None:
+@takes(ReportOptions)
+def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None:
     """Measure what each method costs and how wrong it is, on the toolkit's scenes and on each MODEL.
 
     A MODEL is a file, or a mesh of the toolkit by name; --color or --preset fills it with a medium, and the report says
@@ -94,26 +67,24 @@ def report(
     from translucent.bench.judgement import agreement, compare_reports, machines_differ
     from translucent.bench.output import checked_folder, read_report, table, write_outputs
 
-    parts = _parts(only)
-    if (
-        source is not None
-        and not parts
-        and (models or quick or size or methods or backend or color or distance or preset_name)
-    ):
+    parts, source, output, filling = _parts(given.only), given.source, given.output, given.medium
+    measuring = models or given.quick or given.size or given.methods or given.backend
+    if source is not None and not parts and (measuring or filling.color or filling.distance or filling.preset):
         raise InputError(
             f"--from {source}", "nothing is measured, so there is nothing else to ask for", "leave one out"
         )
     if models and parts and "scenes" not in parts:
-        raise InputError(f"--only {only}", "a MODEL is measured among the scenes", "add scenes, or leave MODEL out")
-    medium = read_medium(color, distance, preset_name, clamp)
+        do = "add scenes, or leave MODEL out"
+        raise InputError(f"--only {given.only}", "a MODEL is measured among the scenes", do)
+    medium = filling.read()
     if medium is not None and not models:
-        given = "--color" if preset_name is None else f"--preset {preset_name}"
-        raise InputError(given, "no MODEL to fill; the toolkit's scenes keep their media", "add a MODEL")
-    before = None if old is None else read_report(old)
+        asked = "--color" if filling.preset is None else f"--preset {filling.preset}"
+        raise InputError(asked, "no MODEL to fill; the toolkit's scenes keep their media", "add a MODEL")
+    before = None if given.compare is None else read_report(given.compare)
     made = None if source is None else read_report(source)
     with nullcontext() if output is None else checked_folder(output):
         if made is None or parts:
-            made = _measured(models, medium, output, quick, size, methods, parts, made, unit, backend, allow_outside)
+            made = _measured(models, medium, given, parts, made)
         files = [] if output is None else write_outputs(made, output)
     changes = None if before is None else compare_reports(before, made)
     agreed = None if before is None else agreement(before, made)
@@ -123,7 +94,7 @@ def report(
         echo(json.dumps(_summary(made, files, changes, agreed)))
     else:
         _tell(made, files, changes, agreed)
-    if output is None and old is None and not as_json:
+    if output is None and before is None and not as_json:
         echo(table(made))
     if not made.complete and (source is None or parts):
         raise click.exceptions.Abort
@@ -134,35 +105,26 @@ def report(
         )
     if worse:
         count = f"{len(worse)} {'thing' if len(worse) == 1 else 'things'} got worse"
-        raise RenderError(f"report --compare {old}", count, str(worse[0]))
+        raise RenderError(f"report --compare {given.compare}", count, str(worse[0]))
 
 
 def _measured(
-    models: tuple[str, ...],
-    medium: Medium | None,
-    output: Path | None,
-    quick: bool,
-    size: str | None,
-    methods: str | None,
-    parts: tuple[Part, ...],
-    base: Report | None,
-    unit: str,
-    backend: str | None,
-    allow_outside: bool,
+    models: tuple[str, ...], medium: Medium | None, given: ReportOptions, parts: tuple[Part, ...], base: Report | None
 ) -> Report:
     """Measure, with a bar that tells how far it is; each finished scene is in ``report.json`` at once."""
     from translucent.bench.cases import model_cases
     from translucent.bench.output import write_report
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
 
-    pixels = read_size(size) if size is not None else QUICK_SIZE if quick else FULL_SIZE
-    scenes = {model: read_scene(model, unit, medium, size=pixels, allow_outside=allow_outside) for model in models}
+    pixels = read_size(given.size) if given.size is not None else QUICK_SIZE if given.quick else FULL_SIZE
+    asked = SceneRequest(medium=medium, file=given.file, size=pixels)
+    scenes = {model: read_scene(model, asked) for model in models}
     for model, scene in scenes.items():
         require_translucent(model, scene)
 
     def keep(part: Report) -> None:
-        if output is not None:
-            write_report(part, output / "report.json")
+        if given.output is not None:
+            write_report(part, given.output / "report.json")
 
     # Where nobody watches, the bar would be an empty line before an error.
     shown_in = sys.stderr if is_terminal(sys.stderr) else io.StringIO()
@@ -175,12 +137,12 @@ def _measured(
         return measure_all(
             model_cases(scenes),
             size=pixels,
-            methods=[] if methods is None else [name.strip() for name in methods.split(",")],
-            quick=quick,
-            backend=backend,
+            methods=[] if given.methods is None else [name.strip() for name in given.methods.split(",")],
+            quick=given.quick,
+            backend=given.backend,
             only=parts,
             base=base,
-            command=_command(click.get_current_context().params),
+            command=_command(models, given),
             progress=progress,
             keep=keep,
         )
@@ -200,17 +162,18 @@ def _parts(only: str | None) -> tuple[Part, ...]:
     return tuple(part for part in known if part in named)
 
 
-def _command(given: dict[str, Any]) -> str:
+def _command(models: tuple[str, ...], given: ReportOptions) -> str:
     """Command line of the user, as far as it tells what was measured."""
-    words = ["translucent", "report", *given["models"]]
-    options = {"-o": "output", "--size": "size", "--methods": "methods", "--backend": "backend"}
-    options |= {"--only": "only", "--from": "source"}
-    options |= {"--color": "color", "--distance": "distance", "--preset": "preset_name"}
-    for option, name in options.items():
-        words += [option, str(given[name])] if given[name] is not None else []
-    words += ["--unit", given["unit"]] if given["unit"] != "m" else []
-    words += ["--no-clamp"] if given["clamp"] is False else []
-    return shlex.join([*words, "--quick"] if given["quick"] else words)
+    medium = given.medium
+    options = {"-o": given.output, "--size": given.size, "--methods": given.methods, "--backend": given.backend}
+    options |= {"--only": given.only, "--from": given.source}
+    options |= {"--color": medium.color, "--distance": medium.distance, "--preset": medium.preset}
+    options |= {"--unit": given.file.unit if given.file.unit != "m" else None}
+    words = ["translucent", "report", *models]
+    for name, value in options.items():
+        words += [name, str(value)] if value is not None else []
+    words += ["--no-clamp"] if medium.clamp is False else []
+    return shlex.join([*words, "--quick"] if given.quick else words)
 
 
 def _summary(made: Report, files: list[Path], changes: Any, agreed: Agreement | None) -> dict[str, Any]:
