@@ -14,8 +14,8 @@ from preview_hand import Artist, Waiting, require
 
 import translucent as tl
 from translucent.preview.document import camera_of
+from translucent.preview.library import ball_key, model_key, panorama_key
 from translucent.preview.panels.viewport import on_screen, probe_lines
-from translucent.preview.thumbnails import ball_key, model_key, panorama_key
 
 
 def open_model(a: Artist, name: str) -> Waiting:

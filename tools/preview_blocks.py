@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from translucent.preview import app
 from translucent.preview.document import Document, Model
-from translucent.preview.script import Script, Step, perform, read_step
+from translucent.preview.script import VERBS, Script, Step, read_step
 from translucent.preview.window_state import WindowState
 
 #: Seconds after which the user does the next thing, whatever is under way.
@@ -88,7 +88,7 @@ class Longest(Script):
         self.began: float = time.perf_counter()
         self.last: float = self.began
         self.told.append((" ".join(map(str, (step.do, *step.values.values()))), 0.0, 0.0, 0.0))
-        perform(state, step)
+        VERBS[step.do](state, **step.values)
         return False
 
 

@@ -199,7 +199,7 @@ class Artist:
     def resting(self) -> bool:
         """True while nothing is under way in the window."""
         work = self.state.work
-        return not (self.state.more or work.shelf.busy or any(lane.task for lane in work.lanes.values()))
+        return not (self.state.more or work.thumbnails.busy or any(lane.task for lane in work.lanes.values()))
 
     def until(self, there: Callable[[], object], what: str) -> Waiting:
         """Wait until something is there, as long as anything is under way that could bring it about."""

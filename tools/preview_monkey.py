@@ -23,6 +23,7 @@ from translucent.media.presets import presets
 from translucent.preview.actions import ChoosePreset, Pan, SetField, SetOrbit, Turn, Zoom
 from translucent.preview.document import RANGES, Document, Model, Orbit
 from translucent.preview.scenes import method_of
+from translucent.preview.session import save_session
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 
@@ -57,7 +58,7 @@ def bad_files(folder: Path) -> list[str]:
 
 
 class Monkey:
-    """Plays with a workspace and a stage.
+    """Plays with a workspace and its viewport.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ class Monkey:
     def __init__(self, seed: int, folder: Path) -> None:
         self.random = random.Random(seed)
         self.work, self.size = Workspace(Document(Model("knot"))), (160, 96)
-        self.stage = ViewportRenderer(compiler=self.work.compiler)
+        self.view = ViewportRenderer(compiler=self.work.compiler)
         self.folder, self.bad = folder, bad_files(folder)
         self.refused = 0
         self.verbs = [self.change] * 8 + [self.bad_change, self.move, self.move, self.move, self.preset, self.resize]
@@ -90,11 +91,11 @@ class Monkey:
         self.work.size = self.size
         self.work.update()
         for _ in range(self.random.choice((1, 1, 2, 5))):
-            self.stage.draw(self.work, self.size)
+            self.view.draw(self.work, self.size)
         if self.random.random() < 0.2:
             self.settle(lambda: self.work.compiler.lane.task is None)
-            self.stage.draw(self.work, self.size)
-        with self.stage.current() as gl:
+            self.view.draw(self.work, self.size)
+        with self.view.current() as gl:
             if (error := gl.error) != "GL_NO_ERROR":
                 raise AssertionError(f"action {number}, {verb.__name__}: {error}")
         return verb.__name__
@@ -159,9 +160,9 @@ class Monkey:
         self.work.frame(self.random.choice((None, 0, 7)))
 
     def probe(self) -> None:
-        size = self.stage.viewport.size
+        size = self.view.viewport.size
         pixel = self.random.randrange(-5, 400), self.random.randrange(-5, 400)
-        self.stage.probe(*pixel, self.random.choice((0, 1)))
+        self.view.probe(*pixel, self.random.choice((0, 1)))
         scene = self.work.scene()
         if scene is not None and 0 <= pixel[0] < size[0] and 0 <= pixel[1] < size[1] and self.random.random() < 0.2:
             self.work.cross(scene, size, pixel, lambda _: None)
@@ -169,7 +170,7 @@ class Monkey:
     def session(self) -> None:
         path = str(self.folder / "session.toml")
         if self.random.random() < 0.5:
-            self.work.save_session(path)
+            save_session(path, self.work.document)
         else:
             self.work.open_session(self.random.choice((path, str(self.folder / "text.obj"))))
             self.settle(lambda: self.work.lanes["load"].task is None)
@@ -179,11 +180,7 @@ class Monkey:
         if scene is None or self.random.random() < 0.7:
             return
         method = method_of(document.display.method, document.material)
-
-        def take(measured: Any) -> None:
-            self.work.measured = measured
-
-        self.work.measure(scene, method, (64, 36), take)
+        self.work.measure(scene, method, (64, 36))
         if self.random.random() < 0.7:
             self.settle(lambda: self.work.lanes["draw"].task is None, 5.0)
 
@@ -194,7 +191,7 @@ class Monkey:
 
     def close(self) -> None:
         self.work.close()
-        self.stage.close()
+        self.view.close()
 
 
 def memory() -> float:

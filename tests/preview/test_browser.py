@@ -12,11 +12,11 @@ import pytest
 
 from tests.preview.waiting import wait
 from translucent.assets import shader_path
-from translucent.preview import session, thumbnails
+from translucent.preview import library
 from translucent.preview.dialogs import Browser, with_recent
 from translucent.preview.document import FINISH, TIPS, Display, Look, Material, Orbit, camera_of
-from translucent.preview.library import EnvironmentFolder, title
-from translucent.preview.thumbnails import draw_panorama, model_key, model_picture, panorama_key
+from translucent.preview.library import EnvironmentFolder, draw_panorama, model_key, model_picture, panorama_key, title
+from translucent.preview.session import Preferences
 from translucent.preview.workspace import Workspace
 
 
@@ -88,14 +88,13 @@ def test_a_folder_that_is_gone_is_told(folder: Path) -> None:
 
 def test_where_there_is_no_dialog_the_browser_asks(state: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from translucent.preview import dialogs
-    from translucent.preview.panels.files import accept_answer
 
     monkeypatch.setattr(dialogs.shutil, "which", lambda _: None)
     monkeypatch.setattr(dialogs.sys, "platform", "linux")
     state.folders = [str(folder)]
     state.ask_file("save session")
     assert (state.browser.folder, state.browser.text, state.browser.saves) == (folder, "session.toml", True)
-    accept_answer(state)
+    state.answer()
     assert state.browser is None
     assert (folder / "session.toml").is_file()
     state.ask_file("environment")
@@ -122,7 +121,7 @@ def test_environments_of_a_folder(tmp_path: Path, state: Any) -> None:
     shown.take(str(tmp_path / "gone"))
     assert (shown.files(), "No such file" in shown.problem) == ([], True)
     assert (title(""), title("studio"), title(str(tmp_path / "a.HDR"))) == ("own", "studio", "a")
-    state.light_with("studio")
+    state.change("look.environment", "studio", step=True)
     assert state.get("look.environment") == "studio"
     state.work.undo()
     assert state.get("look.environment") == ""
@@ -130,14 +129,15 @@ def test_environments_of_a_folder(tmp_path: Path, state: Any) -> None:
 
 def test_folders_are_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    assert (session.read_folders(), session.read_environments()) == ([], "")
+    assert Preferences.read() == Preferences()
     found = with_recent(["/usr"], tmp_path / "a.glb")
     assert found == [os.path.realpath(tmp_path), "/usr"]
     assert with_recent(found, "/usr/a.glb")[0] == os.path.realpath("/usr")
-    session.write_folders([*found, str(tmp_path / "gone")])
-    session.write_environments(str(tmp_path))
-    assert session.read_folders() == found
-    assert session.read_environments() == str(tmp_path)
+    gone = str(tmp_path / "gone")
+    Preferences([gone, "/usr"], [*found, gone], str(tmp_path), "night").write()
+    assert Preferences.read() == Preferences(["/usr"], found, str(tmp_path), "night")
+    Preferences([], [], gone).write()
+    assert Preferences.read() == Preferences()
 
 
 def test_a_model_leaves_a_small_picture(state: Any, folder: Path) -> None:
@@ -176,7 +176,8 @@ def test_a_model_leaves_a_small_picture(state: Any, folder: Path) -> None:
 
 
 def test_every_knob_is_explained() -> None:
-    silent = {"material.source", "material.preset", "orbit.target", "orbit.yaw", "orbit.pitch", "orbit.distance"}
+    silent = {"material.source", "material.preset", "material.phase"}  # set by presets and sessions
+    silent |= {"orbit.target", "orbit.yaw", "orbit.pitch", "orbit.distance"}
     sections = {"material": Material, "look": Look, "display": Display, "orbit": Orbit}
     fields = {f"{section}.{one.name}" for section, kind in sections.items() for one in dataclasses.fields(kind)}
     assert set(TIPS) == (fields - silent) | {"model.unit"}
@@ -208,14 +209,12 @@ def test_the_scale_of_errors_has_the_colors_of_the_picture() -> None:
 
 
 def test_of_ten_dropped_files_one_model_and_one_environment_are_taken(state: Any, folder: Path) -> None:
-    from translucent.preview.panels.files import take_dropped
-
     skies = [folder / f"sky-{i}.hdr" for i in range(4)]
     for path in skies:
         path.write_bytes(b"no picture")
     opened: list[str] = []
     state.work.open = lambda model: opened.append(Path(model.path).name)
-    take_dropped(state, [str(folder / name) for name in ("a.glb", "b.GLB", *(path.name for path in skies), *"cdef")])
+    state.take_dropped([str(folder / name) for name in ("a.glb", "b.GLB", *(path.name for path in skies), *"cdef")])
     assert opened == ["a.glb"]
     assert state.get("look.environment") == str(skies[0])
     assert state.environments.files() == [str(path) for path in skies]
@@ -233,9 +232,9 @@ def test_of_a_folder_of_500_environments_few_are_read_in_a_frame(
     monkeypatch.setattr(os, "listdir", lambda _: pytest.fail("the folder has not changed"))
     assert state.environments.files()[-1] == str(tmp_path / "499.hdr")
     cache, read = state.work.thumbnails, list[Path]()
-    monkeypatch.setattr(thumbnails, "_read", lambda path: read.append(path))
+    monkeypatch.setattr(library, "_read", lambda path: read.append(path))
     for _ in range(2):
         cache.begin_frame(idle=False)
         for path in state.environments.files():
             assert cache.picture(panorama_key(path), draw_panorama, path) is None
-    assert 0 < len(read) <= 2 * thumbnails.READ_AT_ONCE
+    assert 0 < len(read) <= 2 * library.READ_AT_ONCE

@@ -17,16 +17,15 @@ import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals
+from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals, made_normals
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.compile_budget import CompileBudget, PostponedError, ProgramName
 from translucent.gpu.packed_meshes import has_packed
 from translucent.gpu.viewport import Viewport
 from translucent.planning.passes import PassName
-from translucent.preview import compiling, viewport_renderer
-from translucent.preview import compiling as tracing
+from translucent.preview import preparation, viewport_renderer
 from translucent.preview.actions import ChoosePreset, SetField
-from translucent.preview.compiling import Compiled, Compiler, stand_in
+from translucent.preview.preparation import Compiled, Compiler, stand_in
 from translucent.preview.quality import StepTimes
 from translucent.preview.tasks import Task
 from translucent.preview.viewport_renderer import ViewportRenderer
@@ -63,15 +62,15 @@ def near(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
 
     def call(_: Pool, task: Any, work: Callable[..., Any], *arguments: Any, **_urgency: Any) -> Any:
         go.wait(60.0)
-        return work(task.report, *arguments)
+        return work(*arguments)
 
     monkeypatch.setattr(Pool, "call", call)
-    compiling._engine.cache_clear()
+    preparation._engine.cache_clear()
     return go
 
 
 def drawn_alone(work: Workspace) -> np.ndarray:
-    """The picture of a stage that compiles all by itself."""
+    """The picture of a viewport renderer that compiles all by itself."""
     alone = ViewportRenderer()
     try:
         finish(alone, work)
@@ -130,7 +129,7 @@ def test_what_stands_in_for_a_scene_is_drawn_with_its_programs(name: str) -> Non
             except tl.InputError:
                 continue
             # Cells take time, and are those of all methods: the picture in full is drawn by the planner's own alone.
-            quick = compiling._quick(plan)
+            quick = preparation._quick(plan)
             before, after = needed((stand_in(scene), quick), (scene, plan if method is None else quick))
             assert after == before, method
 
@@ -206,7 +205,7 @@ def test_what_adds_samples_is_made_in_frames_of_its_own() -> None:
 def test_normals_of_a_large_mesh_come_from_another_process(
     view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(compiling, "SMOOTHED_AT_ONCE", 100)
+    monkeypatch.setattr(preparation, "SMOOTHED_AT_ONCE", 100)
     finish(view, work)
     assert work.loaded is not None
     mesh = work.loaded.scene.objects[0].mesh
@@ -226,7 +225,7 @@ def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
     with tl.Renderer() as renderer:
         plans = [renderer.plan(scene), renderer.plan(scene, tl.DepthPeeling())]
         compiler.device = renderer.gpu.context.renderer
-    compiler.ask("", scene, plans, found.append)
+    compiler.request("", scene, plans, found.append)
     while not found:
         compiler.lane.poll(pytest.fail)
         time.sleep(0.002)
@@ -238,7 +237,7 @@ def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> 
     near.set()
     scene, compiler, found = stand_in(showcase(BALL, GLASS, stage="none")), Compiler(work.pool), list[Compiled]()
     compiler.device = "a card from the future"
-    compiler.ask("", scene, [], found.append)
+    compiler.request("", scene, [], found.append)
     while not found:
         compiler.lane.poll(pytest.fail)
         time.sleep(0.002)
@@ -330,7 +329,7 @@ def test_a_request_that_cannot_be_made_is_told_once(
     def fails(_: tl.Scene) -> tl.Scene:
         raise MemoryError
 
-    monkeypatch.setattr(compiling, "stand_in", fails)
+    monkeypatch.setattr(preparation, "stand_in", fails)
     work.do(ChoosePreset("whole_milk"))
     finish(view, work)
     assert view.problem == ""
@@ -348,9 +347,9 @@ def test_normals_that_two_lanes_ask_for_are_made_once(monkeypatch: pytest.Monkey
             may_end.wait(20.0)
             return np.zeros((*mesh.faces.shape, 3), np.float32)
 
-    monkeypatch.setattr(tracing, "PATIENCE", 0.001)
+    monkeypatch.setattr(preparation, "PATIENCE", 0.001)
     pool: Any = Slow()
-    tasks = [Task("", lambda task: tracing.have_smoothed(task, pool, mesh), print) for _ in range(3)]
+    tasks = [Task("", lambda task: preparation.make_normals(task, pool, mesh), print) for _ in range(3)]
     threads = [threading.Thread(target=task.run) for task in tasks]
     for thread in threads:
         thread.start()
@@ -358,7 +357,7 @@ def test_normals_that_two_lanes_ask_for_are_made_once(monkeypatch: pytest.Monkey
     may_end.set()
     for thread in threads:
         thread.join(20.0)
-    assert asked == [tracing.smoothed]
+    assert asked == [made_normals]
     assert has_drawn_normals(mesh)
     assert [task.error for task in tasks] == [None] * 3
 
@@ -366,7 +365,7 @@ def test_normals_that_two_lanes_ask_for_are_made_once(monkeypatch: pytest.Monkey
 def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierarchy(
     view: ViewportRenderer, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tracing, "PACKED_AT_ONCE", 10)
+    monkeypatch.setattr(preparation, "PACKED_AT_ONCE", 10)
     near.set()
     finish(view, work)
     wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
@@ -375,12 +374,12 @@ def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierar
     mesh = work.loaded.scene.objects[0].mesh
     work.do(ChoosePreset("merlot"))
     view.draw(work, SIZE)
-    assert "until rays can be traced" in view.quality.told[0]
+    assert "until rays can be traced" in view.quality.notes[0]
     assert isinstance(view.quality.interfaces, tl.ScreenInterfaces)
     assert not has_packed(mesh)
     near.set()
     finish(view, work)
-    assert (view.quality.told[0], view.quality.interfaces) == ("", None)
+    assert (view.quality.notes[0], view.quality.interfaces) == ("", None)
     assert has_packed(mesh)
     assert view.plans[0] is not None
     assert view.plans[0].has(PassName.TRACED)
@@ -413,7 +412,7 @@ def test_where_no_process_can_draw_the_window_compiles_by_itself(
     told = [message.text for message in work.messages if "shaders are compiled in the window" in message.text]
     assert len(told) == 1
     assert "status 9" in told[0]
-    assert "since it could not be solved for" in view.quality.told[1]  # nor is the window to run out of memory
+    assert "since it could not be solved for" in view.quality.notes[1]  # nor is the window to run out of memory
     messages = len(work.messages)
     work.do(SetField("display.method", "depth-peeling"))
     finish(view, work)

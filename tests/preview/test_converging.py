@@ -29,15 +29,15 @@ def test_a_still_picture_converges_until_something_changes(
     work.do(SetField("material.ior", 1.5))
     finish(view, work)
     interactive = pixels(view)
-    assert view.converging.told == ""
+    assert view.paths.note == ""
     work.do(SetField("display.converge", True))
     told = []
     while view.draw(work, SIZE):
-        told.append(view.converging.told)
+        told.append(view.paths.note)
     assert view.problem == ""
     assert "converging: the first paths" in told
     assert any(text.startswith("converging: 4 paths, standard error ") for text in told)
-    assert view.converging.told.startswith("converged: 16 paths")
+    assert view.paths.note.startswith("converged: 16 paths")
     scene = work.scene()
     assert scene is not None
     with view.current():
@@ -50,7 +50,7 @@ def test_a_still_picture_converges_until_something_changes(
     assert probe.thickness == pytest.approx(truth.thickness[48, 80], rel=1e-5)
     work.do(Turn(20.0, 10.0))
     assert view.draw(work, SIZE)
-    assert view.converging.told == ""
+    assert view.paths.note == ""
     work.do(Turn(-20.0, -10.0))
     work.do(SetField("display.converge", False))
     finish(view, work)
@@ -61,12 +61,12 @@ def test_what_paths_cannot_follow_stays_as_it_is_and_says_so(view: ViewportRende
     work.do(SetField("display.converge", True))
     work.do(SetField("display.mode", "thickness"))
     finish(view, work)
-    assert view.converging.told == ""  # a quantity is as exact as it will be
+    assert view.paths.note == ""  # a quantity is as exact as it will be
     scene = work.scene()
     assert scene is not None
     body = scene.objects[0]
     hole = tl.Mesh(body.mesh.vertices, body.mesh.faces[1:])
     broken = tl.Scene([tl.Object(hole, body.medium)], scene.camera, environment=scene.environment)
-    more, changed = view.converging.step(broken, view.renderer, view.viewport, 1.0)
+    more, changed = view.paths.step(broken, view.renderer, view.viewport, 1.0)
     assert (more, changed) == (False, False)
-    assert "not converging: PathTraced of" in view.converging.told
+    assert "not converging: PathTraced of" in view.paths.note

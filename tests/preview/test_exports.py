@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +14,10 @@ import translucent as tl
 from tests.preview.waiting import wait
 from translucent.files.paths import write_atomically
 from translucent.geometry.solids import Box
-from translucent.preview import worker
+from translucent.preview import exports, worker
 from translucent.preview.document import Document, Model
 from translucent.preview.exports import write_picture, write_turntable
+from translucent.preview.worker import report
 from translucent.preview.workspace import Workspace
 from translucent.scene.showcase import showcase
 
@@ -25,13 +25,9 @@ SIZE = (64, 40)
 SCENE = showcase(Box((-0.01, -0.01, -0.01), (0.01, 0.01, 0.01)).tessellate(), size=SIZE, stage="none")
 
 
-def told(share: float | None, detail: str = "") -> None:
-    """Nobody looks."""
-
-
 @pytest.mark.parametrize("transparent", [False, True])
 def test_a_picture_is_the_one_that_render_makes(tmp_path: Path, transparent: bool) -> None:
-    write_picture(told, str(tmp_path / "a.png"), SCENE, None, SIZE, (0.5, "neutral"), transparent)
+    write_picture(str(tmp_path / "a.png"), SCENE, None, SIZE, (0.5, "neutral"), transparent)
     with tl.Renderer() as renderer:
         renderer.render(SCENE, SIZE, samples=16, transparent=transparent).save(tmp_path / "b.png", 0.5, "neutral")
     written, expected = (np.asarray(Image.open(tmp_path / name)) for name in ("a.png", "b.png"))
@@ -39,9 +35,10 @@ def test_a_picture_is_the_one_that_render_makes(tmp_path: Path, transparent: boo
     np.testing.assert_array_equal(written, expected)
 
 
-def test_a_turntable_shows_the_model_from_all_around(tmp_path: Path) -> None:
+def test_a_turntable_shows_the_model_from_all_around(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     at: list[str] = []
-    write_turntable(lambda _, detail: at.append(detail), str(tmp_path / "a.gif"), SCENE, None, SIZE, count=3)
+    monkeypatch.setattr(exports, "report", lambda _, detail: at.append(detail))
+    write_turntable(str(tmp_path / "a.gif"), SCENE, None, SIZE, count=3)
     assert at == ["picture 1 of 3", "picture 2 of 3", "picture 3 of 3"]
     with Image.open(tmp_path / "a.gif") as moving:
         assert (moving.n_frames, moving.size) == (3, SIZE)
@@ -68,7 +65,7 @@ def test_what_cannot_be_written_is_told_at_once(work: Workspace, tmp_path: Path)
         assert reason in work.messages[-1].text
 
 
-def slow(report: Callable[[float | None, str], None], path: str) -> None:
+def slow(path: str) -> None:
     with Path(path).open("wb") as stream:
         try:
             stream.write(b"half")
@@ -97,7 +94,7 @@ def test_a_file_in_the_background_that_cannot_be_written_is_told(work: Workspace
     def fails(path: str) -> None:
         raise tl.RenderError(f"writing {path!r}", "the disk is full", "make room")
 
-    work.write(str(tmp_path / "map.exr"), fails)
+    work.write(str(tmp_path / "map.exr"), lambda _: fails(str(tmp_path / "map.exr")))
     wait(work, lambda: work.lanes["write"].task is None)
     assert "the disk is full" in work.messages[-1].text
 
@@ -110,14 +107,14 @@ def test_a_window_that_is_closed_finishes_its_file(tmp_path: Path) -> None:
         time.sleep(1.5)
         Path(to).write_bytes(b"whole")
 
-    work.write(str(path), writes)
+    work.write(str(path), lambda _: writes(str(path)))
     wait(work, lambda: work.loaded is not None)
     work.close()
     assert path.read_bytes() == b"whole"
     assert work.ended
 
 
-def hard(report: Callable[[float | None, str], None], path: str) -> None:
+def hard(path: str) -> None:
     """Writes, and is not to be stopped."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     write_atomically(Path(path), lambda temporary: (temporary.write_bytes(b"half"), report(0.5, ""), time.sleep(60.0)))
@@ -138,7 +135,7 @@ def test_what_a_killed_process_has_left_is_removed(
     assert not list(tmp_path.iterdir())
 
 
-def slowly(report: Callable[[float | None, str], None], path: str) -> None:
+def slowly(path: str) -> None:
     """Writes in two halves."""
 
     def write(temporary: Path) -> None:

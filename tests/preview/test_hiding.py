@@ -44,28 +44,26 @@ def test_hiding_is_a_step_of_undo_and_kept_in_sessions(tmp_path: Path) -> None:
 
 def test_an_object_is_isolated_and_the_last_one_is_not_hidden(work: Workspace) -> None:
     states = pytest.importorskip("translucent.preview.window_state", reason="the extra 'ui' is not installed")
-    from translucent.preview.panels.scene import hide, isolate
-
     state = states.WindowState(work, None)
     loaded = dataclasses.replace(two_bodies(), model=work.document.model)
     work._keep(loaded)
-    isolate(state, 1)
+    state.isolate(1)
     assert work.document.hidden == (0, 2)
     scene = work.scene()
     assert scene is not None
     assert [item.mesh for item in scene.objects] == [loaded.scene.objects[1].mesh]
     found: list[int | None] = []
-    state.view = type("Stage", (), {"viewport": type("Viewport", (), {"size": (48, 32)})})()
+    state.view = type("View", (), {"viewport": type("Viewport", (), {"size": (48, 32)})})()
     work.frame(1)
     state.pick((0.5, 0.5), found.append)
     wait(work, lambda: bool(found))
     assert found == [1], "it is told by its number in the model"
-    hide(state, 1)
+    state.hide(1)
     assert "the only one on show" in work.messages[-1].text
     shot = Recipe(work.document, loaded, scene, (48, 32))
     assert "hidden objects" in command_line(shot)[1]
     assert "if i not in [0, 2]" in python_code(shot)
-    isolate(state, 1)
+    state.isolate(1)
     assert work.document.hidden == ()
     work.do(Hide((0, 1, 2)))
     assert work.document.hidden == (), "a picture of nothing is none"

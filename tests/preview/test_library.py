@@ -13,16 +13,15 @@ import pytest
 
 import translucent as tl
 from tests.preview.waiting import wait
-from translucent.preview import thumbnails
+from translucent.preview import library
 from translucent.preview.actions import Assign, ChoosePreset, History, Open, apply, preset_material
 from translucent.preview.document import Document, Material, Orbit
 from translucent.preview.exports import Recipe, command_line, python_code
-from translucent.preview.library import Library
+from translucent.preview.library import Library, ThumbnailCache
 from translucent.preview.measuring import first_object
 from translucent.preview.scenes import Loaded, material_of, medium_of, scene_of
 from translucent.preview.session import from_table, load_session, save_session, to_table
 from translucent.preview.tasks import Lane
-from translucent.preview.thumbnails import ThumbnailCache
 from translucent.preview.workspace import Workspace
 
 PICTURE = np.full((2, 3, 3), 7, dtype=np.uint8)
@@ -35,12 +34,12 @@ def lane() -> Iterator[Lane]:
     made.close()
 
 
-def settle(thumbnails: ThumbnailCache, ask: Callable[[], Any]) -> Any:
-    """Answer of a thumbnails to a request that is made in every frame."""
+def settle(cache: ThumbnailCache, ask: Callable[[], Any]) -> Any:
+    """Answer of a cache to a request that is made in every frame."""
     end = time.monotonic() + 10.0
     while (found := ask()) is None and time.monotonic() < end:
-        thumbnails.begin_frame(idle=True)
-        thumbnails.lane.poll(print)
+        cache.begin_frame(idle=True)
+        cache.lane.poll(print)
         time.sleep(0.001)
     return found
 
@@ -61,25 +60,25 @@ def test_a_picture_is_made_once_and_kept_on_disk(lane: Lane, tmp_path: Path) -> 
         made.append(name)
         return PICTURE
 
-    thumbnails = ThumbnailCache(lane, make, tmp_path)
-    assert thumbnails.picture("a", "a") is None
+    cache = ThumbnailCache(lane, make, tmp_path)
+    assert cache.picture("a", "a") is None
     for _ in range(3):
-        thumbnails.begin_frame(idle=False)
-        assert thumbnails.picture("a", "a") is None
+        cache.begin_frame(idle=False)
+        assert cache.picture("a", "a") is None
     assert lane.task is None, "while the picture of the window is drawn, no others are"
-    np.testing.assert_array_equal(settle(thumbnails, lambda: thumbnails.picture("a", "a")), PICTURE)
+    np.testing.assert_array_equal(settle(cache, lambda: cache.picture("a", "a")), PICTURE)
     again = ThumbnailCache(lane, make, tmp_path)
     np.testing.assert_array_equal(again.picture("a", "a"), PICTURE)
     assert made == ["a"]
 
 
 def test_what_nobody_sees_any_more_is_not_made(lane: Lane, tmp_path: Path) -> None:
-    thumbnails = ThumbnailCache(lane, lambda _, name: PICTURE, tmp_path)
-    thumbnails.picture("seen", "seen")
-    thumbnails.begin_frame(idle=False)
-    assert thumbnails.busy
-    thumbnails.begin_frame(idle=False)
-    assert not thumbnails.busy
+    cache = ThumbnailCache(lane, lambda _, name: PICTURE, tmp_path)
+    cache.picture("seen", "seen")
+    cache.begin_frame(idle=False)
+    assert cache.busy
+    cache.begin_frame(idle=False)
+    assert not cache.busy
 
 
 def test_few_are_read_in_a_frame_and_what_cannot_be_made_has_no_picture(lane: Lane, tmp_path: Path) -> None:
@@ -89,15 +88,15 @@ def test_few_are_read_in_a_frame_and_what_cannot_be_made_has_no_picture(lane: La
         asked.append(name)
         raise tl.InputError("environment 'a.hdr'", "no picture")
 
-    thumbnails = ThumbnailCache(lane, fail, tmp_path)
+    cache = ThumbnailCache(lane, fail, tmp_path)
     (tmp_path / "0.png").write_bytes(b"half")
     for number in range(500):
-        thumbnails.picture(str(number), str(number))
-    thumbnails.begin_frame(idle=True)
-    assert len(thumbnails._wanted) == 4, "a folder of 500 files stops no frame"
+        cache.picture(str(number), str(number))
+    cache.begin_frame(idle=True)
+    assert len(cache._wanted) == 4, "a folder of 500 files stops no frame"
     for _ in range(20):
-        thumbnails.picture("0", "0")
-        thumbnails.begin_frame(idle=True)
+        cache.picture("0", "0")
+        cache.begin_frame(idle=True)
         lane.poll(print)
         time.sleep(0.002)
     assert asked == ["0"], "it is tried once"
@@ -114,47 +113,47 @@ def test_a_ball_fills_its_picture_on_the_default_stage(monkeypatch: pytest.Monke
         def to_srgb8(self, *_: object) -> np.ndarray:
             return PICTURE
 
-    monkeypatch.setattr(thumbnails, "_renderer", lambda _: Recorder())
-    assert thumbnails.draw_ball(lambda *_: None, tl.preset("wax")) is not None
+    monkeypatch.setattr(library, "worker_renderer", Recorder)
+    assert library.draw_ball(tl.preset("wax")) is not None
     ball, ground = seen[0].objects
     assert (ball.medium, ball.surface.roughness) == (tl.preset("wax").medium, 0.35)  # type: ignore[union-attr]
     assert ground.shadow_catcher
     origins, ways = seen[0].camera.rays((9, 9))
     towards = ball.bounds.mean(axis=0) - origins
     past = np.linalg.norm(np.cross(towards, ways), axis=-1).reshape(9, 9)
-    assert (past[4, 1:8] < thumbnails.RADIUS).all()
-    assert past[0, 0] > thumbnails.RADIUS
+    assert (past[4, 1:8] < library.RADIUS).all()
+    assert past[0, 0] > library.RADIUS
 
 
 def test_an_environment_is_drawn_in_all_directions() -> None:
-    assert thumbnails.draw_panorama(lambda *_: None, "studio").shape == (64, 128, 3)
-    assert (thumbnails.draw_panorama(lambda *_: None, "#ff0000")[..., 0] > 200).all()
-    low, high = thumbnails.draw_panorama(lambda *_: None, "light-table")[[-1, 0], 5].astype(int)
+    assert library.draw_panorama("studio").shape == (64, 128, 3)
+    assert (library.draw_panorama("#ff0000")[..., 0] > 200).all()
+    low, high = library.draw_panorama("light-table")[[-1, 0], 5].astype(int)
     assert (high > low + 20).all(), "the light table is white above"
 
 
 def test_keys_are_of_the_content() -> None:
     jade = tl.preset("jade")
-    assert thumbnails.ball_key(jade) == thumbnails.ball_key(dataclasses.replace(jade, name="stone", note="another"))
-    assert thumbnails.ball_key(jade) != thumbnails.ball_key(dataclasses.replace(jade, roughness=0.5))
+    assert library.ball_key(jade) == library.ball_key(dataclasses.replace(jade, name="stone", note="another"))
+    assert library.ball_key(jade) != library.ball_key(dataclasses.replace(jade, roughness=0.5))
 
 
 def test_a_material_is_saved_and_found(tmp_path: Path) -> None:
     refused: list[Exception] = []
-    library = Library(refused.append, tmp_path / "presets")
+    own = Library(refused.append, tmp_path / "presets")
     material = dataclasses.replace(preset_material(Material(), "marble"), roughness=0.25, dispersion=0.5)
-    path, left_out = library.save("My Marble", material)
+    path, left_out = own.save("My Marble", material)
     assert (path.name, left_out) == ("my_marble.toml", ["dispersion"])
-    found = library.find("my_marble")
+    found = own.find("my_marble")
     assert found is not None
     assert (found.medium, found.roughness, found.group) == (medium_of(material), 0.25, "own")
-    library.search = "my marb"
-    assert list(library.groups()) == ["own"]
+    own.search = "my marb"
+    assert list(own.groups()) == ["own"]
     with pytest.raises(tl.InputError, match="one of the toolkit's has that name"):
-        library.save("Marble", material)
+        own.save("Marble", material)
     (tmp_path / "presets" / "bad.toml").write_text('[a]\nkind = "guessed"\n')
-    library._checked = -1e9
-    assert library.find("my_marble") is not None
+    own._checked = -1e9
+    assert own.find("my_marble") is not None
     assert "bad.toml', line 1, [a]; no key" in str(refused[0])
     assert len(refused) == 1
 

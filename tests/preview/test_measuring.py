@@ -15,7 +15,7 @@ from translucent.preview import measuring, workspace
 from translucent.preview.actions import SetField, Turn
 from translucent.preview.measuring import crossing, measure
 from translucent.preview.window_state import WindowState
-from translucent.preview.workspace import Workspace, prepares
+from translucent.preview.workspace import Workspace
 from translucent.scene.texture import Texture
 
 
@@ -31,10 +31,10 @@ def leaf() -> tl.Scene:
 
 
 def test_the_reference_has_the_holes_of_a_leaf() -> None:
-    thickness = [crossing(lambda *_: None, leaf(), (60, 60), (30, y)).thickness for y in (22, 38)]
+    thickness = [crossing(leaf(), (60, 60), (30, y)).thickness for y in (22, 38)]
     assert sorted(thickness)[0] == 0.0
     assert 0.01 < sorted(thickness)[1] < 0.0102
-    found = measure(lambda *_: None, leaf(), None, (30, 30))
+    found = measure(leaf(), None, (30, 30))
     seen, float32 = found.errors[0], 1e-6 * 0.01
     assert (seen.coverage_mismatch, seen.max < float32) == (0.0, True)
     assert (found.truth.min(axis=(1, 2)) < 250).mean() < 0.3, "half of the leaf is seen"
@@ -54,7 +54,7 @@ def test_the_inset_shows_textures_paint_and_leaves() -> None:
     beside[0, 3] = 1.0
     glass = tl.Object(square, tl.Medium(ior=1.5), transform=beside, surface=painted, sheet_thickness=0.01)
     camera = tl.Camera.orthographic((1.0, 0.5, 3), (1.0, 0.5, 0), height=1.0)
-    seen = measure(lambda *_: None, tl.Scene([leaf, glass], camera), None, (16, 8)).truth
+    seen = measure(tl.Scene([leaf, glass], camera), None, (16, 8)).truth
     for first in (0, 90):
         above, below, cut_out = (seen[y, first + x].tolist() for x, y in ((10, 10), (10, 80), (80, 80)))
         assert above == [255, 0, 0]
@@ -62,8 +62,8 @@ def test_the_inset_shows_textures_paint_and_leaves() -> None:
         assert cut_out == [255, 255, 255], "the hole shows what is behind"
 
 
-class StillStage:
-    """A stage whose picture is always there."""
+class StillView:
+    """A view whose picture is always there."""
 
     waits, state, viewport = False, "full picture", SimpleNamespace(size=SIZE)
 
@@ -74,12 +74,12 @@ class StillStage:
 def test_measuring_waits_for_what_the_picture_needs_and_is_cancelled_when_things_move(
     work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    view: Any = StillStage()
+    view: Any = StillView()
     state, begun = WindowState(work, view), list[tl.Scene]()
     monkeypatch.setattr(workspace, "STILL", -1.0)
     monkeypatch.setattr(WindowState, "_keep_picture", lambda _: None)
     monkeypatch.setattr(work, "measure", lambda scene, *_: begun.append(scene))
-    wait(work, lambda: work.loaded is not None and not prepares(work))
+    wait(work, lambda: work.loaded is not None and not work.prepares)
     reads = threading.Event()
     work.lanes["light"].start("setting the stage", lambda _: reads.wait(20.0), lambda _: None)
     assert state.draw(SIZE)

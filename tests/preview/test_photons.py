@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -88,14 +89,14 @@ def test_photons_light_the_still_picture_until_something_changes(
     work.do(SetField("display.caustics", True))
     told = []
     while view.draw(work, SIZE):
-        told.append(view.photons.told)
-    told.append(view.photons.told)
+        told.append(view.photons.note)
+    told.append(view.photons.note)
     assert view.problem == ""
     assert any(text.startswith("caustics: not in the picture yet; ") for text in told)
     # Two pictures tell the noise; a quick machine follows all these photons for the first.
     pictures = {text.split(" photons")[0] for text in told if "photons in the picture" in text}
     assert any("photons in the picture, standard error" in text for text in told) or len(pictures) == 1
-    assert view.photons.told.startswith(f"caustics: {view.photons.light.photons:,} photons in the picture")  # type: ignore[union-attr]
+    assert view.photons.note.startswith(f"caustics: {view.photons.light.photons:,} photons in the picture")  # type: ignore[union-attr]
     count = view.photons.light.photons  # type: ignore[union-attr]
     with view.current():
         frame = view.renderer.render(LIT, SIZE, caustics=tl.Caustics(count))
@@ -103,7 +104,7 @@ def test_photons_light_the_still_picture_until_something_changes(
     assert np.abs(pixels(view) - without).mean() > 0.5
     work.do(SetField("display.caustics", False))
     finish(view, work)
-    assert view.photons.told == ""
+    assert view.photons.note == ""
     assert (np.abs(pixels(view) - without)[~frame.coverage] > 1).mean() < 2e-3
 
 
@@ -111,18 +112,18 @@ def test_what_has_no_caustics_says_why_and_keeps_its_picture(view: ViewportRende
     work.do(SetField("display.antialias", True))
     work.do(SetField("display.caustics", True))
     finish(view, work)
-    assert view.photons.told.startswith("no caustics; the scene has no lights")
+    assert view.photons.note.startswith("no caustics; the scene has no lights")
     assert view.viewport.steps(0) > view._strides.of[0] ** 2  # edges become smooth all the same
     work.do(Turn(10.0, 0.0))
     assert view.draw(work, SIZE)
     work.do(SetField("display.mode", "thickness"))
     finish(view, work)
-    assert view.photons.told == ""
+    assert view.photons.note == ""
 
 
 def test_files_have_the_photons(tmp_path: Path) -> None:
     photons = tl.Caustics(ROUND)
-    write_picture(lambda *_: None, str(tmp_path / "a.png"), LIT, None, (32, 24), caustics=photons)
+    write_picture(str(tmp_path / "a.png"), LIT, None, (32, 24), caustics=photons)
     with tl.Renderer() as renderer:
         frame = renderer.render(LIT, (32, 24), samples=16, caustics=photons)
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "a.png")), frame.to_srgb8())
@@ -150,21 +151,22 @@ def test_photons_in_media_are_followed_aside(
     monkeypatch.setattr(refining, "ROUND", 1 << 10)
     fog = tl.Object(Box((-1.5, -3.0, -1.5), (1.5, -1.2, 1.5)).tessellate(), tl.Medium(scattering=0.5))
     scene = replace(LIT, objects=[tl.Object(Sphere().tessellate(16), tl.Medium(ior=1.5)), fog])
-    found, lane = refining.Photons(), work.lanes["diffuse"]
+    found, lane = refining.PhotonRefinement(), work.lanes["diffuse"]
 
     def ready() -> bool:
-        return found.ready(work, scene, view.renderer, view.viewport, None, tl.Diffusion(8), 0.1, 0.0)
+        plan = partial(view.renderer.plan, scene, scattering=tl.Diffusion(8))
+        return found.ready(work, scene, view.renderer, view.viewport, plan, 0.1, 0.0)
 
     with view.current():
         assert not ready()
-        assert found.told == "caustics: photons in media first"
+        assert found.note == "caustics: photons in media first"
         assert found.show_media(view.viewport) is None
         wait(work, lambda: lane.task is None)
         assert not ready()
-        assert found.told == "caustics: 1,024 photons in media"
+        assert found.note == "caustics: 1,024 photons in media"
         shown = found.show_media(view.viewport)
         assert shown is not None
         assert shown.given_back.volumes == (1,)
         assert found.show_media(view.viewport) is None
         assert found.stop(view.viewport)
-    assert found.told == ""
+    assert found.note == ""

@@ -11,6 +11,7 @@ import pytest
 
 from tests.command_line import Run
 from tests.preview.waiting import wait
+from translucent.commands import preview as preview_command
 from translucent.errors import RenderError
 from translucent.preview import app
 from translucent.preview.actions import ChoosePreset, SetField
@@ -54,7 +55,7 @@ def preview(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callab
             return work
 
         monkeypatch.setattr(app, "run", stand_in)
-        monkeypatch.setattr(app, "require_display", lambda: None)
+        monkeypatch.setattr(preview_command, "require_display", lambda: None)
         (tmp_path / "script.toml").write_text('[[action]]\ndo = "frame"\n')
         return run("preview", "leaf", "--script", tmp_path / "script.toml", *arguments)
 

@@ -15,12 +15,12 @@ from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.cli import main
 from translucent.gpu.compile_budget import PostponedError
 from translucent.gpu.passes import shadow_maps
-from translucent.preview import quality, session
+from translucent.preview import quality
 from translucent.preview.actions import ChoosePreset, SetField, Turn
 from translucent.preview.document import AUTO, Document, Look, Model, framed, orbit_of
 from translucent.preview.exports import Recipe, command_line, python_code
 from translucent.preview.scenes import stage_name, tone_of
-from translucent.preview.session import load_session, save_session
+from translucent.preview.session import Preferences, load_session, save_session
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 from translucent.scene import stages
@@ -252,11 +252,11 @@ def test_what_no_option_says_is_told_and_python_says_it(staged: Workspace) -> No
 
 def test_the_last_stage_is_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    assert session.read_stage() == AUTO
-    session.write_stage("night")
-    assert session.read_stage() == "night"
+    assert Preferences.read().stage == AUTO
+    Preferences(stage="night").write()
+    assert Preferences.read().stage == "night"
     (tmp_path / "translucent" / "stage.txt").write_text("moon")
-    assert session.read_stage() == AUTO
+    assert Preferences.read().stage == AUTO
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ def test_the_picture_is_the_one_that_render_makes(
     assert probe is not None
     assert probe.thickness == pytest.approx(frame.thickness[y, x], rel=1e-5)
     assert (probe.covered, probe.valid) == (True, True)
-    found = crossing(lambda *_: None, scene, SIZE, (int(x), int(y)))
+    found = crossing(scene, SIZE, (int(x), int(y)))
     assert found.thickness == pytest.approx(frame.thickness[y, x], rel=1e-4)
     assert found.layers % 2 == 0
     assert found.body == 0
@@ -119,11 +119,11 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(
     monkeypatch.setattr(viewport_renderer, "PREPARING", 1e9)  # what is solved for in a frame is drawn in it
     work.do(ChoosePreset("whole_milk"))
     assert view.draw(work, SIZE)
-    assert "until its diffusion is solved for" in view.quality.told[1]
+    assert "until its diffusion is solved for" in view.quality.notes[1]
     assert view.plans[0] is not None
     assert view.plans[0].given_back.layered == (0,)
     finish(view, work)
-    assert view.quality.told[1] == ""
+    assert view.quality.notes[1] == ""
     assert view.plans[0].given_back.diffused == (0,)
     scene = work.scene()
     assert scene is not None
@@ -135,7 +135,7 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(
     for action, told in ((Turn(20.0, 10.0), ""), (SetField("look.light_yaw", 3.0), "on a small grid")):
         work.do(action)
         view.draw(work, SIZE)
-        assert (told in view.quality.told[1]) if told else not view.quality.told[1]
+        assert (told in view.quality.notes[1]) if told else not view.quality.notes[1]
         assert view.plans[0].given_back.diffusion == (SMALL if told else tl.Diffusion())
         assert work.lanes["diffuse"].task is None  # while the light moves, nothing is looked for that nobody will see
     finish(view, work)
@@ -165,7 +165,7 @@ def test_light_that_takes_long_to_solve_for_is_drawn_in_the_next_frame(
     assert [id(scene) for scene in drawn] == [id(scene) for scene in scenes[::2]]
     assert work.lanes["diffuse"].task is None
     finish(view, work)
-    assert view.quality.told[1] == ""
+    assert view.quality.notes[1] == ""
 
 
 def test_a_picture_that_takes_long_to_be_shown_has_frames_for_that(
@@ -207,7 +207,7 @@ def test_light_that_cannot_be_solved_for_is_told_once(
     monkeypatch.setattr(view.renderer.gpu.diffusion, "solve", fail)
     work.do(ChoosePreset("whole_milk"))
     finish(view, work)
-    assert "since it could not be solved for" in view.quality.told[1]
+    assert "since it could not be solved for" in view.quality.notes[1]
     assert [message.kind for message in work.messages] == ["error"]
     assert view.plans[0] is not None
     assert view.plans[0].given_back.layered == (0,)
@@ -242,10 +242,10 @@ def test_a_split_shows_another_method_and_then_the_reference(
     assert solid is not None
     assert sheet.thickness != solid.thickness
     work.do(SetField("display.compare", "reference"))
-    work.draw_truth(scene, None, SIZE, (1,))
+    work.draw_reference(scene, None, SIZE, (1,))
     wait(work, lambda: work.truth is not None and work.lanes["truth"].task is None)
     finish(view, work)
-    assert view.has_truth()
+    assert view.has_truth
     truth = view.probe(80, 48, 1)
     assert truth is not None
     assert truth.thickness == pytest.approx(solid.thickness, rel=1e-4, abs=1e-9)
@@ -308,7 +308,7 @@ def test_undo_brings_the_last_model_back(work: Workspace) -> None:
 def test_the_error_is_measured(work: Workspace) -> None:
     scene = work.scene()
     assert scene is not None
-    work.measure(scene, None, SIZE, lambda found: setattr(work, "measured", found))
+    work.measure(scene, None, SIZE)
     wait(work, lambda: work.lanes["draw"].task is None)
     found = work.measured
     assert found is not None

@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,8 @@ import translucent as tl
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box
 from translucent.preview import worker
-from translucent.preview.tasks import CancelledError, Report, Task
-from translucent.preview.worker import Pool, Urgency
+from translucent.preview.tasks import CancelledError, Task
+from translucent.preview.worker import Pool, Urgency, report
 
 _seen: list[Mesh] = []
 
@@ -33,41 +34,41 @@ def task() -> Task:
     return Task("baking", lambda _: None, lambda _: None)
 
 
-def pid(report: Report) -> int:
+def pid() -> int:
     return os.getpid()
 
 
-def slow(report: Report) -> None:
+def slow() -> None:
     report(0.5, str(os.getpid()))
     time.sleep(60.0)
 
 
-def steps(report: Report) -> None:
+def steps() -> None:
     for i in range(10_000):
         report(i / 10_000, str(os.getpid()))
         time.sleep(0.001)
 
 
-def dies(report: Report) -> None:
+def dies() -> None:
     os._exit(9)
 
 
-def warns(report: Report, text: str) -> Any:
+def warns(text: str) -> Any:
     warnings.warn(text, tl.TranslucentWarning, stacklevel=1)
     return np.arange(3)
 
 
-def refuses(report: Report) -> None:
+def refuses() -> None:
     raise tl.InputError("cheese", "it is no mesh", "give one")
 
 
-def same_mesh(report: Report, mesh: Mesh) -> tuple[bool, int]:
+def same_mesh(mesh: Mesh) -> tuple[bool, int]:
     """True if the mesh is the very one of the last call, and its number of faces."""
     _seen.append(mesh)
     return len(_seen) > 1 and _seen[-2] is mesh, len(mesh.faces)
 
 
-def alive(report: Report) -> int:
+def alive() -> int:
     """Number of meshes of other calls that there still are."""
     del _seen[:]
     kept = __import__("sys")._getframe(2).f_locals["kept"]
@@ -80,7 +81,7 @@ def plane(count: int) -> Mesh:
     return Mesh(corners, (np.arange(3 * count) % count).reshape(-1, 3))
 
 
-def held(report: Report, mesh: Mesh) -> None:
+def held(mesh: Mesh) -> None:
     report(None, str(os.getpid()))
     time.sleep(60.0)
 
@@ -91,24 +92,24 @@ def files(folder: str) -> set[str]:
     return {line.split()[4] for line in lines if folder in line}
 
 
-def grown(report: Report, mesh: Mesh, folder: str) -> tuple[Mesh, np.ndarray, set[str]]:
+def grown(mesh: Mesh, folder: str) -> tuple[Mesh, np.ndarray, set[str]]:
     """A larger mesh, normals, and the files that are mapped."""
     return Mesh(2.0 * mesh.vertices, mesh.faces), mesh.face_normals, files(folder)
 
 
-def mapped(report: Report, folder: str, mesh: Mesh) -> tuple[float, set[str]]:
+def mapped(folder: str, mesh: Mesh) -> tuple[float, set[str]]:
     return float(mesh.vertices[-1, 0]), files(folder)
 
 
-def policies(report: Report) -> set[int]:
+def policies() -> set[int]:
     return {os.sched_getscheduler(int(thread)) for thread in os.listdir("/proc/self/task")}
 
 
 def cancelling(task: Task) -> Callable[..., None]:
-    report = task.report
+    reported = task.report
 
     def cancel(share: float | None, detail: str = "") -> None:
-        report(share, detail)
+        reported(share, detail)
         if share is not None:
             task.cancel()
 
@@ -250,9 +251,8 @@ def runs(process: int) -> bool:
 class Fake:
     """A worker without a process, whose work is done when it is told."""
 
-    alive = True
-
     def __init__(self, _: object) -> None:
+        self.process = SimpleNamespace(is_alive=lambda: True)
         self.modules = set[str]()
 
     def ask(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from translucent.preview.viewport_renderer import ViewportRenderer
-from translucent.preview.workspace import Workspace, relights
+from translucent.preview.workspace import Workspace
 
 SIZE = (160, 96)
 
@@ -35,11 +35,11 @@ def finish(view: ViewportRenderer, work: Workspace) -> None:
     """Draw until nothing is left to draw, or to be compiled or solved for it."""
     end = time.monotonic() + 60.0
     lanes = work.compiler.lane, work.lanes["diffuse"], work.lanes["trace"]
-    while view.draw(work, SIZE) | (busy := relights(work) or any(lane.task is not None for lane in lanes)):
+    while view.draw(work, SIZE) | (busy := work.relights or any(lane.task is not None for lane in lanes)):
         assert time.monotonic() < end, "the picture is never done"
         work.update()
         if busy:
-            time.sleep(0.01)  # a stage that waits for a lane returns at once: turning round, it would slow the lane
+            time.sleep(0.01)  # a view that waits for a lane returns at once: turning round, it would slow the lane
 
 
 def pixels(view: ViewportRenderer) -> np.ndarray:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +14,7 @@ import click
 from translucent.commands.console import echo
 from translucent.commands.options import FileOptions, group, option, read_size, takes
 from translucent.errors import InputError, RenderError, TranslucentError, message_of
+from translucent.extras import require_package
 
 
 def _stage_words() -> str:
@@ -45,10 +48,9 @@ def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
     With --script, the window does what the script says, and closes; --screenshot keeps a picture of it. An action that
     fails does not stop the others; the exit code is then 1, or 2 where it asked for what cannot be.
     """
-    from translucent.preview.app import leave, require_display, run
     from translucent.preview.document import AUTO, Document, Look, Model
     from translucent.preview.script import Script, read_script
-    from translucent.preview.session import load_session, read_stage
+    from translucent.preview.session import Preferences, load_session
     from translucent.preview.tasks import problem
     from translucent.scene.stages import stage_named
 
@@ -65,13 +67,15 @@ def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
     if session is not None:
         document = load_session(session)
     else:
-        document = Document() if script or screenshot else Document(look=Look(stage=read_stage()))
+        document = Document() if script or screenshot else Document(look=Look(stage=Preferences.read().stage))
     if stage is not None:
         document = dataclasses.replace(document, look=dataclasses.replace(document.look, stage=stage))
     if model is not None:
         document = dataclasses.replace(document, model=Model(model, given.file.unit))
     todo = read_script(script) if script is not None else Script.of([]) if screenshot is not None else None
     require_display()
+    from translucent.preview.app import leave, run
+
     shot = str(screenshot) if screenshot is not None else None
     work = run(document, pixels, given.scale, todo, shot, given.file.allow_outside)
     failure = None if todo is None else work.failure
@@ -89,6 +93,20 @@ def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
     leave(work, 0 if error is None else 2 if isinstance(error, InputError) else 1)
     if error is not None:
         raise error
+
+
+def require_display() -> None:
+    """Raise if there is no display for a window, or no package that could open one.
+
+    Raises
+    ------
+    RenderError
+        It names the way without a window.
+    """
+    without = "without a window: translucent render MODEL -o picture.png"
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise RenderError("preview", "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)", without)
+    require_package("imgui_bundle", "preview", without)
 
 
 def _script_error(failure: Exception) -> TranslucentError:

@@ -4,23 +4,38 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from translucent.errors import InputError
 from translucent.formulas.phase import parse_phase
 from translucent.gltf.load import SUFFIXES
+from translucent.media.conversion import extinction_from_colors
 from translucent.media.medium import MAX_COEFFICIENT, Medium, color_at
 from translucent.media.presets import preset
-from translucent.preview import document as orbiting
-from translucent.preview.document import Assigned, Document, Material, Model, Orbit, checked
+from translucent.preview.document import (
+    Assigned,
+    Document,
+    Material,
+    Model,
+    Orbit,
+    Triple,
+    checked,
+    medium_fields,
+    panned,
+    triple_of,
+    turned,
+    zoomed,
+)
+
+#: Largest number of steps that can be undone.
+MAX_STEPS = 200
 
 
 @dataclass(frozen=True)
 class SetField:
-    """Action: give a field, such as ``material.roughness``, a value. Changes of one `drag` are one step of undo."""
+    """Give a field, such as ``material.roughness``, a value. Changes of one `drag` are one step of undo."""
 
     field: str
     value: Any
@@ -89,7 +104,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class Pan:
-    """Move the picture by shares of its height: to the right, and down."""
+    """Move the picture by fractions of its height: to the right, and down."""
 
     right: float
     down: float
@@ -109,10 +124,8 @@ Action = SetField | Open | ChoosePreset | Assign | Hide | Adopt | Replace | SetO
 #: Actions that move the camera: they are no undo steps, and undo leaves the camera where it is.
 CAMERA_ACTIONS = (SetOrbit, Turn, Pan, Zoom)
 
-#: Fields that define the medium by a color at a distance, or by coefficients.
-_BY_COLOR = ("color", "distance")
-_BY_COEFFICIENTS = ("absorption",)
-_OF_PRESET = ("scattering", "anisotropy", "phase", "emission")
+#: Fields with which a preset is none any more.
+_OF_PRESET = ("absorption", "scattering", "anisotropy", "phase", "emission")
 
 
 def apply(document: Document, action: Action) -> Document:
@@ -123,37 +136,39 @@ def apply(document: Document, action: Action) -> Document:
     InputError
         If there is no such field or preset, or a value is out of its range; the document is as it was.
     """
+    replace = partial(dataclasses.replace, document)
     match action:
         case SetField():
             return _changed(document, action)
         case Open():
-            return _opened(document, action)
+            model, material = Model(action.path, checked("model.unit", action.unit, "m")), document.material
+            # A glTF file shows its own media; on a mesh, which has none, a material of the user's own stays.
+            if Path(action.path).suffix.lower() in SUFFIXES or material.source == "file":
+                material = Material()
+            return replace(model=model, material=material, orbit=None, assigned=(), hidden=())
         case ChoosePreset():
-            return dataclasses.replace(document, material=preset_material(document.material, action.name))
+            return replace(material=preset_material(document.material, action.name))
         case Assign():
-            return _assigned(document, action)
+            assigned = {one.object: one for one in document.assigned if one.object != action.object}
+            if action.material is not None:
+                assigned[action.object] = Assigned(action.object, action.material)
+            return replace(assigned=tuple(assigned[number] for number in sorted(assigned)))
         case Hide():
-            return dataclasses.replace(document, hidden=tuple(sorted(set(action.objects))))
+            return replace(hidden=tuple(sorted(set(action.objects))))
         case Adopt():
-            return dataclasses.replace(document, material=action.material)
+            return replace(material=action.material)
         case Replace():
             return action.document
         case SetOrbit():
-            return dataclasses.replace(document, orbit=action.orbit)
-        case _:
-            if document.orbit is None:  # nothing is loaded yet, so that there is nothing to move
-                return document
-            return dataclasses.replace(document, orbit=_moved(document.orbit, action))
-
-
-def _moved(orbit: Orbit, action: Turn | Pan | Zoom) -> Orbit:
-    match action:
+            return replace(orbit=action.orbit)
+        case _ if document.orbit is None:  # nothing is loaded yet, so that there is nothing to move
+            return document
         case Turn():
-            return orbiting.turned(orbit, action.right, action.up)
+            return replace(orbit=turned(document.orbit, action.right, action.up))
         case Pan():
-            return orbiting.panned(orbit, action.right, action.down)
+            return replace(orbit=panned(document.orbit, action.right, action.down))
         case Zoom():
-            return orbiting.zoomed(orbit, action.factor, (action.right, action.down))
+            return replace(orbit=zoomed(document.orbit, action.factor, (action.right, action.down)))
 
 
 def _changed(document: Document, action: SetField) -> Document:
@@ -168,87 +183,51 @@ def _changed(document: Document, action: SetField) -> Document:
 
 
 def changed_material(material: Material, name: str, value: Any) -> Material:
-    """Material with another value of a field; raises `InputError` if that is out of its range."""
+    """Material with another value of a field, and its source accordingly.
+
+    Raises
+    ------
+    InputError
+        If the value is out of its range.
+    """
     value = checked(f"material.{name}", value, getattr(material, name))
     values = {name: value}
     if name == "phase":
         values["anisotropy"] = parse_phase(value).mean_cosine if value else 0.0
     elif name == "anisotropy":
         values["phase"] = ""
-    return _resourced(dataclasses.replace(material, **values), name)
-
-
-def _assigned(document: Document, action: Assign) -> Document:
-    others = [one for one in document.assigned if one.object != action.object]
-    if action.material is not None:
-        others.append(Assigned(action.object, action.material))
-    return dataclasses.replace(document, assigned=tuple(sorted(others, key=lambda one: one.object)))
-
-
-def _resourced(material: Material, edited: str) -> Material:
-    """Material with its source updated for an edited field."""
-    if edited in _BY_COLOR:
-        absorption = absorption_of_color(material)
-        return dataclasses.replace(material, source="color", preset="", absorption=absorption)
-    if edited in _BY_COEFFICIENTS or (edited in _OF_PRESET and material.source == "preset"):
-        return _stated(dataclasses.replace(material, source="coefficients", preset=""))
-    if material.source == "file" and edited != "source":
+    material = dataclasses.replace(material, **values)
+    if name in ("color", "distance"):
+        return dataclasses.replace(material, source="color", preset="", absorption=_absorption_of_color(material))
+    if name == "absorption" or (name in _OF_PRESET and material.source == "preset"):
+        return _with_color(dataclasses.replace(material, source="coefficients", preset=""))
+    if material.source == "file" and name != "source":
         return dataclasses.replace(material, source="coefficients")
     return material
 
 
-def absorption_of_color(material: Material) -> tuple[float, float, float]:
+def _absorption_of_color(material: Material) -> Triple:
     """Absorption in 1/m of a color at a distance."""
-    from translucent.media.conversion import extinction_from_colors
-
     absorption = extinction_from_colors(material.color, material.distance)
     if not (absorption <= MAX_COEFFICIENT).all():
-        raise InputError(
-            f"distance {material.distance:g} m", "so short that the extinction overflows", "check the unit"
-        )
-    red, green, blue = absorption.tolist()
-    return red, green, blue
-
-
-def _opened(document: Document, action: Open) -> Document:
-    model = Model(action.path, checked("model.unit", action.unit, "m"))
-    material = document.material
-    # A glTF file shows its own media; on a mesh, which has none, a material of the user's own stays.
-    if Path(action.path).suffix.lower() in SUFFIXES or material.source == "file":
-        material = Material()
-    return dataclasses.replace(document, model=model, material=material, orbit=None, assigned=(), hidden=())
+        found = "so short that the extinction overflows"
+        raise InputError(f"distance {material.distance:g} m", found, "check the unit")
+    return triple_of(absorption)
 
 
 def preset_material(material: Material, name: str) -> Material:
     """Material with the medium of a preset; polished, if it was rough as another preset's surfaces are."""
     found = preset(name)
-    medium = found.medium
-    kept = 0.0 if material.source == "preset" else material.roughness
-    filled = dataclasses.replace(
-        material,
-        source="preset",
-        preset=found.name,
-        absorption=tuple(found.absorption.tolist()),
-        scattering=tuple(found.scattering.tolist()),
-        emission=tuple(np.asarray(medium.emission).tolist()),
-        anisotropy=float(medium.anisotropy),
-        phase=str(medium.phase or ""),
-        ior=float(medium.ior),
-        roughness=found.roughness or kept,
-    )
-    return _stated(filled)
+    roughness = found.roughness or (0.0 if material.source == "preset" else material.roughness)
+    stated: dict[str, Any] = medium_fields(found.medium) | {"source": "preset", "preset": found.name}
+    return _with_color(dataclasses.replace(material, **stated, roughness=roughness))
 
 
-def _stated(material: Material) -> Material:
+def _with_color(material: Material) -> Material:
     """Material with the color at a distance of its coefficients, as ``translucent extinction`` states it."""
     medium = Medium(material.absorption, material.scattering)
     color, distance = color_at(medium, None if medium.extinction.any() else 1.0)
-    red, green, blue = np.asarray(color).tolist()
-    return dataclasses.replace(material, color=(red, green, blue), distance=float(distance))
-
-
-#: Largest number of steps that can be undone.
-MAX_STEPS = 200
+    return dataclasses.replace(material, color=triple_of(color), distance=float(distance))
 
 
 @dataclass(frozen=True)
@@ -259,7 +238,7 @@ class History:
     ----------
     present : Document
     past, future : tuple of Document
-        The last of `past` is what undo shows, the last of `future` what redo shows.
+        Undo shows the last of `past`, redo the last of `future`.
     drag : tuple of (str, int), optional
         Field, or object, and number of the drag that made the present one.
     """

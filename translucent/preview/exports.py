@@ -25,7 +25,7 @@ from translucent.media.presets import preset
 from translucent.planning.caustics import Caustics
 from translucent.planning.methods import Method
 from translucent.planning.scattering import Scattering
-from translucent.preview.document import AUTO, Document, Material, Orbit, camera_of, length_text
+from translucent.preview.document import AUTO, Document, Material, Orbit, camera_of, direction_from, length_text
 from translucent.preview.scenes import (
     Loaded,
     medium_of,
@@ -34,13 +34,11 @@ from translucent.preview.scenes import (
     scattering_of,
     stage_name,
     tone_of,
-    towards_light,
     turn_from,
 )
-from translucent.preview.tasks import Report, Task
-from translucent.preview.worker import Pool, Urgency
+from translucent.preview.tasks import Task
+from translucent.preview.worker import Pool, Urgency, report
 from translucent.renderer import Renderer
-from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene
 from translucent.scene.stages import NO_STAGE
@@ -62,6 +60,9 @@ MOVING = (".gif", ".webp", ".mp4")
 
 FPS = 24.0
 
+#: Samples of a pixel.
+SAMPLES = 16
+
 
 def check_export(path: str) -> None:
     """Raise before any work is done if a picture or turntable could not be written."""
@@ -74,7 +75,6 @@ def check_export(path: str) -> None:
 
 
 def write_picture(
-    report: Report,
     path: str,
     scene: Scene,
     method: Method | None,
@@ -84,17 +84,23 @@ def write_picture(
     scattering: Scattering | None = None,
     caustics: Caustics | None = None,
 ) -> None:
-    """Write a .png, or an .exr with all quantities; transparent, it lacks what is seen beside and behind the bodies."""
+    """Write a .png, or an .exr with all quantities; a transparent one has the bodies alone."""
     report(None, "drawing")
     with Renderer() as renderer:
-        ways: dict[str, Any] = {"scattering": scattering, "caustics": caustics}
-        frame = renderer.render(scene, size, method, samples=16, transparent=transparent, **ways)
+        frame = renderer.render(
+            scene,
+            size,
+            method,
+            samples=SAMPLES,
+            transparent=transparent,
+            scattering=scattering,
+            caustics=caustics,
+        )
     report(None, "writing")
     frame.save(path, *look)
 
 
 def write_turntable(
-    report: Report,
     path: str,
     scene: Scene,
     method: Method | None,
@@ -135,7 +141,7 @@ class Bake:
 
     @property
     def covered(self) -> float:
-        """Share of the texels that have a value."""
+        """Fraction of the texels that have a value."""
         return float(np.mean(self.map.coverage))
 
     def thickest_text(self, unit: str) -> str:
@@ -162,8 +168,8 @@ def bake_map(task: Task, pool: Pool, body: Object, medium: Medium, mode: str, si
     return Bake(baked, mode, painted(dataclasses.replace(body, mesh=baked.mesh), baked))
 
 
-def _bake(report: Report, mesh: Mesh, options: dict[str, Any]) -> tuple[ThicknessMap, npt.NDArray[np.float32]]:
-    """Bake a map; with what the picture needs of its mesh, which is diagnosed, too: its normals."""
+def _bake(mesh: Mesh, options: dict[str, Any]) -> tuple[ThicknessMap, npt.NDArray[np.float32]]:
+    """Bake a map; with the normals that the picture needs of its mesh, which is diagnosed, too."""
     from translucent.bake.bake import bake_thickness
 
     def progress(done: int, total: int, cast: int) -> None:
@@ -181,20 +187,15 @@ def painted(body: Object, baked: ThicknessMap) -> Scene:
     most = float(values.max(initial=0.0)) or 1.0
     colors = false_colors()[np.rint(np.clip(values / most, 0.0, 1.0) * 255).astype(np.intp)]
     colors[~np.asarray(baked.coverage, dtype=bool)] = EMPTY
-    paint = Surface(
-        transmission=0.0, roughness=1.0, color_texture=Texture(srgb_to_linear(colors / 255.0).astype(np.float32))
-    )
+    texture = Texture(srgb_to_linear(colors / 255.0).astype(np.float32))
+    paint = Surface(transmission=0.0, roughness=1.0, color_texture=texture)
     shown = dataclasses.replace(body, medium=Medium(absorption=1.0), surface=paint, sheet_thickness=None)
     return Scene([shown], camera_of(Orbit()), environment=Environment.constant((1.0, 1.0, 1.0)))
 
 
-#: Samples of a pixel, as of exported pictures.
-SAMPLES = 16
-
-
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Recipe:
-    """Picture to be told: the document, its model and scene, the size in pixels, and its photons."""
+    """How to make a picture again: the document, its model and scene, the size in pixels, and its photons."""
 
     document: Document
     loaded: Loaded
@@ -203,10 +204,10 @@ class Recipe:
     caustics: Caustics | None = None
 
     @property
-    def camera(self) -> Camera:
-        """Camera of the orbit."""
+    def orbit(self) -> Orbit:
+        """Orbit of the camera."""
         assert self.document.orbit is not None
-        return camera_of(self.document.orbit)
+        return self.document.orbit
 
     @property
     def stage(self) -> str:
@@ -216,139 +217,129 @@ class Recipe:
     @property
     def turn(self) -> float:
         """Degrees by which the stage is turned, as this camera sees it."""
-        return round(turn_from(self.document, self.loaded, self.camera), 6) + 0.0
-
-    @property
-    def kept(self) -> bool:
-        """True if the material is the one that ``translucent render`` gives the model by itself."""
-        return self.document.material == own_material(self.document.look, self.loaded)
-
-    def object_name(self, number: int) -> str | None:
-        """Name by which a command finds an object; None if others have it, too, or it has none."""
-        names = [item.mesh.name for item in self.loaded.scene.objects]
-        return names[number] if number < len(names) and names[number] and names.count(names[number]) == 1 else None
+        return round(turn_from(self.document, self.loaded, camera_of(self.orbit)), 6) + 0.0
 
     @property
     def output(self) -> str:
         """Name of the file."""
         return f"{Path(self.loaded.model.path).stem}.png"
 
-    @property
-    def is_own(self) -> bool:
-        """True if the model is one of the toolkit's own."""
-        path = self.loaded.model.path
-        return path in mesh_names() and not Path(path).exists()
 
-
-def command_line(shot: Recipe) -> tuple[str, list[str]]:
-    """Command that renders the picture, and what it leaves out, since no option says it."""
-    document, look, display = shot.document, shot.document.look, shot.document.display
-    model, orbit = shot.loaded.model, document.orbit
-    assert orbit is not None
-    words = ["translucent", "render", model.path, "-o", shot.output, "--size", f"{shot.size[0]}x{shot.size[1]}"]
+def command_line(recipe: Recipe) -> tuple[str, list[str]]:
+    """Command that renders the picture, and the parts of it that no option states."""
+    document, look, display = recipe.document, recipe.document.look, recipe.document.display
+    model, orbit = recipe.loaded.model, recipe.orbit
+    words = ["translucent", "render", model.path, "-o", recipe.output, "--size", f"{recipe.size[0]}x{recipe.size[1]}"]
     words += ["--unit", model.unit] if model.unit != "m" else []
-    medium, left_out = _medium_options(shot)
-    words += [*medium, "--eye", _numbers(shot.camera.eye), "--target", _numbers(orbit.target)]
-    words += ["--fov", f"{orbit.fov_y:.12g}", "--stage", shot.stage + (f",{shot.turn:g}" if shot.turn else "")]
-    turned = f",{look.rotation:g}" if look.rotation else ""
+    own = document.material == own_material(look, recipe.loaded)  # which translucent render gives the model by itself
+    medium, left_out = ([], []) if own else _medium_options(document.material)
+    words += medium
+    names = [item.mesh.name for item in recipe.loaded.scene.objects]
+    for one in document.assigned:
+        medium, lost = _medium_options(one.material)
+        if one.object < len(names) and (name := names[one.object]) and names.count(name) == 1:
+            words += ["--object", name, *medium]
+            left_out += [f"{part} of {name}" for part in lost]
+        else:
+            left_out.append(f"the material of object {one.object}")
+    words += ["--eye", _numbers(camera_of(orbit).eye), "--target", _numbers(orbit.target)]
+    words += ["--fov", f"{orbit.fov_y:.12g}", "--stage", recipe.stage + (f",{recipe.turn:g}" if recipe.turn else "")]
+    turned = f",{look.rotation:g}" if look.rotation and recipe.scene.environment.kind == "image" else ""
     lit = look.environment or ("light-table" if look.background else "")
-    words += ["--environment", lit + (turned if shot.scene.environment.kind == "image" else "")] if lit else []
+    words += ["--environment", lit + turned] if lit else []
     words += ["--background", look.background] if look.background else []
     words += ["--exposure", f"{look.exposure:g}"] if look.exposure else []
-    words += ["--tone", tone_of(look, shot.scene)]
+    words += ["--tone", tone_of(look, recipe.scene)]
     words += ["--method", display.method] if display.method != AUTO else []
     words += ["--thickness", f"{document.material.thickness:.12g}m"] if display.method == "thin-layer" else []
     words += ["--scattering", display.scattering] if display.scattering != AUTO else []
-    words += ["--caustics", str(shot.caustics.photons)] if shot.caustics else []
+    words += ["--caustics", str(recipe.caustics.photons)] if recipe.caustics else []
     left_out += ["the orthographic camera"] if orbit.orthographic else []
     left_out += ["the directional light"] if look.light else []
     left_out += ["hidden objects"] if document.hidden else []
     return shlex.join(words), left_out
 
 
-def _medium_options(shot: Recipe) -> tuple[list[str], list[str]]:
-    """Options for the medium and the finish of the bodies, and what they leave out."""
-    material = shot.document.material
-    words, left_out = ([], []) if shot.kept else _options_of(material)
-    for one in shot.document.assigned:
-        name = shot.object_name(one.object)
-        told, lost = _options_of(one.material)
-        if name is None:
-            left_out.append(f"the material of object {one.object}")
-        else:
-            words += ["--object", name, *told]
-            left_out += [f"{what} of {name}" for what in lost]
-    return words, left_out
-
-
-def _options_of(material: Material) -> tuple[list[str], list[str]]:
+def _medium_options(material: Material) -> tuple[list[str], list[str]]:
+    """Options for a medium and its surface, and the parts of them that no option states."""
     wanted = medium_of(material)
     if material.source == "preset":
         found, words = preset(material.preset).medium, ["--preset", material.preset]
     else:
         found = Medium.from_color(material.color, material.distance)
-        color = ",".join(f"{value:.12g}" for value in material.color)
-        words = ["--color", f"linear({color})", "--distance", f"{material.distance:.12g}m"]
+        words = ["--color", f"linear({_numbers(material.color)})", "--distance", f"{material.distance:.12g}m"]
     fields = {"ior": "the index of refraction", "scattering": "scattering", "emission": "emission"}
-    left_out = [told for name, told in fields.items() if np.any(getattr(found, name) != getattr(wanted, name))]
-    left_out += material.unsaid
-    return [*words, "--roughness", f"{material.roughness:g}"], left_out
+    left_out = [part for name, part in fields.items() if np.any(getattr(found, name) != getattr(wanted, name))]
+    return [*words, "--roughness", f"{material.roughness:g}"], left_out + material.unsaid
 
 
-def python_code(shot: Recipe) -> str:
+def python_code(recipe: Recipe) -> str:
     """Python that renders the picture."""
-    document, look, display = shot.document, shot.document.look, shot.document.display
-    model = shot.loaded.model
+    document, look, display = recipe.document, recipe.document.look, recipe.document.display
+    model, orbit, camera = recipe.loaded.model, recipe.orbit, camera_of(recipe.orbit)
     lines = ["import dataclasses", "", "import translucent as tl", "from translucent.assets import mesh_path"]
     lines += ["from translucent.scene.showcase import filled, named_environment", ""]
-    path = f"mesh_path({model.path!r})" if shot.is_own else repr(model.path)
+    is_own = model.path in mesh_names() and not Path(model.path).exists()
+    path = f"mesh_path({model.path!r})" if is_own else repr(model.path)
     unit = "" if model.unit == "m" else f", unit={model.unit!r}"
-    if shot.loaded.bare:
+    if recipe.loaded.bare:
         lines += [f"mesh = tl.load_mesh({path}{unit})", 'scene = tl.showcase(mesh, stage="none")']
     else:
         lines += [f"scene = tl.load_scene({path}{unit})"]
-    lines += _material_lines(shot) + _camera_lines(shot) + _stage_lines(shot)
-    if hidden := [i for i in document.hidden if i < len(shot.loaded.scene.objects)]:
+    count = len(recipe.loaded.scene.objects)
+    if document.material.source != "file" or recipe.loaded.bare:
+        lines += _filling_lines(document.material, None)
+    for one in document.assigned:
+        lines += _filling_lines(one.material, one.object) if one.object < count else []
+    ends = f"({_numbers(camera.eye, ', ')}), ({_numbers(orbit.target, ', ')})"
+    if camera.fov_y is None:
+        made = f"tl.Camera.orthographic({ends}, height={camera.height:.12g})"
+    else:
+        made = f"tl.Camera.look_at({ends}, fov_y={camera.fov_y:.12g})"
+    lines += [f"scene = dataclasses.replace(scene, camera={made})"]
+    own = ""
+    if look.environment or (look.background and recipe.stage != NO_STAGE):
+        own = f"named_environment({look.environment or 'light-table'!r}, {look.rotation:.12g})"
+    elif look.background:
+        own = "scene.environment"
+    if look.background:
+        own += f".with_background(named_environment({look.background!r}))"
+    if recipe.stage != NO_STAGE:
+        lines += [f"scene = tl.staged(scene, {recipe.stage!r}, {own or None}, turn={recipe.turn:g})"]
+    elif own:
+        lines += [f"scene = dataclasses.replace(scene, environment={own})"]
+    if hidden := [i for i in document.hidden if i < count]:
         shown = f"[item for i, item in enumerate(scene.objects) if i not in {hidden}]"
         lines += [f"scene = dataclasses.replace(scene, objects={shown})"]
     if look.light:
-        way = tuple(-value for value in towards_light(look))
-        light = f"tl.DirectionalLight(({_numbers(way, ', ')}), {look.light_irradiance:.12g})"
+        towards = _numbers(-direction_from(look.light_yaw, look.light_pitch), ", ")
+        light = f"tl.DirectionalLight(({towards}), {look.light_irradiance:.12g})"
         lines += [f"scene = dataclasses.replace(scene, lights=[*scene.lights, {light}])"]
-    ways = [f"samples={SAMPLES}"]
+    choices = [f"samples={SAMPLES}"]
     if (method := method_of(display.method, document.material)) is not None:
-        ways += [f"method=tl.{method!r}"]
+        choices += [f"method=tl.{method!r}"]
     if (scattering := scattering_of(display.scattering)) is not None:
-        ways += [f"scattering=tl.{scattering!r}"]
-    if shot.caustics is not None:
-        ways += [f"caustics=tl.Caustics({shot.caustics.photons})"]
-    lines += ["with tl.Renderer() as renderer:", f"    frame = renderer.render(scene, {shot.size}, {', '.join(ways)})"]
-    lines += [f"frame.save({shot.output!r}, exposure={look.exposure:.12g}, tone={tone_of(look, shot.scene)!r})", ""]
+        choices += [f"scattering=tl.{scattering!r}"]
+    if recipe.caustics is not None:
+        choices += [f"caustics=tl.Caustics({recipe.caustics.photons})"]
+    lines += ["with tl.Renderer() as renderer:"]
+    lines += [f"    frame = renderer.render(scene, {recipe.size}, {', '.join(choices)})"]
+    lines += [f"frame.save({recipe.output!r}, exposure={look.exposure:.12g}, tone={tone_of(look, recipe.scene)!r})", ""]
     return "\n".join(lines)
 
 
-def _material_lines(shot: Recipe) -> list[str]:
-    lines = _filling_lines(shot, shot.document.material, None)
-    for one in shot.document.assigned:
-        if one.object < len(shot.loaded.scene.objects):
-            lines += _filling_lines(shot, one.material, one.object)
-    return lines
-
-
-def _filling_lines(shot: Recipe, material: Material, number: int | None) -> list[str]:
-    """Lines that fill all bodies, or one object."""
+def _filling_lines(material: Material, number: int | None) -> list[str]:
+    """Lines of Python that fill all bodies, or one object."""
     medium = medium_of(material)
-    if material.source == "file" and not shot.loaded.bare and number is None:
-        return []
     triples = (
         f"{name}=({_numbers(np.asarray(getattr(medium, name)), ', ')})"
         for name in ("absorption", "scattering", "emission")
     )
     phase = f"phase=tl.{medium.phase!r}" if medium.phase else f"anisotropy={medium.anisotropy:.12g}"
-    told = f"{', '.join(triples)}, {phase}, ior={medium.ior:.12g}"
+    stated = f"{', '.join(triples)}, {phase}, ior={medium.ior:.12g}"
     among = "" if number is None else f", [scene.objects[{number}]]"
     chosen = "item.medium is not None" if number is None else f"item is scene.objects[{number}]"
-    lines = [f"scene = filled(scene, tl.Medium({told}){among})"]
+    lines = [f"scene = filled(scene, tl.Medium({stated}){among})"]
     if material.source == "file" and number is None:
         return lines
     finish = ", ".join(f"{name}={value:.12g}" for name, value in material.finish.items())
@@ -361,30 +352,6 @@ def _filling_lines(shot: Recipe, material: Material, number: int | None) -> list
         "    for item in scene.objects",
         "])",
     ]
-
-
-def _camera_lines(shot: Recipe) -> list[str]:
-    orbit, camera = shot.document.orbit, shot.camera
-    assert orbit is not None
-    ends = f"({_numbers(camera.eye, ', ')}), ({_numbers(orbit.target, ', ')})"
-    if camera.fov_y is None:
-        made = f"tl.Camera.orthographic({ends}, height={camera.height:.12g})"
-    else:
-        made = f"tl.Camera.look_at({ends}, fov_y={camera.fov_y:.12g})"
-    return [f"scene = dataclasses.replace(scene, camera={made})"]
-
-
-def _stage_lines(shot: Recipe) -> list[str]:
-    look, own = shot.document.look, ""
-    if look.environment or (look.background and shot.stage != NO_STAGE):
-        own = f"named_environment({look.environment or 'light-table'!r}, {look.rotation:.12g})"
-    elif look.background:
-        own = "scene.environment"
-    if look.background:
-        own += f".with_background(named_environment({look.background!r}))"
-    if shot.stage != NO_STAGE:
-        return [f"scene = tl.staged(scene, {shot.stage!r}, {own or None}, turn={shot.turn:g})"]
-    return [f"scene = dataclasses.replace(scene, environment={own})"] if own else []
 
 
 def _numbers(values: Iterable[float], between: str = ",") -> str:

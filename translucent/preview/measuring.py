@@ -1,4 +1,4 @@
-"""Measurements in a worker process: errors against the reference, histograms, crossings of one ray."""
+"""Comparison with the float64 reference: errors of a small picture, whole pictures, and single rays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.assets import newest_shader
 from translucent.errors import InputError, TranslucentWarning
 from translucent.formulas.color import to_hex
 from translucent.frames.appearance import average_color, thickness_samples
@@ -20,103 +19,36 @@ from translucent.frames.frame import Frame
 from translucent.frames.metrics import Errors, compare
 from translucent.media.medium import Medium
 from translucent.planning.methods import Method
-from translucent.preview.tasks import Report
-from translucent.renderer import Renderer
+from translucent.preview.worker import report, worker_renderer
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Texture
-
-#: Thickness of the sheet that stands for paint, in diagonals of its object.
-THIN = 1e-6
-
-#: Largest side of a texture of paint in pixels: a small picture shows no more.
-MOST = 512
-
-
-def with_paint(straight: Scene, scene: Scene) -> Scene:
-    """Scene of straight rays, with the matt colors of opaque objects, and layers of paint on bodies.
-
-    Parameters
-    ----------
-    straight : Scene
-        Without the optical effects of interfaces.
-    scene : Scene
-        The same with them. Its objects are shown as they are, in their order.
-    """
-    objects: list[Object] = []
-    for plain, item in zip(straight.objects, scene.shown, strict=True):
-        if item.medium is None and item.surface is not None:
-            plain = dataclasses.replace(plain, surface=_matt(item.surface))
-        objects.append(plain)
-        if (paint := _paint(item)) is not None:
-            objects.append(paint)
-    return dataclasses.replace(straight, objects=objects)
-
-
-def shows_paint(scene: Scene) -> bool:
-    """True if its surfaces show more than straight rays do without them."""
-    return any((item.medium is None and item.surface is not None) or _paint(item) is not None for item in scene.shown)
-
-
-def _matt(surface: Surface) -> Surface:
-    return Surface(
-        color=surface.color,
-        color_texture=surface.color_texture,
-        emissive=surface.emissive,
-        emissive_texture=surface.emissive_texture,
-        alpha_cutoff=surface.alpha_cutoff,
-    )
-
-
-def _paint(item: Object) -> Object | None:
-    """Layer that covers as much of a body as does not let light in; None if all does."""
-    surface = item.surface
-    if item.medium is None or surface is None or item.covers:
-        return None
-    if surface.transmission == 1.0 and surface.transmission_texture is None:
-        return None
-    texture = surface.color_texture
-    if surface.transmission_texture is not None:
-        texture = _covering(texture, surface.transmission_texture, surface.transmission)
-    opacity = 1.0 if surface.transmission_texture is not None else 1.0 - surface.transmission
-    paint = Surface(color=surface.color, color_texture=texture, opacity=opacity)
-    thin = THIN * float(np.linalg.norm(np.ptp(item.bounds, axis=0)))
-    return Object(item.mesh, Medium(), transform=item.matrix, surface=paint, sheet_thickness=thin)
-
-
-@lru_cache(maxsize=8)
-def _covering(color: Texture | None, entering: Texture, transmission: float) -> Texture:
-    """Texture of the color of paint, and as its opacity the share of light that does not enter."""
-    pictures = [one for one in (color, entering) if one is not None]
-    height, width = (min(max(one.pixels.shape[i] for one in pictures), MOST) for i in (0, 1))
-    v, u = np.meshgrid(1.0 - (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width, indexing="ij")
-    at = np.stack([u, v], axis=-1)
-    pixels = np.ones((height, width, 4), dtype=np.float32)
-    if color is not None:
-        pixels[..., :3] = color.sample(at)[..., :3]
-    pixels[..., 3] = 1.0 - transmission * entering.sample(at)[..., 0]
-    return Texture(np.clip(pixels, 0.0, 1.0), wrap=entering.wrap)
-
 
 Size = tuple[int, int]
 
 #: Height of the picture that is compared with the reference, in pixels.
 MEASURED_HEIGHT = 90
 
-#: The same where media scatter light of lamps, which the reference has to look for from every place: a pixel takes a
-#: hundred times as long.
+#: The same where media scatter the light of point lights, which the reference has to look for from every place: a pixel
+#: takes a hundred times as long.
 LIT_HEIGHT = 30
 
-#: Largest number of triangles of a scene that is measured without being asked to: of 5 million, the reference takes 20
-#: seconds and 2 GB.
+#: Largest number of triangles of a scene that is measured though nobody requests it: of 5 million, the reference takes
+#: 20 seconds and 2 GB.
 MOST_TRIANGLES = 2_000_000
 
-#: Shares of the viewport's size at which the split's reference is drawn, one after the other.
+#: Divisors of the viewport's size at which the split's reference is drawn, one after the other.
 LEVELS = (8, 4, 2, 1)
 
-#: Bodies with an interface are followed through refraction in the reference: 20 times the work for a pixel.
+#: The same where the reference follows rays through refracting interfaces: 20 times the work for a pixel.
 BENT_LEVELS = (16, 8)
+
+#: Thickness of the sheet that shows a diffuse base, in diagonals of its object.
+THIN = 1e-6
+
+#: Largest side of a texture of a diffuse base in pixels: a small picture shows no more.
+MOST = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,10 +72,15 @@ class ThicknessStatistics:
     invalid: int
 
     @classmethod
-    def of(cls, thickness: Array, pixels: int, invalid: int) -> ThicknessStatistics:
+    def of(cls, frame: Frame) -> ThicknessStatistics:
         """Thickness statistics of a frame, with a histogram of 48 bins."""
+        try:
+            thickness = thickness_samples(frame)
+        except InputError:
+            thickness = np.zeros(0)
         most = float(thickness.max(initial=0.0)) or 1.0
         counts, edges = np.histogram(thickness, bins=48, range=(0.0, most))
+        pixels, invalid = int(np.count_nonzero(frame.coverage)), int(np.count_nonzero(~frame.valid))
         return cls(thickness, counts / max(int(counts.max()), 1), edges, pixels, invalid)
 
     def average_hex(self, medium: Medium) -> str:
@@ -152,37 +89,32 @@ class ThicknessStatistics:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
-    """Comparison of a small picture of the viewport with the truth.
+class Measurement:
+    """Comparison of a small picture of the viewport with the reference.
 
     Attributes
     ----------
     errors : tuple of Errors
         Of thickness and transmittance; empty if there is nothing to compare.
     doubt : str
-        Why they are empty.
+        The reason for that.
     seen : ThicknessStatistics
     truth : (h, w, 3) uint8
-        The reference as a picture, for a corner of the viewport, with the paint of its surfaces.
+        The reference as a picture, for a corner of the viewport, with the diffuse base of its surfaces.
+    scene : Scene, optional
+        The scene on show, once it is known here.
     """
 
     errors: tuple[Errors, ...]
     doubt: str
     seen: ThicknessStatistics
     truth: npt.NDArray[np.uint8]
-
-
-@dataclass(frozen=True, eq=False)
-class Measurement(Compared):
-    """Comparison together with its scene and method."""
-
-    scene: Scene
-    method: Method | None
+    scene: Scene | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class ReferencePicture:
-    """Reference of a whole picture, at a share of its size; of straight rays, or with refraction."""
+    """Reference of a whole picture, its size divided by `level`; of straight rays, or with refraction."""
 
     scene: Scene
     method: Method | None
@@ -198,36 +130,25 @@ class Crossing:
     Attributes
     ----------
     thickness : float
-        Metres.
+        In metres.
     layers : int
-        Surfaces of bodies.
-    optical_depth, transmittance : tuple of 3 floats
-    valid : bool
+        Number of surfaces of bodies.
     body : int, optional
-        Number of the first object that is met.
+        Number of the first object that is hit.
     """
 
     thickness: float
     layers: int
-    optical_depth: tuple[float, ...]
-    transmittance: tuple[float, ...]
-    valid: bool
     body: int | None
 
 
-@lru_cache(maxsize=1)
-def _renderer(written: float) -> Renderer:
-    """Renderer of the worker process, for one version of the shaders."""
-    return Renderer()
-
-
 def measurable(scene: Scene) -> bool:
-    """True if a scene is small enough to be measured without being asked to."""
+    """True if a scene is small enough to be measured though nobody requests it."""
     return sum(len(item.mesh.faces) for item in scene.objects) <= MOST_TRIANGLES
 
 
-def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> Compared:
-    """Compare a small picture of the scene with the reference, as straight rays see both."""
+def measure(scene: Scene, method: Method | None, size: Size) -> Measurement:
+    """Compare a small picture of the scene with the reference, both of straight rays."""
     lit = bool(scene.lights) and any(item.medium is not None and item.medium.scatters for item in scene.objects)
     height = LIT_HEIGHT if lit else MEASURED_HEIGHT
     small = max(round(height * size[0] / size[1]), 1), height
@@ -235,23 +156,79 @@ def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> 
     report(None, "drawing")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TranslucentWarning)  # invalid pixels are counted, below
-        frame = _renderer(newest_shader()).render(plain, small, method)
+        frame = worker_renderer().render(plain, small, method)
     report(None, "float64 reference")
-    truth = _reference(plain, small, method)
-    errors: tuple[Errors, ...] = ()
-    doubt = ""
+    truth = reference_frame(plain, method, small)
+    errors, doubt = tuple[Errors, ...](), ""
     try:
-        errors = (compare(frame, truth, "thickness"), compare(frame, truth, "transmittance"))
+        errors = compare(frame, truth, "thickness"), compare(frame, truth, "transmittance")
     except InputError as error:
         doubt = str(error)
-    covered = int(np.count_nonzero(frame.coverage))
-    try:
-        samples = thickness_samples(frame)
-    except InputError:
-        samples = np.zeros(0)
-    seen = ThicknessStatistics.of(samples, covered, int(np.count_nonzero(~frame.valid)))
-    shown = _reference(with_paint(plain, scene), small, method) if shows_paint(scene) else truth
-    return Compared(errors, doubt, seen, shown.to_srgb8())
+    colored = with_diffuse_base(plain, scene)
+    inset = truth if colored is plain else reference_frame(colored, method, small)
+    return Measurement(errors, doubt, ThicknessStatistics.of(frame), inset.to_srgb8())
+
+
+def reference_frame(scene: Scene, method: Method | None, size: Size) -> Frame:
+    """Reference of a scene, which follows rays through interfaces; straight on where sheets have holes."""
+    from translucent import reference  # late: a window opens without it
+
+    holes = any(item.has_holes for item in scene.objects)
+    return reference.render(scene, size, method, refraction=False if holes else None)
+
+
+def reference_plan(scene: Scene, levels: tuple[int, ...] | None = None) -> tuple[Scene, tuple[int, ...]]:
+    """Scene of a whole reference picture, and the divisors of its size at which it is drawn, coarse first.
+
+    With `levels` given it is that of straight rays, for differences of thickness.
+    """
+    bent = any(item.has_interface for item in scene.objects) and levels is None
+    textured = any(
+        item.mesh.colors is not None or (item.surface is not None and any(item.surface.textures))
+        for item in scene.objects
+    )
+    if not bent or textured:
+        return straight(scene), levels or LEVELS
+    return scene, BENT_LEVELS
+
+
+def crossing(scene: Scene, size: Size, pixel: Size) -> Crossing:
+    """Trace the ray through a pixel's center in the reference."""
+    camera = pixel_camera(scene.camera, size, pixel)
+    frame = reference_frame(dataclasses.replace(straight(scene), camera=camera), None, (1, 1))
+    hits = _hits(scene, camera)
+    layers = sum(len(found) for item, found in zip(scene.objects, hits, strict=True) if item.medium is not None)
+    return Crossing(float(frame.thickness[0, 0]), layers, _first(hits))
+
+
+def first_object(scene: Scene, size: Size, pixel: Size) -> int | None:
+    """Number of the first object on the ray through a pixel's center; None if there is none."""
+    return _first(_hits(scene, pixel_camera(scene.camera, size, pixel)))
+
+
+def _hits(scene: Scene, camera: Camera) -> list[Array]:
+    """Distances at which the ray of a camera with one pixel hits each object, in order."""
+    from translucent.reference.hits import camera_hits  # late: a window opens without it
+
+    return [camera_hits(item.mesh, item.matrix, camera, (1, 1)).distance for item in scene.objects]
+
+
+def _first(hits: list[Array]) -> int | None:
+    found = [(float(distances[0]), i) for i, distances in enumerate(hits) if len(distances)]
+    return min(found)[1] if found else None
+
+
+def pixel_camera(camera: Camera, size: Size, pixel: Size) -> Camera:
+    """Camera with one pixel, whose ray is that of a pixel of another camera."""
+    half_width, half_height = camera.half_extent(size)
+    x = ((pixel[0] + 0.5) / size[0] * 2 - 1) * half_width
+    y = (1 - (pixel[1] + 0.5) / size[1] * 2) * half_height
+    across = x * camera.right + y * camera.up
+    if camera.fov_y is None:
+        eye = camera.eye + across
+        return Camera.orthographic(eye, eye + camera.forward, camera.up, height=2 * half_height / size[1])
+    fov = 2.0 * math.degrees(math.atan(half_height / size[1]))
+    return Camera.look_at(camera.eye, camera.eye + camera.forward + across, camera.up, fov_y=fov)
 
 
 def straight(scene: Scene) -> Scene:
@@ -267,16 +244,10 @@ def _index_matched(item: Object) -> Object:
         return item if item.surface is None else dataclasses.replace(item, surface=None)
     if not item.has_interface:
         return item
-    medium = dataclasses.replace(item.medium, ior=1.0)
-    return dataclasses.replace(item, medium=medium, surface=_holes(item))
-
-
-def _holes(item: Object) -> Surface | None:
-    """Surface that has the holes of a thin sheet, and changes no light beside them."""
-    surface = item.surface
-    if not item.has_holes or surface is None or surface.color_texture is None or item.mesh.colors is not None:
-        return None
-    return Surface(color_texture=_only_alpha(surface.color_texture), alpha_cutoff=surface.alpha_cutoff)
+    surface, holes = item.surface, None
+    if item.has_holes and surface is not None and surface.color_texture is not None and item.mesh.colors is None:
+        holes = Surface(color_texture=_only_alpha(surface.color_texture), alpha_cutoff=surface.alpha_cutoff)
+    return dataclasses.replace(item, medium=dataclasses.replace(item.medium, ior=1.0), surface=holes)
 
 
 @lru_cache(maxsize=8)
@@ -287,79 +258,55 @@ def _only_alpha(texture: Texture) -> Texture:
     return dataclasses.replace(texture, pixels=pixels)
 
 
-def _reference(scene: Scene, size: Size, method: Method | None = None) -> Frame:
-    """Reference of a scene, which follows rays through interfaces; straight on where sheets have holes."""
-    from translucent import reference  # late: a window opens without it
+def with_diffuse_base(straight: Scene, scene: Scene) -> Scene:
+    """Scene of straight rays with the colors of opaque objects, and sheets that show the diffuse base of bodies.
 
-    holes = any(item.has_holes for item in scene.objects)
-    return reference.render(scene, size, method, refraction=False if holes else None)
-
-
-def truth_plan(scene: Scene, levels: tuple[int, ...] | None = None) -> tuple[Scene, tuple[int, ...]]:
-    """Plan of the reference of a whole picture: its scene, and the shares of its size at which it is drawn, coarse
-    first.
-
-    With `levels` given it is that of straight rays, for differences of thickness.
+    Parameters
+    ----------
+    straight : Scene
+        Without the optical effects of interfaces; the result where there are no such colors.
+    scene : Scene
+        The same with them. Its objects are shown as they are, in their order.
     """
-    bent = any(item.has_interface for item in scene.objects) and levels is None
-    textured = any(
-        item.mesh.colors is not None or (item.surface is not None and any(item.surface.textures))
-        for item in scene.objects
-    )
-    if not bent or textured:
-        return straight(scene), levels or LEVELS
-    return scene, BENT_LEVELS
+    objects: list[Object] = []
+    for plain, item in zip(straight.objects, scene.shown, strict=True):
+        surface = item.surface
+        if item.medium is None and surface is not None:
+            names = "color", "color_texture", "emissive", "emissive_texture", "alpha_cutoff"
+            colors = Surface(**{name: getattr(surface, name) for name in names})
+            objects.append(dataclasses.replace(plain, surface=colors))
+        else:
+            objects.append(plain)
+        objects += _diffuse_sheet(item)
+    if list(map(id, objects)) == list(map(id, straight.objects)):
+        return straight
+    return dataclasses.replace(straight, objects=objects)
 
 
-def truth_frame(report: Report, scene: Scene, method: Method | None, size: Size) -> Frame:
-    """Render the reference of a picture."""
-    return _reference(scene, size, method)
+def _diffuse_sheet(item: Object) -> list[Object]:
+    """Sheet that covers a body with its diffuse base; none if all light enters."""
+    surface = item.surface
+    if item.medium is None or surface is None or item.covers:
+        return []
+    opacity, texture = 1.0 - surface.transmission, surface.color_texture
+    if surface.transmission_texture is not None:
+        opacity, texture = 1.0, _covering(texture, surface.transmission_texture, surface.transmission)
+    elif opacity == 0.0:
+        return []
+    thin = THIN * float(np.linalg.norm(np.ptp(item.bounds, axis=0)))
+    base = Surface(color=surface.color, color_texture=texture, opacity=opacity)
+    return [Object(item.mesh, Medium(), transform=item.matrix, surface=base, sheet_thickness=thin)]
 
 
-def crossing(report: Report, scene: Scene, size: Size, pixel: Size) -> Crossing:
-    """Trace the ray through a pixel's center in the reference."""
-    from translucent.reference.hits import camera_hits
-
-    camera = pixel_camera(scene.camera, size, pixel)
-    one = dataclasses.replace(straight(scene), camera=camera)
-    frame = _reference(one, (1, 1))
-    layers, nearest, body = 0, math.inf, None
-    for i, item in enumerate(scene.objects):
-        hits = camera_hits(item.mesh, item.matrix, camera, (1, 1))
-        layers += len(hits.distance) if item.medium is not None else 0
-        if len(hits.distance) and hits.distance[0] < nearest:
-            nearest, body = float(hits.distance[0]), i
-    return Crossing(
-        float(frame.thickness[0, 0]),
-        layers,
-        tuple(frame.optical_depth[0, 0].tolist()),
-        tuple(frame.transmittance[0, 0].tolist()),
-        bool(frame.valid[0, 0]),
-        body,
-    )
-
-
-def first_object(scene: Scene, size: Size, pixel: Size) -> int | None:
-    """Number of the first object on the ray through a pixel's center; None if there is none."""
-    from translucent.reference.hits import camera_hits
-
-    camera = pixel_camera(scene.camera, size, pixel)
-    nearest, found = math.inf, None
-    for i, item in enumerate(scene.objects):
-        hits = camera_hits(item.mesh, item.matrix, camera, (1, 1))
-        if len(hits.distance) and hits.distance[0] < nearest:
-            nearest, found = float(hits.distance[0]), i
-    return found
-
-
-def pixel_camera(camera: Camera, size: Size, pixel: Size) -> Camera:
-    """Camera with one pixel, whose ray is that of a pixel of another camera."""
-    half_width, half_height = camera.half_extent(size)
-    x = ((pixel[0] + 0.5) / size[0] * 2 - 1) * half_width
-    y = (1 - (pixel[1] + 0.5) / size[1] * 2) * half_height
-    across = x * camera.right + y * camera.up
-    if camera.fov_y is None:
-        eye = camera.eye + across
-        return Camera.orthographic(eye, eye + camera.forward, camera.up, height=2 * half_height / size[1])
-    fov = 2.0 * math.degrees(math.atan(half_height / size[1]))
-    return Camera.look_at(camera.eye, camera.eye + camera.forward + across, camera.up, fov_y=fov)
+@lru_cache(maxsize=8)
+def _covering(color: Texture | None, entering: Texture, transmission: float) -> Texture:
+    """Texture of the color of a diffuse base, and as its opacity the fraction of light that does not enter."""
+    pictures = [one for one in (color, entering) if one is not None]
+    height, width = (min(max(one.pixels.shape[i] for one in pictures), MOST) for i in (0, 1))
+    v, u = np.meshgrid(1.0 - (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width, indexing="ij")
+    at = np.stack([u, v], axis=-1)
+    pixels = np.ones((height, width, 4), dtype=np.float32)
+    if color is not None:
+        pixels[..., :3] = color.sample(at)[..., :3]
+    pixels[..., 3] = 1.0 - transmission * entering.sample(at)[..., 0]
+    return Texture(np.clip(pixels, 0.0, 1.0), wrap=entering.wrap)

@@ -1,8 +1,9 @@
-"""Refinement of a still picture: path tracing, and the light of photons."""
+"""Refinement of a still picture, as long as nobody changes anything: path tracing, or the light of photons."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 from translucent.diffusion.keys import diffusion_key
 from translucent.errors import InputError
@@ -11,34 +12,41 @@ from translucent.gpu.photon_light import PhotonLight
 from translucent.gpu.viewport import Viewport
 from translucent.planning.caustic_plan import lit_by_photons
 from translucent.planning.caustics import Caustics
-from translucent.planning.methods import Method, PathTraced
+from translucent.planning.methods import PathTraced
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.planning.scattering import Scattering
 from translucent.planning.scattering.choice import shown
 from translucent.preview.quality import solve_aside
-from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
-#: What the plan of such a picture is made for; how many paths there are is seen as it goes on.
+#: Method of a path traced picture; how many paths there are is seen as it goes on.
 PATHS = PathTraced(paths=2)
 
+#: Photons of a round, rounds after which they are first shown, and photons after which a picture is done.
+ROUND, FIRST_ROUNDS, MOST_PHOTONS = 1 << 14, 4, 1 << 26
 
-class Converging:
-    """Path tracing of the scene on show.
+#: Seconds of following photons for each second of drawing, at least.
+SHARE = 0.1
+
+#: Noise of the picture, as a fraction of its mean radiance, at which it is done, too.
+QUIET = 1e-3
+
+
+class PathRefinement:
+    """Path tracing of the scene on show, in place of the interactive method.
 
     Attributes
     ----------
-    told : str
+    note : str
         How many paths there are, and how noisy they are; or why there are none; or nothing.
     plan : RenderPlan, optional
-        Of the paths, while they are followed.
+        Plan of the paths, while they are followed.
     """
 
     def __init__(self) -> None:
-        self.told = ""
+        self.note = ""
         self.plan: RenderPlan | None = None
         self._scene: Scene | None = None
         self._held: Convergence | None = None
@@ -53,10 +61,10 @@ class Converging:
                 return False, False
             if self._held is None:
                 self._held = Convergence(renderer.gpu, scene, viewport.size, self.plan)
-                self.told = "converging: the first paths"
+                self.note = "converging: the first paths"
                 return True, False
         except InputError as error:
-            self.told = f"not converging: {error}"
+            self.note = f"not converging: {error}"
             return False, False
         held = self._held
         if held.done:
@@ -64,7 +72,7 @@ class Converging:
         if changed := held.step(seconds):
             viewport.take(0, held.job)
             state = "converged" if held.done else "converging"
-            self.told = f"{state}: {held.paths} paths, standard error {held.error:.2%}"
+            self.note = f"{state}: {held.paths} paths, standard error {held.error:.2%}"
         return not held.done, changed
 
     def stop(self) -> bool:
@@ -73,36 +81,26 @@ class Converging:
         if self._held is not None:
             self._held.release()
         self._scene = self._held = self.plan = None
-        self.told = ""
+        self.note = ""
         return was
 
 
-#: Photons of a round, rounds after which they are first shown, and photons after which a picture is done.
-ROUND, FIRST_ROUNDS, MOST_PHOTONS = 1 << 14, 4, 1 << 26
-
-#: Seconds of following photons for each second of drawing, at least.
-SHARE = 0.1
-
-#: Noise of the picture, as a share of its mean radiance, at which it is done, too.
-QUIET = 1e-3
-
-
-class Photons:
+class PhotonRefinement:
     """Photons of the scene on show, and pictures with their light: the next is drawn aside, and then takes over.
 
     Each picture has twice the photons of the one before at least, and more where drawing it takes long.
 
     Attributes
     ----------
-    told : str
+    note : str
         How many photons there are, and how noisy their light is; or why there are none; or nothing.
     plan : RenderPlan, optional
-        With caustics, while photons are followed.
+        Plan with caustics, while photons are followed.
     light : PhotonLight, optional
     drawing : bool
         A picture is to be drawn with the light as it is.
     side : int
-        Of the viewport, on which it is: 1 until it has taken over.
+        Side of the viewport with that picture: 1 until it has taken over.
     in_media : bool
         The light of photons in media is known.
     """
@@ -111,13 +109,12 @@ class Photons:
         self._reset()
 
     def _reset(self) -> None:
-        self.told = ""
+        self.note = ""
         self.plan: RenderPlan | None = None
         self.light: PhotonLight | None = None
         self.drawing, self.side, self._on_show, self.in_media = False, 1, False, False
         self._in_texture = self._in_picture = 0  # photons
         self._scene: Scene | None = None
-        self._solving: Task | None = None
         self._noise, self._next = float("inf"), FIRST_ROUNDS
         self._following = self._drawing = self._begun = 0.0  # seconds spent, and when drawing began
 
@@ -127,31 +124,40 @@ class Photons:
         scene: Scene,
         renderer: Renderer,
         viewport: Viewport,
-        method: Method | None,
-        scattering: Scattering | None,
+        plan: Callable[..., RenderPlan],
         seconds: float,
         drawing: float,
     ) -> bool:
         """Follow photons for about so many seconds, unless a picture is being drawn; whether any are to be followed.
 
-        Pictures are expected to take `drawing` seconds. Those that light media are followed first, all at once, in a
-        worker process.
+        Photons that light media are followed first, all at once, in a worker process.
+
+        Parameters
+        ----------
+        workspace : Workspace
+        scene : Scene
+        renderer : Renderer
+        viewport : Viewport
+        plan : callable
+            Plans the picture, with the caustics that it is given.
+        seconds : float
+        drawing : float
+            Seconds that a picture is expected to take.
         """
         try:
             if self._scene is not scene:
                 self.stop(viewport)
-                self._scene = scene
-                self.plan = renderer.plan(scene, method, scattering=scattering, caustics=Caustics(ROUND))
+                self._scene, self.plan = scene, plan(caustics=Caustics(ROUND))
             if self.plan is None or self.done or not self._media_known(workspace, scene, renderer):
                 return False
             if not self.plan.has(PassName.CAUSTICS):
                 return False  # nothing opaque that more could land on
             if self.light is None:
                 self.light = PhotonLight(renderer.gpu, scene, viewport.size, self.plan)
-                self.told = "caustics: the first photons"
+                self.note = "caustics: the first photons"
                 return True
         except InputError as error:
-            self.told = f"no {error}" if str(error).startswith("caustics") else f"no caustics: {error}"
+            self.note = f"no {error}" if str(error).startswith("caustics") else f"no caustics: {error}"
             return False
         if not self.drawing:
             begun = time.perf_counter()
@@ -163,28 +169,29 @@ class Photons:
                 self._in_texture = self.light.photons
                 viewport.restart(1)
                 self.drawing, self.side, self._begun = True, 1, time.perf_counter()
-            self._tell()
+            self._count()
         return True
 
     def _media_known(self, workspace: Workspace, scene: Scene, renderer: Renderer) -> bool:
-        """True if the light of photons in media is known, if there is any; else it is searched for."""
+        """True if the light of photons in media is known, if there is any; else it is solved for."""
         assert self.plan is not None
         back, caustics, cache = self.plan.given_back, self.plan.caustics, renderer.gpu.diffusion
         if not lit_by_photons(scene, (*back.volumes, *back.diffused)):
             return True
         assert caustics is not None
-        marked = shown(scene, back).with_ambient_emitted
-        if cache.has(diffusion_key(marked, back.diffusion, caustics)):
+        marked, lane = shown(scene, back).with_ambient_emitted, workspace.lanes["diffuse"]
+        key = diffusion_key(marked, back.diffusion, caustics)
+        if cache.has(key):
             self.in_media = True
             if not self.plan.has(PassName.CAUSTICS):
-                self.told = f"caustics: {caustics.in_media:,} photons in media"
+                self.note = f"caustics: {caustics.in_media:,} photons in media"
             return True
-        if self._solving is not None and (self._solving.cancelled or self._solving.error is not None):
-            self.told = "no caustics: what photons light in media could not be solved for"
-        elif (lane := workspace.lanes["diffuse"]).task is None:
-            self.told = "caustics: photons in media first"
+        if lane.failed(key):
+            self.note = "no caustics: what photons light in media could not be solved for"
+        elif lane.task is None:
+            self.note = "caustics: photons in media first"
             given = workspace.pool, cache, marked, back.diffusion, caustics
-            self._solving = lane.start("photons in media", lambda task: solve_aside(task, *given), lambda _: None)
+            lane.request(key, "photons in media", lambda task: solve_aside(task, *given))
         return False
 
     def show_media(self, viewport: Viewport) -> RenderPlan | None:
@@ -217,14 +224,14 @@ class Photons:
         if drawn >= last:
             self.drawing, self._next = False, 2 * self.light.rounds
             self._drawing, self._following = time.perf_counter() - self._begun, 0.0
-        self._tell()
+        self._count()
         return over
 
-    def _tell(self) -> None:
+    def _count(self) -> None:
         assert self.light is not None
         noise = f", standard error {self._noise:.2%}" if self._noise < 1e3 else ""
         seen = f"{self._in_picture:,} photons in the picture{noise}" if self._in_picture else "not in the picture yet"
-        self.told = f"caustics: {seen}" if self.done else f"caustics: {seen}; {self.light.photons:,} so far"
+        self.note = f"caustics: {seen}" if self.done else f"caustics: {seen}; {self.light.photons:,} so far"
 
     def stop(self, viewport: Viewport) -> bool:
         """End it; returns whether its picture was on show."""

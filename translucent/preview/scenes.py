@@ -1,31 +1,45 @@
-"""Scenes from documents and loaded models, and materials from models."""
+"""Scenes on show: models read from files, on stages, in the light and with the materials of a document."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from translucent.assets import mesh_names, mesh_path
 from translucent.errors import InputError
 from translucent.formulas.brdf_table import brdf_table
 from translucent.formulas.phase import parse_phase
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals, keep_drawn_normals
 from translucent.geometry.solids import Box
+from translucent.gltf.load import SUFFIXES, load_scene
 from translucent.media.medium import Medium, color_at
 from translucent.planning.methods import Method, method_from_name
 from translucent.planning.scattering import SCATTERINGS, Scattering
-from translucent.preview import document as orbiting
-from translucent.preview.document import AUTO, FINISH, Assigned, Document, Look, Material, Model, Orbit, camera_of
-from translucent.preview.tasks import Lane, Report, Task
+from translucent.preview.document import (
+    AUTO,
+    FINISH,
+    Assigned,
+    Document,
+    Look,
+    Material,
+    Model,
+    Orbit,
+    camera_of,
+    direction_from,
+    framed,
+    medium_fields,
+    orbit_of,
+    triple_of,
+)
+from translucent.preview.tasks import Lane, Task
 from translucent.preview.worker import Pool, Urgency
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment, filtered
@@ -41,6 +55,7 @@ from translucent.scene.showcase import (
     fillable,
     framing,
     named_environment,
+    showcase,
 )
 from translucent.scene.stages import (
     DEFAULT_STAGE,
@@ -54,6 +69,14 @@ from translucent.scene.stages import (
 )
 from translucent.scene.surface import Surface
 from translucent.scene.turntable import on_stage
+
+#: Bytes of a file from which on it is read by a worker process: while a picture is on show, and before. Whatever reads
+#: it holds the interpreter's lock now and then, which nobody sees in a window without a picture, and no process need
+#: be started for the first one.
+LARGE_BESIDE_PICTURE, LARGE_FILE = 1 << 18, 1 << 23
+
+#: Names of the environments that light, and are seen in the background, and of the stage.
+Names = tuple[str, str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,18 +93,131 @@ class Loaded:
         return not hasattr(self.scene, "has_camera")
 
     @property
+    def has_camera(self) -> bool:
+        """True if the model brings a camera."""
+        return getattr(self.scene, "has_camera", False)
+
+    @property
     def triangles(self) -> int:
         """Number of triangles that are drawn."""
         return sum(len(item.mesh.faces) for item in self.scene.objects)
 
 
+def load_with(task: Task, pool: Pool, model: Model, allow_outside: bool = False, *, pictured: bool = False) -> Loaded:
+    """Load a model here, or if it is large, in a worker process; `pictured` while the window shows another.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    large = LARGE_BESIDE_PICTURE if pictured else LARGE_FILE
+    if not (os.path.isfile(model.path) and os.path.getsize(model.path) > large):
+        return load(model, allow_outside)
+    loaded, normals = pool.call(task, load_with_normals, model, allow_outside, urgency=Urgency.PICTURE)
+    for mesh, made in normals:
+        keep_drawn_normals(mesh, made)
+    return loaded
+
+
+def load_with_normals(model: Model, allow_outside: bool) -> tuple[Loaded, list[tuple[Mesh, npt.NDArray[np.float32]]]]:
+    """Load a model; with the normals that have been made of its meshes."""
+    loaded = load(model, allow_outside)
+    meshes = dict.fromkeys(item.mesh for item in loaded.scene.objects)
+    return loaded, [(mesh, drawn_normals(mesh)) for mesh in meshes if has_drawn_normals(mesh)]
+
+
+def load(model: Model, allow_outside: bool = False) -> Loaded:
+    """Load a model, and compute everything that would delay its first picture.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    from translucent.mesh_files import load_mesh  # with trimesh, which takes long to import
+
+    if Path(model.path).suffix.lower() in SUFFIXES:
+        scene: Scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
+    elif model.path in mesh_names() and not Path(model.path).exists():
+        scene = showcase(load_mesh(mesh_path(model.path)), stage="none")
+    else:
+        scene = showcase(load_mesh(model.path, unit=model.unit, allow_outside=allow_outside), stage="none")
+    for item in scene.objects:
+        _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
+        if item.has_interface or item.surface is not None:
+            drawn_normals(item.mesh)
+    return Loaded(model, scene, material_of(scene))
+
+
+@dataclass
+class Lighting:
+    """Environments and stages prepared in the background, with the last ones on show meanwhile.
+
+    Parameters
+    ----------
+    lane : Lane
+
+    Attributes
+    ----------
+    begun : bool
+        The first picture is there: it is one without a stage, and waits for none.
+    """
+
+    lane: Lane
+    begun: bool = False
+    _ready: Names = ("", "", NO_STAGE)
+    _requested: Names | None = None
+    #: Stages whose light is known.
+    _made: set[str] = field(default_factory=lambda: {NO_STAGE})
+
+    def lit(self, document: Document, loaded: Loaded) -> Document:
+        """Document with the last environments and the last stage in place of its own, if these are not ready."""
+        look = document.look
+        wanted = look.environment, look.background, stage_name(look, loaded)
+        files = any(Path(name).suffix.lower() in READERS for name in wanted[:2])
+        if not files and wanted[2] in self._made:
+            self._ready, self._requested = wanted, None
+        elif wanted != self._requested and (self.begun or wanted[2] == NO_STAGE):
+            self._requested = wanted
+            name = "reading the environment" if wanted[2] == NO_STAGE else "setting the stage"
+            self.lane.start(name, lambda _: _prepare(wanted), lambda _: self._take(wanted))
+        environment, background, stage = self._ready
+        return dataclasses.replace(
+            document, look=dataclasses.replace(look, environment=environment, background=background, stage=stage)
+        )
+
+    def _take(self, names: Names) -> None:
+        self._ready = names
+        if not any(names[:2]):
+            self._made.add(names[2])
+
+
+def _prepare(names: Names) -> None:
+    """Compute the parts of environments and a stage that take long, and are cached."""
+    environment, background, stage_of = names
+    for name in filter(None, (environment, background)):
+        filtered(environment_of(name))
+    if (stage := stage_named(stage_of)) is not None:
+        lit = _own_environment(environment, background) or stage.environment()
+        filtered(lit)
+        shadow_directions(lit, ENVIRONMENT_SHADOWS)
+
+
+def prepare(_: Task) -> None:
+    """Prepare the data of frames with surfaces or smooth edges, before it is waited for."""
+    corner_normals(Box().tessellate())
+    brdf_table()
+    for name in ("light-table", "studio"):
+        filtered(environment_of(name))
+
+
 def stage_name(look: Look, loaded: Loaded) -> str:
-    """Name of the stage that a look asks for; ``auto`` is what ``translucent render`` gives the model."""
+    """Name of the stage that a look requests; ``auto`` is the choice of ``translucent render`` for the model."""
     if look.stage != AUTO:
         return look.stage
-    scene = loaded.scene
-    own = look.environment or look.background or scene.lights or getattr(scene, "has_camera", False)
-    return NO_STAGE if own or has_ground(scene) else DEFAULT_STAGE
+    own = look.environment or look.background or loaded.scene.lights or loaded.has_camera
+    return NO_STAGE if own or has_ground(loaded.scene) else DEFAULT_STAGE
 
 
 def own_material(look: Look, loaded: Loaded) -> Material:
@@ -109,86 +245,68 @@ def _environment_of(name: str, written: int) -> Environment:
     return named_environment(name)
 
 
-def own_environment(environment: str, background: str) -> Environment | None:
-    """Environment in place of the stage's; None if a look names none."""
-    if not (environment or background):
-        return None
-    lit = environment_of(environment) if environment else LIGHT_TABLE
-    return lit.with_background(environment_of(background)) if background else lit
-
-
-def shown_from(loaded: Loaded, name: str) -> Camera:
-    """Camera to which a stage is turned: the model's own, or the one that frames it there."""
-    scene = loaded.scene
-    own = getattr(scene, "has_camera", False)
-    return scene.camera if own else framing(scene.objects, (16, 9), stage=stage_named(name))
+def _own_environment(environment: str, background: str, rotation: float = 0.0) -> Environment | None:
+    """Environment in place of the stage's; None if neither is named."""
+    return _environment(environment, background, rotation, LIGHT_TABLE) if environment or background else None
 
 
 @lru_cache(maxsize=2)
-def standing(loaded: Loaded, name: str, environment: str, background: str, rotation: float) -> Scene:
+def _environment(name: str, background: str, rotation: float, default: Environment) -> Environment:
+    """Environment of a scene; cached, since its filtered maps are cached with it."""
+    lit = environment_of(name) if name else default
+    if lit.kind == "image" and rotation:
+        lit = dataclasses.replace(lit, rotation=lit.rotation + rotation)
+    return lit.with_background(environment_of(background)) if background else lit
+
+
+def _shown_from(loaded: Loaded, name: str) -> Camera:
+    """Camera to which a stage is turned: the model's own, or the one that frames it there."""
+    scene = loaded.scene
+    return scene.camera if loaded.has_camera else framing(scene.objects, (16, 9), stage=stage_named(name))
+
+
+@lru_cache(maxsize=2)
+def _standing(loaded: Loaded, name: str, environment: str, background: str, rotation: float) -> Scene:
     """Loaded scene on a stage; cached, as the ground, the lights and the environment stay while the camera moves."""
-    own = own_environment(environment, background)
-    if own is not None and own.kind == "image":
-        own = dataclasses.replace(own, rotation=own.rotation + rotation)
-    seen = dataclasses.replace(loaded.scene, camera=shown_from(loaded, name))
-    return staged(seen, name, own, rotation)
+    seen = dataclasses.replace(loaded.scene, camera=_shown_from(loaded, name))
+    return staged(seen, name, _own_environment(environment, background, rotation), rotation)
 
 
 def turn_from(document: Document, loaded: Loaded, camera: Camera) -> float:
     """Degrees by which the stage is turned about +Y from where `staged` puts it for a camera."""
-    from_, to = (view_axes(one)[2] for one in (camera, shown_from(loaded, stage_name(document.look, loaded))))
+    from_, to = (view_axes(one)[2] for one in (camera, _shown_from(loaded, stage_name(document.look, loaded))))
     turn = math.degrees(math.atan2(to[0], to[2]) - math.atan2(from_[0], from_[2]))
     return math.remainder(turn + document.look.rotation, 360.0)
 
 
 def first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
     """First orbit of a model: that of the file's own camera, or from where `render` sees it, close as F frames it."""
-    scene = loaded.scene
-    if getattr(scene, "has_camera", False):
-        return orbiting.orbit_of(scene.camera, scene.bounds.mean(axis=0))
-    if stage == NO_STAGE:
-        return orbiting.framed(None, scene.objects, size)
-    seen = orbiting.orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
-    return orbiting.framed(seen, scene.objects, size)
-
-
-def prepare_stage(name: str, environment: str, background: str) -> None:
-    """Compute what takes long about a stage, and is cached."""
-    from translucent.scene.environment import filtered
-
-    stage = stage_named(name)
-    if stage is not None:
-        lit = own_environment(environment, background) or stage.environment()
-        filtered(lit)
-        shadow_directions(lit, ENVIRONMENT_SHADOWS)
+    scene, seen = loaded.scene, None
+    if loaded.has_camera:
+        return orbit_of(scene.camera, scene.bounds.mean(axis=0))
+    if stage != NO_STAGE:
+        seen = orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
+    return framed(seen, scene.objects, size)
 
 
 def material_of(scene: Scene, number: int | None = None) -> Material:
     """Material of an object, by default of the first body; if it is opaque, the one that it would be filled with."""
     diagonal = scene.diagonal or 1.0
+    reach, thickness = DEFAULT_REACH * diagonal, 0.1 * diagonal
     body = fillable(scene)[0] if number is None else scene.objects[number]
-    if body.medium is None or body.covers:
-        reach = DEFAULT_REACH * diagonal
-        red, green, blue = np.asarray(Medium.from_color(DEFAULT_COLOR, reach).absorption).tolist()
-        return Material(color=DEFAULT_COLOR, distance=reach, absorption=(red, green, blue), thickness=0.1 * diagonal)
-    medium, surface = body.medium or Medium(), body.surface or Surface()
-    reach = DEFAULT_REACH * diagonal
+    medium, surface = body.medium, body.surface or Surface()
+    if medium is None or body.covers:
+        absorption = triple_of(Medium.from_color(DEFAULT_COLOR, reach).absorption)
+        return Material(color=DEFAULT_COLOR, distance=reach, absorption=absorption, thickness=thickness)
     # Where the showcase states it; if that is too dark or too bright to tell, where 1/e is left.
     near = reach if (medium.transmittance(reach) > 1e-3).all() else None
     color, distance = color_at(medium, near)
-    triples = (np.asarray(v).tolist() for v in (color, medium.absorption, medium.scattering, medium.emission))
-    given = tuple((float(r), float(g), float(b)) for r, g, b in triples)
     return Material(
-        color=given[0],
+        color=triple_of(color),
         distance=float(distance) if math.isfinite(distance) else reach,
-        absorption=given[1],
-        scattering=given[2],
-        emission=given[3],
-        anisotropy=medium.anisotropy,
-        phase=str(medium.phase or ""),
-        ior=medium.ior,
+        **medium_fields(medium),
         **{name: getattr(surface, name) for name in FINISH},
-        thickness=body.sheet_thickness or 0.1 * diagonal,
+        thickness=body.sheet_thickness or thickness,
     )
 
 
@@ -212,31 +330,23 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
     """
     if document.orbit is None:
         raise InputError("a picture", "nobody has framed the model", "frame it first")
-    scene, look = loaded.scene, document.look
-    light = _light(look.light_yaw, look.light_pitch, look.light_irradiance) if look.light else None
-    objects, camera = _shown(document.material, document.assigned, document.hidden, scene), camera_of(document.orbit)
+    look, scene = document.look, loaded.scene
+    objects = _objects(document.material, document.assigned, scene)
+    objects = tuple(item for number, item in enumerate(objects) if number not in document.hidden)
     if (name := stage_name(look, loaded)) != NO_STAGE and document.display.pictured:
-        on = standing(loaded, name, look.environment, look.background, look.rotation)
-        ground = tuple(item for item in on.objects if item.shadow_catcher)
-        lights = on.lights if light is None else (*on.lights, light)
-        return dataclasses.replace(on, objects=(*objects, *ground), camera=camera, lights=lights)
-    lights = scene.lights if light is None else (*scene.lights, light)
+        scene = _standing(loaded, name, look.environment, look.background, look.rotation)
+        objects += tuple(item for item in scene.objects if item.shadow_catcher)
+        environment = scene.environment
+    else:
+        environment = _environment(look.environment, look.background, look.rotation, scene.environment)
+    lights = [_light(look.light_yaw, look.light_pitch, look.light_irradiance)] if look.light else []
     return dataclasses.replace(
         scene,
         objects=objects,
-        camera=camera,
-        lights=lights,
-        environment=_environment(look.environment, look.background, look.rotation, scene),
+        camera=camera_of(document.orbit),
+        lights=(*scene.lights, *lights),
+        environment=environment,
     )
-
-
-@lru_cache(maxsize=2)
-def _shown(
-    material: Material, assigned: tuple[Assigned, ...], hidden: tuple[int, ...], scene: Scene
-) -> tuple[Object, ...]:
-    """Objects of the scene on show with their materials; cached, so that turning the camera makes none anew."""
-    objects = _objects(material, assigned, scene)
-    return tuple(item for number, item in enumerate(objects) if number not in hidden)
 
 
 @lru_cache(maxsize=2)
@@ -251,21 +361,18 @@ def _objects(material: Material, assigned: tuple[Assigned, ...], scene: Scene) -
 
 @lru_cache(maxsize=2)
 def _objects_alike(material: Material, scene: Scene) -> tuple[Object, ...]:
-    """Objects of the scene with one material in all bodies."""
-    if material.source == "file" and scene.bodies:
-        return tuple(scene.objects) if hasattr(scene, "has_camera") else tuple(_bent(scene.objects, material.ior))
-    medium, chosen = medium_of(material), set(map(id, fillable(scene)))
-    return tuple(_filled(item, material, medium) if id(item) in chosen else item for item in scene.objects)
-
-
-def _bent(objects: Sequence[Object], ior: float) -> list[Object]:
-    """Bodies of a bare mesh with this index of refraction."""
-    return [
+    """Objects of the scene with one material in all bodies; a bare mesh with the model's own gets an ior alone."""
+    if material.source != "file" or not scene.bodies:
+        medium, chosen = medium_of(material), set(map(id, fillable(scene)))
+        return tuple(_filled(item, material, medium) if id(item) in chosen else item for item in scene.objects)
+    if hasattr(scene, "has_camera"):
+        return tuple(scene.objects)
+    return tuple(
         item
-        if item.medium is None or item.medium.ior == ior
-        else dataclasses.replace(item, medium=dataclasses.replace(item.medium, ior=ior))
-        for item in objects
-    ]
+        if item.medium is None or item.medium.ior == material.ior
+        else dataclasses.replace(item, medium=dataclasses.replace(item.medium, ior=material.ior))
+        for item in scene.objects
+    )
 
 
 def _filled(item: Object, material: Material, medium: Medium) -> Object:
@@ -273,29 +380,10 @@ def _filled(item: Object, material: Material, medium: Medium) -> Object:
     return dataclasses.replace(item, medium=medium, surface=surface, sheet_thickness=None)
 
 
-def towards_light(look: Look) -> tuple[float, float, float]:
-    """Unit vector to the light that the look adds."""
-    return _direction(look.light_yaw, look.light_pitch)
-
-
-def _direction(yaw: float, pitch: float) -> tuple[float, float, float]:
-    yaw, pitch = math.radians(yaw), math.radians(pitch)
-    return math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)
-
-
 @lru_cache(maxsize=2)
 def _light(yaw: float, pitch: float, irradiance: float) -> DirectionalLight:
     """Light that the look adds; cached, since what it does in bodies is cached with it."""
-    return DirectionalLight([-v for v in _direction(yaw, pitch)], irradiance)
-
-
-@lru_cache(maxsize=2)
-def _environment(name: str, background: str, rotation: float, scene: Scene) -> Environment:
-    """Environment of the scene; cached, since its filtered maps are cached with it."""
-    lit = environment_of(name) if name else scene.environment
-    if lit.kind == "image" and rotation:
-        lit = dataclasses.replace(lit, rotation=lit.rotation + rotation)
-    return lit.with_background(environment_of(background)) if background else lit
+    return DirectionalLight(-direction_from(yaw, pitch), irradiance)
 
 
 @lru_cache(maxsize=4)
@@ -307,129 +395,5 @@ def method_of(name: str, material: Material) -> Method | None:
 
 
 def scattering_of(name: str) -> Scattering | None:
-    """Way of showing light that is scattered many times; None leaves it to the planner."""
+    """Strategy for light that is scattered many times; None leaves it to the planner."""
     return None if name == AUTO else SCATTERINGS[name]()
-
-
-#: Bytes of a file from which on it is read by a worker process: while a picture is on show, and before. Whatever reads
-#: it holds the interpreter's lock now and then, which nobody sees in a window without a picture, and no process need
-#: be started for the first one.
-LARGE_BESIDE_PICTURE, LARGE_FILE = 1 << 18, 1 << 23
-
-Normals: TypeAlias = list[tuple[Mesh, npt.NDArray[np.float32]]]
-
-
-def load_with(task: Task, pool: Pool, model: Model, allow_outside: bool = False, *, pictured: bool = False) -> Loaded:
-    """Load a model here, or if it is large, in a worker process; `pictured` while the window shows another.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
-    large = LARGE_BESIDE_PICTURE if pictured else LARGE_FILE
-    if not (os.path.isfile(model.path) and os.path.getsize(model.path) > large):
-        return load(model, allow_outside)
-    loaded, normals = pool.call(task, load_elsewhere, model, allow_outside, urgency=Urgency.PICTURE)
-    for mesh, made in normals:
-        keep_drawn_normals(mesh, made)
-    return loaded
-
-
-def load_elsewhere(report: Report, model: Model, allow_outside: bool) -> tuple[Loaded, Normals]:
-    """Load a model; with the normals that have been made of its meshes."""
-    report(None, f"reading {Path(model.path).name}")
-    loaded = load(model, allow_outside)
-    meshes = dict.fromkeys(item.mesh for item in loaded.scene.objects)
-    return loaded, [(mesh, drawn_normals(mesh)) for mesh in meshes if has_drawn_normals(mesh)]
-
-
-def load(model: Model, allow_outside: bool = False) -> Loaded:
-    """Load a model, and compute everything that would delay its first picture.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
-    from translucent.assets import mesh_names, mesh_path
-    from translucent.gltf.load import SUFFIXES, load_scene
-    from translucent.mesh_files import load_mesh
-    from translucent.scene.showcase import showcase
-
-    if Path(model.path).suffix.lower() in SUFFIXES:
-        scene: Scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
-    elif model.path in mesh_names() and not Path(model.path).exists():
-        scene = showcase(load_mesh(mesh_path(model.path)), stage="none")
-    else:
-        scene = showcase(load_mesh(model.path, unit=model.unit, allow_outside=allow_outside), stage="none")
-    for item in scene.objects:
-        _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
-        if item.has_interface or item.surface is not None:
-            drawn_normals(item.mesh)
-    return Loaded(model, scene, material_of(scene))
-
-
-#: Environments: the one that lights, and the one in the background; and the stage.
-Names = tuple[str, str, str]
-
-
-@dataclass
-class Lighting:
-    """Reader of the environments of documents, and maker of their stages.
-
-    Parameters
-    ----------
-    lane : Lane
-
-    Attributes
-    ----------
-    begun : bool
-        The first picture is there: it is one without a stage, and waits for none.
-    """
-
-    lane: Lane
-    begun: bool = False
-    _ready: Names = ("", "", NO_STAGE)
-    _asked: Names | None = None
-    #: Stages whose light is known.
-    _made: set[str] = field(default_factory=lambda: {NO_STAGE})
-
-    def lit(self, document: Document, loaded: Loaded) -> Document:
-        """Document with the last environments and the last stage in place of its own, if these are not ready."""
-        look = document.look
-        wanted = look.environment, look.background, stage_name(look, loaded)
-        if not any(map(_is_file, wanted[:2])) and wanted[2] in self._made:
-            self._ready, self._asked = wanted, None
-        elif wanted != self._asked and (self.begun or wanted[2] == NO_STAGE):
-            self._asked = wanted
-            name = "reading the environment" if wanted[2] == NO_STAGE else "setting the stage"
-            self.lane.start(name, lambda _: _prepare(wanted), lambda _: self._take(wanted))
-        environment, background, stage = wanted if wanted == self._ready else self._ready
-        return dataclasses.replace(
-            document, look=dataclasses.replace(look, environment=environment, background=background, stage=stage)
-        )
-
-    def _take(self, names: Names) -> None:
-        self._ready = names
-        if not any(names[:2]):
-            self._made.add(names[2])
-
-
-def prepare(_: Task) -> None:
-    """Prepare the data of frames with surfaces or smooth edges, before it is waited for."""
-    corner_normals(Box().tessellate())
-    brdf_table()
-    for name in ("light-table", "studio"):
-        filtered(environment_of(name))
-
-
-def _is_file(name: str) -> bool:
-    return Path(name).suffix.lower() in READERS
-
-
-def _prepare(names: Names) -> None:
-    environment, background, stage = names
-    for name in filter(None, (environment, background)):
-        filtered(environment_of(name))
-    prepare_stage(stage, environment, background)

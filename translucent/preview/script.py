@@ -2,17 +2,18 @@
 
 Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, value), ``open`` (model, unit), ``preset``
 (name), ``turn`` (right, up: degrees), ``pan`` (right, down: heights of the picture), ``zoom`` (factor, right, down),
-``undo``, ``redo``, ``frame``. Of the library: ``library`` (search), ``drop`` (preset, x, y: shares of the viewport),
-``save_preset`` (name), ``environments`` (folder). Of files: ``ask`` (kind: as of ``save``), in our own browser, and
-``answer`` (file). Of the keyboard: ``key`` (name, such as escape or ctrl+z), ``type`` (text). Of objects: ``pick`` (x,
-y: shares of the viewport), ``object`` (number; -1: none), ``hide``, ``isolate`` (number). Of the window: ``probe`` (x,
-y: shares of the viewport), ``select`` (panel), ``wait`` (seconds; without them, until nothing is under way),
-``reload``, ``bake`` (mode, size, rays), ``save`` (kind, file), ``session`` (file). Of the mouse: ``point`` (x, y:
-shares of the window), ``press``, ``release`` (button), ``wheel`` (steps).
+``undo``, ``redo``, ``frame``. Of the library: ``library`` (search), ``drop`` (preset, x, y: fractions of the
+viewport), ``save_preset`` (name), ``environments`` (folder). Of files: ``ask`` (kind: as of ``save``), in our own
+browser, and ``answer`` (file). Of the keyboard: ``key`` (name, such as escape or ctrl+z), ``type`` (text). Of
+objects: ``pick`` (x, y: fractions of the viewport), ``object`` (number; -1: none), ``hide``, ``isolate`` (number). Of
+the window: ``probe`` (x, y: fractions of the viewport), ``select`` (panel), ``wait`` (seconds; without them, until
+nothing is under way), ``reload``, ``bake`` (mode, size, rays), ``save`` (kind, file), ``session`` (file). Of the
+mouse: ``point`` (x, y: fractions of the window), ``press``, ``release`` (button), ``wheel`` (steps).
 """
 
 from __future__ import annotations
 
+import inspect
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -37,42 +38,41 @@ PAUSE = 0.03
 #: Frames between two actions, so that changes are drawn before the next one.
 FRAMES = 2
 
-#: Names of panels.
-PANELS = ("Material", "Library", "Scene", "Method", "Look", "Environments", "Files", "Messages")
-
-_WORDS: dict[str, dict[str, Any]] = {
-    "change": {"field": str, "value": object},
-    "open": {"model": str, "unit": "m"},
-    "preset": {"name": str},
-    "turn": {"right": 0.0, "up": 0.0},
-    "pan": {"right": 0.0, "down": 0.0},
-    "zoom": {"factor": 1.0, "right": 0.0, "down": 0.0},
-    "library": {"search": ""},
-    "pick": {"x": 0.5, "y": 0.5},
-    "object": {"number": -1},
-    "hide": {"number": int},
-    "isolate": {"number": int},
-    "drop": {"preset": str, "x": 0.5, "y": 0.5},
-    "save_preset": {"name": str},
-    "ask": {"kind": str},
-    "answer": {"file": str},
-    "environments": {"folder": str},
-    "key": {"name": str},
-    "type": {"text": str},
-    "undo": {},
-    "redo": {},
-    "frame": {},
-    "probe": {"x": 0.5, "y": 0.5},
-    "select": {"panel": str},
-    "wait": {"seconds": -1.0},
-    "reload": {},
-    "bake": {"mode": "cone", "size": 256, "rays": 16},
-    "save": {"kind": str, "file": str},
-    "session": {"file": str},
-    "point": {"x": 0.5, "y": 0.5},
-    "press": {"button": 0},
-    "release": {"button": 0},
-    "wheel": {"steps": 1.0},
+#: Actions by their verbs. A default of a parameter is its value where a script gives none, or if it is a type, the type
+#: of a value that every script has to give.
+VERBS: dict[str, Callable[..., object]] = {
+    "change": lambda state, field=str, value=object: state.change(field, value, step=True),
+    "open": lambda state, model=str, unit="m": state.work.open(Model(model, unit)),
+    "preset": lambda state, name=str: state.choose_preset(name),
+    "turn": lambda state, right=0.0, up=0.0: state.work.do(Turn(right, up)),
+    "pan": lambda state, right=0.0, down=0.0: state.work.do(Pan(right, down)),
+    "zoom": lambda state, factor=1.0, right=0.0, down=0.0: state.work.do(Zoom(factor, right, down)),
+    "library": lambda state, search="": setattr(state.work.library, "search", search),
+    "pick": lambda state, x=0.5, y=0.5: state.pick((x, y), state.select),
+    "object": lambda state, number=-1: state.select(None if number < 0 else number),
+    "hide": lambda state, number=int: state.hide(number),
+    "isolate": lambda state, number=int: state.isolate(number),
+    "drop": lambda state, preset=str, x=0.5, y=0.5: state.drop_preset(preset, (x, y)),
+    "save_preset": lambda state, name=str: state.save_preset(name),
+    "ask": lambda state, kind=str: state.ask_file(kind, system=False),
+    "answer": lambda state, file=str: state.answer(file),
+    "environments": lambda state, folder=str: state.environments.take(folder),
+    "key": lambda state, name=str: state.press(name),
+    "type": lambda state, text=str: state.io.add_input_characters_utf8(text),
+    "undo": lambda state: state.work.undo(),
+    "redo": lambda state: state.work.redo(),
+    "frame": lambda state: state.work.frame(state.selected),
+    "probe": lambda state, x=0.5, y=0.5: setattr(state, "pinned", (x, y)),
+    "select": lambda state, panel=str: state.select_panel(panel),
+    "wait": lambda state, seconds=-1.0: None,  # see `Script.step`
+    "reload": lambda state: state.view.reload(state.work),
+    "bake": lambda state, mode="cone", size=256, rays=16: state.work.start_bake(mode, size, rays),
+    "save": lambda state, kind=str, file=str: state.use_file(kind, file),
+    "session": lambda state, file=str: state.work.open_session(file),
+    "point": lambda state, x=0.5, y=0.5: setattr(state, "pointer", (x, y)),
+    "press": lambda state, button=0: state.io.add_mouse_button_event(button, True),
+    "release": lambda state, button=0: state.io.add_mouse_button_event(button, False),
+    "wheel": lambda state, steps=1.0: state.io.add_mouse_wheel_event(0.0, steps),
 }
 
 
@@ -91,7 +91,7 @@ class Script:
     Attributes
     ----------
     steps : list of Step
-        Those that are still to be done, the next one last.
+        Steps that are still to be done, the next one last.
     remembers : bool
         Whether the window remembers what windows without a script remember.
     """
@@ -111,7 +111,7 @@ class Script:
 
     def step(self, state: WindowState) -> bool:
         """Do the next action, if it is time; returns whether all are done."""
-        hold_pointer(state)
+        state.hold_pointer()
         if self._waiting is not None:
             if not self._rested(state):
                 return False
@@ -125,10 +125,8 @@ class Script:
         step = self.steps.pop()
         self.done.append(step)
         if step.do == "wait":
-            self._waiting = time.monotonic()
-            self._until = step.values["seconds"]
-        else:
-            perform(state, step)
+            self._waiting, self._until = time.monotonic(), step.values["seconds"]
+        VERBS[step.do](state, **step.values)
         return False
 
     def _rested(self, state: WindowState) -> bool:
@@ -160,10 +158,11 @@ def read_script(path: str | Path) -> Script:
 def read_step(table: Any, where: str) -> Step:
     """Check one action."""
     verb = table.get("do") if isinstance(table, dict) else None
-    if verb not in _WORDS:
-        close = get_close_matches(str(verb), _WORDS, n=1)
-        raise InputError(where, f"do = {verb!r}", f"did you mean {close[0]}?" if close else f"use {', '.join(_WORDS)}")
-    known, values = _WORDS[verb], {key: value for key, value in table.items() if key != "do"}
+    if not isinstance(verb, str) or verb not in VERBS:
+        close = get_close_matches(str(verb), VERBS, n=1)
+        raise InputError(where, f"do = {verb!r}", f"did you mean {close[0]}?" if close else f"use {', '.join(VERBS)}")
+    _, *parameters = inspect.signature(VERBS[verb]).parameters.values()
+    known, values = {one.name: one.default for one in parameters}, {k: v for k, v in table.items() if k != "do"}
     if unknown := sorted(set(values) - set(known)):
         raise InputError(where, f"{verb} knows no {unknown[0]!r}", f"use {', '.join(known) or 'nothing'}")
     found = {}
@@ -179,119 +178,3 @@ def read_step(table: Any, where: str) -> Step:
             raise InputError(where, f"{key} = {value!r}", f"give a {kind.__name__}")
         found[key] = value
     return Step(verb, found)
-
-
-def perform(state: WindowState, step: Step) -> None:
-    """Do one action."""
-    work, v = state.work, step.values
-    verbs: dict[str, Callable[[], object]] = {
-        "change": lambda: state.change(v["field"], v["value"], step=True),
-        "open": lambda: work.open(Model(v["model"], v["unit"])),
-        "preset": lambda: state.choose_preset(v["name"]),
-        "library": lambda: setattr(work.library, "search", v["search"]),
-        "pick": lambda: state.pick((v["x"], v["y"]), state.select),
-        "object": lambda: state.select(None if v["number"] < 0 else v["number"]),
-        "hide": lambda: _hide(state, v["number"], alone=False),
-        "isolate": lambda: _hide(state, v["number"], alone=True),
-        "drop": lambda: state.drop_preset(v["preset"], (v["x"], v["y"])),
-        "save_preset": lambda: _save_preset(state, v["name"]),
-        "ask": lambda: _ask(state, v["kind"]),
-        "answer": lambda: _answer(state, v["file"]),
-        "environments": lambda: state.environments.take(v["folder"]),
-        "key": lambda: _press(v["name"]),
-        "type": lambda: _io().add_input_characters_utf8(v["text"]),
-        "turn": lambda: work.do(Turn(v["right"], v["up"])),
-        "pan": lambda: work.do(Pan(v["right"], v["down"])),
-        "zoom": lambda: work.do(Zoom(v["factor"], v["right"], v["down"])),
-        "undo": work.undo,
-        "redo": work.redo,
-        "frame": state.frame,
-        "probe": lambda: setattr(state, "pinned", (v["x"], v["y"])),
-        "select": lambda: _select(v["panel"]),
-        "reload": lambda: state.view.reload(work),
-        "bake": lambda: work.start_bake(v["mode"], v["size"], v["rays"]),
-        "save": lambda: _use_file(state, v["kind"], v["file"]),
-        "session": lambda: work.open_session(v["file"]),
-        "point": lambda: setattr(state, "pointer", (v["x"], v["y"])),
-        "press": lambda: _io().add_mouse_button_event(v["button"], True),
-        "release": lambda: _io().add_mouse_button_event(v["button"], False),
-        "wheel": lambda: _io().add_mouse_wheel_event(0.0, v["steps"]),
-    }
-    verbs[step.do]()
-
-
-def _hide(state: WindowState, number: int, *, alone: bool) -> None:
-    from translucent.preview.panels.scene import hide, isolate
-
-    if not 0 <= number < len(state.objects):
-        raise InputError(f"object {number}", f"the model has {len(state.objects)}", "give a number from 0 on")
-    (isolate if alone else hide)(state, number)
-
-
-def _use_file(state: WindowState, kind: str, path: str) -> None:
-    from translucent.preview.panels.files import use_file
-
-    use_file(state, kind, path)
-
-
-def _ask(state: WindowState, kind: str) -> None:
-    from translucent.preview.dialogs import QUESTIONS
-
-    if kind not in QUESTIONS:
-        raise InputError(f"ask {kind!r}", "there is no such question", f"use one of {', '.join(QUESTIONS)}")
-    state.ask_file(kind, system=False)
-
-
-def _answer(state: WindowState, path: str) -> None:
-    from translucent.preview.panels.files import accept_answer
-
-    if state.browser is None:
-        raise InputError(f"answer {path!r}", "nothing is asked", "ask first")
-    state.browser.text = path
-    accept_answer(state)
-
-
-def _press(name: str) -> None:
-    """Press and release a key, with modifiers before a plus sign, such as ``ctrl+z``."""
-    from imgui_bundle import imgui
-
-    words = name.lower().split("+")
-    modifiers = {"ctrl": imgui.Key.mod_ctrl, "shift": imgui.Key.mod_shift, "alt": imgui.Key.mod_alt}
-    keys = [modifiers.get(word) or getattr(imgui.Key, word, None) for word in words]
-    if None in keys:
-        raise InputError(f"key {name!r}", "there is none of that name", "write for example escape, f1 or ctrl+z")
-    for down in (True, False):  # one after the other, in as many frames
-        for key in keys:
-            _io().add_key_event(key, down)
-
-
-def _save_preset(state: WindowState, name: str) -> None:
-    from translucent.preview.panels.files import save_preset
-
-    save_preset(state, name)
-
-
-def hold_pointer(state: WindowState) -> None:
-    """Keep the mouse where the script has put it, whatever the system reports."""
-    if state.pointer is not None:
-        from translucent.preview.dialogs import move_pointer
-
-        size = _io().display_size
-        place = state.pointer[0] * size.x, state.pointer[1] * size.y
-        move_pointer(*place)
-        _io().add_mouse_pos_event(*place)
-
-
-def _io() -> Any:
-    from imgui_bundle import imgui
-
-    return imgui.get_io()
-
-
-def _select(panel: str) -> None:
-    from imgui_bundle import hello_imgui
-
-    window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(panel)
-    if window is None:
-        raise InputError(f"panel {panel!r}", "there is none", f"use {', '.join(PANELS)}")
-    window.focus_window_at_next_frame = True

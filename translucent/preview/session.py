@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +19,7 @@ from translucent.preview.document import AUTO, STAGE_WORDS, Assigned, Document, 
 #: Version of the format, raised by changes that older readers cannot read.
 VERSION = 1
 
-#: Keys of older sessions that say nothing any more: what was a switch of the material is left to the planner, or to
-#: ``display.scattering``.
+#: Keys of older sessions without a meaning now: ``display.scattering`` replaces a switch of the material.
 _FORMER = {"material": ("multiple_scattering",)}
 
 _SECTIONS = ("model", "material", "look", "display", "orbit")
@@ -110,11 +111,11 @@ def save_session(path: str | Path, document: Document) -> None:
     """
     tomli_w = require_package("tomli_w", f"session {str(path)!r}")
     text = tomli_w.dumps(to_table(document))
-    write_atomically(Path(path), lambda file: _write_text(file, text))
 
+    def write(file: Path) -> None:
+        file.write_text(text, encoding="utf-8")
 
-def _write_text(file: Path, text: str) -> None:
-    file.write_text(text, encoding="utf-8")
+    write_atomically(Path(path), write)
 
 
 def load_session(path: str | Path) -> Document:
@@ -138,61 +139,48 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         raise InputError(what, f"no TOML: {error}", "correct the file") from None
 
 
-def _file(name: str) -> Path:
-    return config_folder() / name
+@dataclass(frozen=True)
+class Preferences:
+    """Choices that one window leaves to the next, each in a text file of the user's folder.
 
+    Attributes
+    ----------
+    recent : list of str
+        Recently opened files, the latest first.
+    folders : list of str
+        Folders in which files were used last.
+    environments : str
+        Folder of environments, or nothing.
+    stage : str
+        Stage of the last window; at first, the choice of ``translucent render``.
+    """
 
-def _read(name: str) -> list[str]:
-    try:
-        return _file(name).read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
-        return []  # a file that cannot be read is no reason not to start
+    recent: list[str] = field(default_factory=list)
+    folders: list[str] = field(default_factory=list)
+    environments: str = ""
+    stage: str = AUTO
 
+    @classmethod
+    def read(cls) -> Preferences:
+        """Read the preferences, without files and folders that are gone."""
 
-def _write(name: str, lines: list[str]) -> None:
-    try:
-        _file(name).parent.mkdir(parents=True, exist_ok=True)
-        _file(name).write_text("\n".join(lines), encoding="utf-8")
-    except OSError:
-        return  # nor is one that cannot be written a reason to fail at the end
+        def lines(name: str) -> list[str]:
+            try:
+                return (config_folder() / f"{name}.txt").read_text(encoding="utf-8").splitlines()
+            except (OSError, UnicodeDecodeError):
+                return []  # a file that cannot be read is no reason not to start
 
+        return cls(
+            list(filter(os.path.exists, lines("recent"))),
+            list(filter(os.path.isdir, lines("folders"))),
+            next(filter(os.path.isdir, lines("environments")), ""),
+            next((line for line in lines("stage")[:1] if line in STAGE_WORDS), AUTO),
+        )
 
-def read_recent() -> list[str]:
-    """Read recent paths, the latest first; those that are gone are left out. None where there is no such list."""
-    return [line for line in _read("recent.txt") if os.path.exists(line)]
-
-
-def write_recent(paths: list[str]) -> None:
-    """Write the list, if possible."""
-    _write("recent.txt", paths)
-
-
-def read_folders() -> list[str]:
-    """Read the folders in which files were used last; those that are gone are left out."""
-    return [line for line in _read("folders.txt") if os.path.isdir(line)]
-
-
-def write_folders(folders: list[str]) -> None:
-    """Write the list, if possible."""
-    _write("folders.txt", folders)
-
-
-def read_environments() -> str:
-    """Read the folder of environments; empty if there is none."""
-    return next((line for line in _read("environments.txt") if os.path.isdir(line)), "")
-
-
-def write_environments(folder: str) -> None:
-    """Write it, if possible."""
-    _write("environments.txt", [folder])
-
-
-def read_stage() -> str:
-    """Read the stage of the last window; at first, the one that ``translucent render`` would take."""
-    lines = _read("stage.txt")
-    return lines[0] if lines and lines[0] in STAGE_WORDS else AUTO
-
-
-def write_stage(stage: str) -> None:
-    """Write it, if possible."""
-    _write("stage.txt", [stage])
+    def write(self) -> None:
+        """Write the preferences, if possible."""
+        with suppress(OSError):  # nor is a file that cannot be written a reason to fail at the end
+            config_folder().mkdir(parents=True, exist_ok=True)
+            for name, value in dataclasses.asdict(self).items():
+                text = "\n".join([value] if isinstance(value, str) else value)
+                (config_folder() / f"{name}.txt").write_text(text, encoding="utf-8")

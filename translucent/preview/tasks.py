@@ -1,22 +1,23 @@
-"""Long tasks in threads, with progress and cancellation."""
+"""Tasks in background threads, with progress and cancellation."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from queue import SimpleQueue
-from typing import Any, TypeAlias
+from typing import Any
 
 from translucent.errors import TranslucentError
-
-#: Callback for progress, 0 to 1 if that is known, and a description of the step.
-Report: TypeAlias = Callable[[float | None, str], None]
 
 
 class CancelledError(Exception):
     """Signal within a task that it is canceled."""
+
+
+def _nothing(_: Any) -> None:
+    """Replacement for the work of a canceled task."""
 
 
 @dataclass(eq=False)
@@ -26,37 +27,30 @@ class Task:
     Attributes
     ----------
     name : str
-        What the user reads.
+        Shown to the user; empty for work that nobody waits for.
     work : callable
-        Takes the task, which it tells how far it is by `report`.
+        Takes the task, to which it reports its progress.
     then : callable
         Takes the result, in the thread that polls.
     share : float, optional
-        Done, 0 to 1, if that is known.
+        Finished fraction of the work, if that is known.
     detail : str
-        What it is at.
+        Current step of the work.
+    key : Hashable, optional
+        Identity of the result, see `Lane.request`.
     """
 
     name: str
     work: Callable[[Task], Any]
-    then: Callable[[Any], None]
+    then: Callable[[Any], None] = _nothing
     started: float = field(default_factory=time.monotonic)
     share: float | None = None
     detail: str = ""
+    key: Hashable = None
     result: Any = None
     error: Exception | None = None
-    _cancelled: threading.Event = field(default_factory=threading.Event)
-    _finished: threading.Event = field(default_factory=threading.Event)
-
-    @property
-    def cancelled(self) -> bool:
-        """True if the task is canceled."""
-        return self._cancelled.is_set()
-
-    @property
-    def finished(self) -> bool:
-        """True if the task has ended, in whichever way."""
-        return self._finished.is_set()
+    cancelled: bool = False
+    finished: bool = False
 
     @property
     def seconds(self) -> float:
@@ -64,7 +58,7 @@ class Task:
         return time.monotonic() - self.started
 
     @property
-    def told(self) -> str:
+    def progress(self) -> str:
         """Progress of the task, in words."""
         share = "" if self.share is None else f"{self.share:.0%}"
         parts = " ".join(filter(None, (self.detail, share, f"{self.seconds:.0f} s")))
@@ -72,7 +66,7 @@ class Task:
 
     def cancel(self) -> None:
         """Cancel the task: the work ends at its next report, or does not start."""
-        self._cancelled.set()
+        self.cancelled = True
         # A task may wait long behind another one, and what it would have drawn is large.
         self.work = self.then = _nothing
 
@@ -92,15 +86,11 @@ class Task:
         except Exception as error:  # noqa: BLE001 - whatever it is, the window tells it and stays
             self.error = error
         finally:
-            self._finished.set()
-
-
-def _nothing(_: Any) -> None:
-    """Replacement for the work of a canceled task."""
+            self.finished = True
 
 
 class Lane:
-    """Thread that runs one task after the other; a new request replaces the last one.
+    """Thread that runs one task after the other; a new task replaces the last one.
 
     Parameters
     ----------
@@ -109,12 +99,13 @@ class Lane:
 
     def __init__(self, name: str) -> None:
         self.task: Task | None = None
+        self._failed = set[Hashable]()
         self._waiting: SimpleQueue[Task | None] = SimpleQueue()
         # A daemon: nobody who closes the window waits for a reference that nobody will see.
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def start(self, name: str, work: Callable[[Task], Any], then: Callable[[Any], None]) -> Task:
+    def start(self, name: str, work: Callable[[Task], Any], then: Callable[[Any], None] = _nothing) -> Task:
         """Start work; work under way is canceled."""
         if self.task is not None:
             self.task.cancel()
@@ -122,12 +113,23 @@ class Lane:
         self._waiting.put(self.task)
         return self.task
 
+    def request(self, key: Hashable, name: str, work: Callable[[Task], Any]) -> None:
+        """Start work, unless other work is under way; `key` identifies its result, see `failed`."""
+        if self.task is None:
+            self.start(name, work).key = key
+
+    def failed(self, key: Hashable) -> bool:
+        """True if the work for this key failed, or was canceled by the user: it should not be requested again."""
+        return key in self._failed
+
     def poll(self, refuse: Callable[[Exception], None]) -> None:
         """Deliver a result that is ready, or its error."""
         task = self.task
         if task is None or not task.finished:
             return
         self.task = None
+        if task.key is not None and (task.cancelled or task.error is not None):
+            self._failed.add(task.key)
         if task.cancelled:
             return
         if task.error is None:

@@ -1,4 +1,4 @@
-"""Viewport renderer: short steps in the window's context, shaders that may change, and the picture as it is shown."""
+"""Viewport renderer: draws the scene on show in short steps, in the window's context, with shaders that may change."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from translucent.gpu.compile_budget import PostponedError, ProgramName
 from translucent.gpu.context import open_context
 from translucent.gpu.viewport import PixelProbe, Shown, Viewport
 from translucent.planning.methods import Method
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.measuring import ReferencePicture
+from translucent.preview.preparation import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.quality import (
     COARSEST_TRACED,
     FACTORS,
@@ -29,156 +30,56 @@ from translucent.preview.quality import (
     Strides,
     samples_of,
 )
-from translucent.preview.refining import Converging, Photons
+from translucent.preview.refining import PathRefinement, PhotonRefinement
 from translucent.preview.scenes import method_of, tone_of
 from translucent.preview.tasks import Task
-from translucent.preview.workspace import Workspace, relights
+from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
-
-
-def thickest(workspace: Workspace) -> float:
-    """Length in metres of the last false color: the thickest that was measured, or a guess."""
-    measured = workspace.measured
-    if measured is not None and measured.seen.thickness.size:
-        return float(measured.seen.thickness.max()) or 1.0
-    return workspace.loaded.scene.diagonal or 1.0 if workspace.loaded else 1.0
-
-
-def worst(workspace: Workspace) -> float:
-    """Largest error in metres that has a color of its own."""
-    measured = workspace.measured
-    least = 1e-7 * thickest(workspace)
-    return max(measured.errors[0].p99, least) if measured is not None and measured.errors else 10 * least
-
-
-#: Seconds up to which a presentation is quick: whatever changes is shown at once. Others are as many seconds apart, and
-#: have frames of their own, as the first of each kind has, which is compiled.
-QUICK, APART = 0.006, 0.25
-
-
-class Presenting:
-    """Presentation of a viewport.
-
-    Attributes
-    ----------
-    truth : ReferencePicture, optional
-        The reference right of the split.
-    shown : tuple
-        Key of what is on show; empty: nothing of the samples.
-    """
-
-    def __init__(self) -> None:
-        self.truth: ReferencePicture | None = None
-        self.shown: tuple[object, ...] = ()
-        self._wanted: tuple[Shown, tuple[object, ...]] | None = None
-        self._pending = self._alone = False
-        self._seconds = self._when = 0.0
-
-    def begin(self, workspace: Workspace, scene: Scene, viewport: Viewport, key: tuple[object, ...]) -> bool:
-        """Begin a frame that shows samples of a picture with a key; returns whether it is to do nothing else."""
-        display, look = workspace.document.display, workspace.document.look
-        wanted_method = method_of(display.method, workspace.document.material)
-        if display.compare in ("reference", "error"):
-            truth = workspace.truth
-            straight = display.compare == "error"
-            if self.truth is not None and straight and not self.truth.straight:
-                self.truth = None
-            fits = truth is not None and truth.scene is scene and truth.method == wanted_method
-            if fits and truth is not None and truth is not self.truth and truth.straight >= straight:
-                viewport.put(truth.frame)
-                self.truth, self._pending = truth, True
-        right = {"off": "same", "method": "second", "reference": "second", "error": "difference"}[display.compare]
-        if display.compare in ("reference", "error") and self.truth is None:
-            right = "same"
-        shown = Shown(
-            display.mode,
-            right,
-            display.split,
-            thickest(workspace),
-            worst(workspace),
-            look.exposure,
-            tone_of(look, scene),
-        )
-        self._wanted = shown, key
-        waits = self._wanted != self.shown or (self._pending and time.perf_counter() - self._when > APART)
-        first = self._is_first(viewport)
-        self._alone = (first or (waits and self._seconds > QUICK)) and viewport.steps(0) > 0
-        return self._alone
-
-    def present(self, viewport: Viewport, *, changed: bool, last: bool) -> bool:
-        """Show the samples so far, unless they are on show, or can be shown later; returns whether they have to be.
-
-        Parameters
-        ----------
-        viewport : Viewport
-        changed : bool
-            There are others than before.
-        last : bool
-            No others are to come.
-        """
-        assert self._wanted is not None
-        self._pending = self._pending or changed
-        now = self._alone or last or self._seconds <= QUICK
-        if self._wanted == self.shown and not (self._pending and now):
-            return False
-        if not self._alone and self._is_first(viewport):
-            return True
-        begun = time.perf_counter()
-        viewport.present(self._wanted[0])
-        viewport.engine.context.gl.finish()
-        self.shown, self._pending, self._when = self._wanted, False, time.perf_counter()
-        self._seconds = self._when - begun
-        return False
-
-    def _is_first(self, viewport: Viewport) -> bool:
-        """True if nothing has been shown so before."""
-        return self._wanted is not None and not viewport.presents_at_once(self._wanted[0])
-
 
 #: Largest time of a step in seconds, where the rest of the window takes little.
 BUDGET = 0.045
 
-#: Picture that stays on show while the wanted one is prepared.
-LAST = "the last picture, until the new one is prepared"
-
 #: Seconds between checks of the shader files.
 WATCH = 0.5
 
+#: Seconds up to which a presentation is quick: every change is shown at once. Others are as many seconds apart, and
+#: have frames of their own, as the first of each type has, which is compiled.
+QUICK, APART = 0.006, 0.25
+
 
 class ViewportRenderer:
-    """Stage: draws a workspace's scene into a texture.
+    """Renderer of a workspace's scene into the texture of a viewport.
 
     Parameters
     ----------
     context : moderngl.Context, optional
-        Of the window; None opens one without a window.
+        Context of the window; None opens one without a window.
     compiler : Compiler, optional
         Compiles what a picture needs, from the second one on, while the one before stays on show.
 
     Attributes
     ----------
     plans : list of RenderPlan or None
-        Of both sides; what ran and why.
+        Plans of both sides.
     timings : list of StepTiming
     problem : str
         Why the picture is not what it should be, or nothing.
     shader_problem : str
         The compiler's message, while the last good shaders go on.
     quality : InteractiveQuality
-        In which light that is scattered and interfaces are shown.
-    converging : Converging
+    paths : PathRefinement
         Paths of the still picture.
-    photons : Photons
-        That light it, unless it is made of paths.
+    photons : PhotonRefinement
+        Photons of the still picture, unless it is made of paths.
     state : str
         Which picture is on show: one that moves, one that becomes sharp, or the full one.
     simpler : str
-        What is drawn more simply while the picture moves, and why, or nothing.
+        Simplifications while the picture moves, with their reason, or nothing.
     drawing : float
         Seconds that the last call of `draw` took.
     waits : bool
-        There was nothing to draw in it before others are done.
+        That call had nothing to draw before other work is done.
     """
 
     def __init__(self, context: Any = None, compiler: Compiler | None = None) -> None:
@@ -201,27 +102,33 @@ class ViewportRenderer:
         self._held: Scene | None = None
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
-        self._asked: Task | None = None
-        self._presenting, self._pace = Presenting(), StepTimes()
+        self._requested: Task | None = None
+        self._presenter, self._times = _Presenter(), StepTimes()
         self._frame_budget, self._budget = FrameBudget(), BUDGET
-        self._strides = Strides(self._pace)
+        self._strides = Strides(self._times)
         self.quality = InteractiveQuality(traced_at_once=compiler is None)
-        self.converging, self.photons = Converging(), Photons()
+        self.paths, self.photons = PathRefinement(), PhotonRefinement()
         self._watched, self._newest = time.monotonic(), newest_shader()
-
-    def current(self) -> AbstractContextManager[Any]:
-        """Context manager that makes the context current: a window's always is."""
-        return nullcontext(self._gl) if self._own is None else self._own.current()
 
     def _new_renderer(self) -> Renderer:
         renderer = Renderer(context=self._gl)
         renderer.gpu.diffusion.warm_starts = True  # light changes from frame to frame
         return renderer
 
+    def current(self) -> AbstractContextManager[Any]:
+        """Context manager that makes the context current: a window's always is."""
+        return nullcontext(self._gl) if self._own is None else self._own.current()
+
+    @property
+    def notes(self) -> list[str]:
+        """Lines on what is wrong with the picture, or simpler than requested, and on its refinement."""
+        simpler = self.problem, self.shader_problem, self.simpler, *self.quality.notes
+        return [text for text in (*simpler, self.paths.note, self.photons.note) if text]
+
     def draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
         """Draw a step, if there is one left; returns whether more are.
 
-        What goes wrong is told in `problem`, and the last picture stays.
+        If that fails, `problem` says why, and the last picture stays.
         """
         started = time.perf_counter()
         self._budget = self._frame_budget.begin(BUDGET)
@@ -256,85 +163,76 @@ class ViewportRenderer:
         if scene is None:
             return False
         material, both = workspace.document.material, display.compare == "method"
-        methods = [method_of(display.method, material), method_of(display.method_b, material)]
+        method = method_of(display.method, material)
+        second = method_of(display.method_b, material) if both else None
         if held is None:
             begun = time.perf_counter()
-            self.quality.choose(workspace, scene, methods[0], self.renderer)
+            self.quality.choose(workspace, scene, method, self.renderer)
             spent = time.perf_counter() - begun
             if self.quality.solved and spent > PREPARING * self._budget:
                 self._held = scene  # the next frame draws this one, or what moves all the time would not be drawn
                 return True
             self._budget -= min(spent, PREPARING * self._budget)
-        scattering, interfaces = self.quality.scattering, self.quality.interfaces
-        second = methods[1] if both else None
-        wanted = (scene, methods[0], second, scattering, interfaces, self.viewport.size, self.renderer)
+        interfaces, scattering = self.quality.interfaces, self.quality.scattering
+        wanted = (scene, method, second, interfaces, scattering, self.viewport.size, self.renderer)
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
             self.waits = True
             return True
-        if (not display.converges or wanted != self._shown) and self.converging.stop():
-            self._shown = ()  # the interactive picture is drawn again
-        if (not display.follows_photons or wanted != self._shown) and self.photons.stop(self.viewport):
-            self._shown = ()
         fresh = wanted != self._shown
-        if not fresh:
+        stopped = (fresh or not display.converges) and self.paths.stop()
+        stopped |= (fresh or not display.follows_photons) and self.photons.stop(self.viewport)
+        if not fresh and not stopped:
             self._begin(workspace, scene)
             self.watch(workspace)
-        else:
+        else:  # or the interactive picture is drawn again
             plan = partial(self.renderer.plan, scene, interfaces=interfaces, scattering=scattering)
-            self.plans = [plan(methods[0]), plan(methods[1]) if both else None]
+            self.plans = [plan(method), plan(second) if both else None]
             self._shown = wanted
             self.viewport.restart()
-            self._presenting.truth = None
+            self._presenter.truth = None
             self._strides.begin(self.plans, self._budget)
             self._moving, self.simpler = None, ""
-            if self._compiler is not None and self._compiler.lacks_normals(scene, self._drawn_plans):
+            if self._compiler is not None and self._compiler.budget.postpones and unsmoothed(scene, self._drawn_plans):
                 self._postpone(workspace, wanted)
                 return True
             if display.mode == "picture" and display.compare == "off":
-                return self._draw_at_once(scene, methods[0], workspace)
+                return self._draw_at_once(scene, method, workspace)
         # One side at a time, the one that is behind: two would take twice as long.
         sides = sorted((0, 1), key=self.viewport.steps) if both else [0]
-        lit = display.follows_photons and self.viewport.steps(0) >= self._strides.of[0] ** 2
         still = (display.converges or display.follows_photons) and self.quality.traceable(workspace, scene)
-        lit = lit and still
+        lit = still and display.follows_photons and self.viewport.steps(0) >= self._strides.of[0] ** 2
         # A large picture takes as long to be shown as a step: it has a frame for that alone.
-        alone = self._presenting.begin(workspace, scene, self.viewport, self._shown)
-        antialias = display.antialias and not relights(workspace)
+        alone = self._presenter.begin(workspace, scene, self.viewport, self._shown)
+        antialias = display.antialias and not workspace.relights
         drawn = not lit and not alone and any(self._step(side, scene, antialias) for side in sides)
-        more = drawn or alone or relights(workspace)
+        more = drawn or alone or workspace.relights
         self.waits = more and not (drawn or alone or lit)
         if display.converges and still and not more:
-            more, drawn = self.converging.step(scene, self.renderer, self.viewport, self._budget)
+            more, drawn = self.paths.step(scene, self.renderer, self.viewport, self._budget)
         if lit:
-            more, drawn = self._light_by_photons(scene, methods[0], workspace)
+            more, drawn = self._light_by_photons(scene, method, workspace)
             if self.photons.light is None and not more:  # there are no photons to follow
                 more = drawn = self._step(0, scene, display.antialias)
-        return self._presenting.present(self.viewport, changed=drawn, last=not more) or more
+        return self._presenter.present(self.viewport, changed=drawn, last=not more) or more
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
-        look, scattering, interfaces = workspace.document.look, self.quality.scattering, self.quality.interfaces
+        look, interfaces, usual = workspace.document.look, self.quality.interfaces, self.plans[0]
+        assert usual is not None
         shadows = self.quality.quick_shadows(scene)
-        planned = partial(self.renderer.plan, scene, method, scattering=scattering, shadows=shadows)
+        choices: dict[str, Any] = {"scattering": self.quality.scattering, "shadows": shadows}
         if shadows is not None:
-            self._moving = planned(interfaces=interfaces)
+            self._moving = self.renderer.plan(scene, method, interfaces=interfaces, **choices)
         slowest = self._budget * COARSEST_TRACED**2
-        if any(self._pace.traces_longer(plan, slowest) for plan in (self.plans[0], self._moving)):
+        plans = usual, self._moving or usual
+        if any(plan.has(PassName.TRACED) and self._times.known(plan) > slowest for plan in plans):
             interfaces = SCREEN
-            self._moving = planned(interfaces=interfaces)
-        begun, factor = time.perf_counter(), self._pace.factor(self._moving or self.plans[0], FACTORS, self._budget)
+            self._moving = self.renderer.plan(scene, method, interfaces=interfaces, **choices)
+        begun, factor = time.perf_counter(), self._times.factor(self._moving or usual, FACTORS, self._budget)
         try:
             with self.viewport.at_once(factor) as framebuffer:
-                plan = self.renderer.draw(
-                    scene,
-                    framebuffer,
-                    method,
-                    look.exposure,
-                    tone_of(look, scene),
-                    interfaces=interfaces,
-                    scattering=scattering,
-                    shadows=shadows,
-                )
+                developed = look.exposure, tone_of(look, scene)
+                plan = self.renderer.draw(scene, framebuffer, method, *developed, interfaces=interfaces, **choices)
         except PostponedError as error:
             if error.program is None:
                 self._shown = ()  # the same again: what has been made is for pictures of this size
@@ -345,7 +243,7 @@ class ViewportRenderer:
             self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
         elif shadows is not None:
             self.simpler = f"shadows from {shadows.directions} directions of the environment while the picture moves"
-        self._presenting.shown = ()
+        self._presenter.shown = ()
         return True
 
     def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
@@ -365,34 +263,36 @@ class ViewportRenderer:
 
     def _light_by_photons(self, scene: Scene, method: Method | None, workspace: Workspace) -> tuple[bool, bool]:
         """Follow photons, or draw a step of the picture with their light; whether more is to come, and it changed."""
-        photons = self.photons
-        expected = 0.0 if self.plans[0] is None else self._pace.known(self.plans[0])
-        given = self.renderer, self.viewport, method, self.quality.scattering
-        if not photons.ready(workspace, scene, *given, self._budget, expected):
-            if (plan := photons.show_media(self.viewport)) is not None:
-                self.plans[0], self._strides.of[0] = plan, self._pace.stride(plan, self._budget)
+        photons, strides = self.photons, self._strides.of
+        expected = 0.0 if self.plans[0] is None else self._times.known(self.plans[0])
+        plan = partial(self.renderer.plan, scene, method, scattering=self.quality.scattering)
+        if not photons.ready(workspace, scene, self.renderer, self.viewport, plan, self._budget, expected):
+            if (shown := photons.show_media(self.viewport)) is not None:
+                self.plans[0], strides[0] = shown, self._times.stride(shown, self._budget)
             return False, False
         if not photons.drawing or photons.plan is None or photons.light is None:
             return True, False
         if photons.side == 1 and not self.viewport.steps(1):
-            self._strides.of[1] = self._pace.stride(photons.plan, self._budget)
-        stride, begun = self._strides.of[photons.side], time.perf_counter()
+            strides[1] = self._times.stride(photons.plan, self._budget)
+        stride, begun = strides[photons.side], time.perf_counter()
         samples = samples_of(stride, workspace.document.display.antialias)
         self.viewport.step(photons.side, scene, photons.plan, stride, max(samples, 1), photons=photons.light.texture)
         self._finish(0, photons.plan, stride, begun)
         if photons.take_over(self.viewport, stride, samples):
-            self._strides.of[0], self.plans[0] = stride, photons.plan
+            strides[0], self.plans[0] = stride, photons.plan
         return True, photons.side == 0
 
     def _finish(self, side: int, plan: RenderPlan, stride: float, begun: float) -> None:
+        """Wait for a step, and record its time."""
         self.renderer.gpu.context.gl.finish()
         wall = time.perf_counter() - begun
-        self._pace.note(plan, wall * stride * stride)
+        self._times.note(plan, wall * stride * stride)
         self.timings[side] = StepTiming(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
 
+    @property
     def has_truth(self) -> bool:
         """True if the split shows the reference."""
-        return self._presenting.truth is not None
+        return self._presenter.truth is not None
 
     def probe(self, x: int, y: int, side: int = 0) -> PixelProbe | None:
         """Values of a pixel of a side, once it is final."""
@@ -413,17 +313,16 @@ class ViewportRenderer:
 
     def _begin(self, workspace: Workspace, scene: Scene) -> None:
         """Mark the first picture as drawn: from now on, it stays on show while later ones are prepared."""
-        if self._begun:
-            return
-        self._begun = True
-        workspace.prepare()
-        if self._compiler is not None:
-            self._compiler.begin(scene, self._drawn_plans, partial(self._take_compiled, workspace))
+        if not self._begun:
+            self._begun = True
+            workspace.prepare()
+            if self._compiler is not None:
+                self._compiler.begin(scene, self._drawn_plans, partial(self._take_compiled, workspace))
 
     @property
     def _drawn_plans(self) -> list[RenderPlan]:
-        still = self.converging.plan, self.photons.plan
-        return [plan for plan in (*self.plans, self._moving, *still) if plan is not None]
+        plans = *self.plans, self._moving, self.paths.plan, self.photons.plan
+        return [plan for plan in plans if plan is not None]
 
     def _postpone(self, workspace: Workspace, wanted: tuple[object, ...], program: ProgramName | None = None) -> None:
         """Request missing programs; until they are there, the same picture is not tried again."""
@@ -431,16 +330,16 @@ class ViewportRenderer:
         assert compiler is not None
         assert isinstance(scene, Scene)
         self._postponed, self._shown = wanted, ()
-        self.state = LAST
-        if self._asked is not None and self._asked.cancelled:
+        self.state = "the last picture, until the new one is prepared"
+        if self._requested is not None and self._requested.cancelled:
             # The user does not wait, so that the window does the work.
-            self._asked = None
+            self._requested = None
             compiler.take(Compiled(frozenset()), program)
             for mesh in unsmoothed(scene, self._drawn_plans):
                 drawn_normals(mesh)
-        elif compiler.lane.task is None or not compiler.lane.task.name:  # for which nobody waits
+        elif compiler.lane.task is None or not compiler.lane.task.name:  # work that nobody waits for is replaced
             then = partial(self._take_compiled, workspace, missing=program)
-            self._asked = compiler.ask("preparing the picture", scene, self._drawn_plans, then)
+            self._requested = compiler.request("preparing the picture", scene, self._drawn_plans, then)
 
     def _take_compiled(self, workspace: Workspace, found: Compiled, missing: ProgramName | None = None) -> None:
         assert self._compiler is not None
@@ -450,7 +349,7 @@ class ViewportRenderer:
             workspace.tell("warning", text)
 
     def reload(self, workspace: Workspace) -> None:
-        """Compile the shaders anew; if that fails, keep the present ones, and tell why."""
+        """Compile the shaders anew; if that fails, keep the present ones, and set `shader_problem`."""
         compiler, scene = self._compiler, workspace.scene()
         if compiler is None or not compiler.budget.postpones or scene is None:
             return self._rebuild(workspace)
@@ -465,47 +364,126 @@ class ViewportRenderer:
             compiler.budget.postpones = True
             self._take_compiled(workspace, found)
 
-        compiler.ask("preparing the picture", scene, self._drawn_plans, take)
+        compiler.request("preparing the picture", scene, self._drawn_plans, take)
         return None
 
     def _rebuild(self, workspace: Workspace) -> None:
-        scene = workspace.scene()
+        """Replace the renderer by one with the shaders as they are, if that can draw the scene."""
+        scene, size = workspace.scene(), self.viewport.size
         with self.current():
             fresh = self._new_renderer()
-            anew, viewport = partial(fresh.plan, scattering=self.quality.scattering), None
+            viewport = None
             try:
                 viewport = Viewport(fresh.gpu)
-                viewport.resize(FRAME)
-                for plan in self._drawn_plans if scene is not None else ():
-                    if scene is not None:
-                        viewport.step(0, scene, anew(scene, plan.method, interfaces=plan.interfaces), 1)
+                if scene is not None:
+                    viewport.resize(FRAME)
+                    for plan in self._drawn_plans:
+                        choices: dict[str, Any] = {"interfaces": plan.interfaces, "scattering": self.quality.scattering}
+                        viewport.step(0, scene, fresh.plan(scene, plan.method, **choices), 1)
+                viewport.restart()
+                viewport.resize(size)
             except TranslucentError as error:
                 self.shader_problem = str(error)
                 if viewport is not None:
                     viewport.release()
                 fresh.close()
                 return
-            viewport.release()
-            self._take_over(fresh)
+            self._release()
+            self.renderer, self.viewport, self.shader_problem = fresh, viewport, ""
+            self._shown = self._presenter.shown = ()
         workspace.tell("info", "shaders reloaded")
 
-    def _take_over(self, fresh: Renderer) -> None:
-        self.converging.stop()
+    def _release(self) -> None:
+        self.paths.stop()
         self.photons.stop(self.viewport)
-        size, self.shader_problem = self.viewport.size, ""
         self.viewport.release()
         self.renderer.close()
-        self.renderer = fresh
-        self.viewport = Viewport(fresh.gpu)
-        self.viewport.resize(size)
-        self._shown = self._presenting.shown = ()
 
     def close(self) -> None:
         """Free all resources."""
         with self.current():
-            self.converging.stop()
-            self.photons.stop(self.viewport)
-            self.viewport.release()
-            self.renderer.close()
+            self._release()
         if self._own is not None:
             self._own.gl.release()
+
+
+class _Presenter:
+    """Presentation of the samples of a viewport as the document asks for it, with the reference beside them.
+
+    Attributes
+    ----------
+    truth : ReferencePicture, optional
+        The reference right of the split.
+    shown : tuple
+        Key of the picture on show; empty: nothing of the samples.
+    """
+
+    def __init__(self) -> None:
+        self.truth: ReferencePicture | None = None
+        self.shown: tuple[object, ...] = ()
+        self._wanted: tuple[Shown, tuple[object, ...]] = Shown(), ()
+        self._pending = self._alone = False
+        self._seconds = self._when = 0.0
+
+    def begin(self, workspace: Workspace, scene: Scene, viewport: Viewport, key: tuple[object, ...]) -> bool:
+        """Begin a frame that shows samples of a picture with a key; returns whether it is to do nothing else."""
+        display, look, truth = workspace.document.display, workspace.document.look, workspace.truth
+        right = {"off": "same", "method": "second", "reference": "second", "error": "difference"}[display.compare]
+        if display.compare in ("reference", "error"):
+            straight = display.compare == "error"
+            if self.truth is not None and straight and not self.truth.straight:
+                self.truth = None
+            method = method_of(display.method, workspace.document.material)
+            if (
+                truth is not None
+                and truth is not self.truth
+                and (truth.scene is scene and truth.method == method and truth.straight >= straight)
+            ):
+                viewport.put(truth.frame)
+                self.truth, self._pending = truth, True
+            right = right if self.truth is not None else "same"
+        lengths = thickest(workspace), worst(workspace)
+        self._wanted = Shown(display.mode, right, display.split, *lengths, look.exposure, tone_of(look, scene)), key
+        waits = self._wanted != self.shown or (self._pending and time.perf_counter() - self._when > APART)
+        first = not viewport.presents_at_once(self._wanted[0])
+        self._alone = (first or (waits and self._seconds > QUICK)) and viewport.steps(0) > 0
+        return self._alone
+
+    def present(self, viewport: Viewport, *, changed: bool, last: bool) -> bool:
+        """Show the samples so far, unless they are on show, or can be shown later; returns whether they have to be.
+
+        Parameters
+        ----------
+        viewport : Viewport
+        changed : bool
+            There are others than before.
+        last : bool
+            No others are to come.
+        """
+        self._pending = self._pending or changed
+        now = self._alone or last or self._seconds <= QUICK
+        if self._wanted == self.shown and not (self._pending and now):
+            return False
+        if not self._alone and not viewport.presents_at_once(self._wanted[0]):
+            return True
+        begun = time.perf_counter()
+        viewport.present(self._wanted[0])
+        viewport.engine.context.gl.finish()
+        self.shown, self._pending, self._when = self._wanted, False, time.perf_counter()
+        self._seconds = self._when - begun
+        return False
+
+
+def thickest(workspace: Workspace) -> float:
+    """Length in metres of the last false color: the thickest that was measured, or a guess."""
+    measured = workspace.measured
+    if measured is not None and measured.seen.thickness.size:
+        return float(measured.seen.thickness.max()) or 1.0
+    return workspace.loaded.scene.diagonal or 1.0 if workspace.loaded else 1.0
+
+
+def worst(workspace: Workspace) -> float:
+    """Largest error in metres that has a color of its own."""
+    measured = workspace.measured
+    least = 1e-7 * thickest(workspace)
+    return max(measured.errors[0].p99, least) if measured is not None and measured.errors else 10 * least

@@ -1,50 +1,94 @@
-"""State of the window beside the document, and the widgets that panels share: rows, fields, cards."""
+"""State of the window beside the document, and the actions of its panels, keys, dropped files and scripts."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from imgui_bundle import ImVec2, hello_imgui, imgui
+from imgui_bundle import hello_imgui, imgui
 
-from translucent.errors import TranslucentError
-from translucent.preview.actions import Assign, ChoosePreset, SetField, changed_material, preset_material
-from translucent.preview.dialogs import Browser, browser_for, open_dialog
-from translucent.preview.document import RANGES, TIPS, Material
-from translucent.preview.library import EnvironmentFolder
+from translucent.errors import InputError, TranslucentError
+from translucent.gltf.load import SUFFIXES
+from translucent.gltf.write import Filling, write_media
+from translucent.planning.caustics import Caustics
+from translucent.preview.actions import Assign, ChoosePreset, Hide, SetField, changed_material, preset_material
+from translucent.preview.dialogs import (
+    QUESTIONS,
+    Browser,
+    browser_for,
+    chosen_path,
+    move_pointer,
+    open_dialog,
+    with_recent,
+)
+from translucent.preview.document import Material, Model
+from translucent.preview.exports import Recipe, command_line, python_code, write_picture, write_turntable
+from translucent.preview.library import ENVIRONMENT_SUFFIXES, EnvironmentFolder, model_key, model_picture
 from translucent.preview.measuring import Crossing, first_object
-from translucent.preview.scenes import material_of
-from translucent.preview.thumbnails import model_key, model_picture
+from translucent.preview.scenes import material_of, medium_of, method_of, scattering_of, tone_of
+from translucent.preview.session import save_session
 from translucent.preview.viewport_renderer import ViewportRenderer
-from translucent.preview.workspace import Comparing, Workspace
-from translucent.scene.scene import Object
+from translucent.preview.workspace import Workspace
+from translucent.scene.scene import Object, Scene
 from translucent.scene.showcase import fillable
 
 #: Largest number of triangles among which a thread finds the one under the mouse; else a worker process does.
 PICKED_AT_ONCE = 200_000
 
-#: sRGB colors of warnings, errors and secondary lines.
-WARNING, ERROR, FAINT = (1.0, 0.75, 0.35, 1.0), (1.0, 0.45, 0.35, 1.0), (0.62, 0.64, 0.68, 1.0)
-
 
 @dataclass
-class Probed:
-    """Probed pixel, with the reference's values for it."""
+class ProbedPixel:
+    """Pixel under the mouse, with the reference's values for it, once they are requested and known."""
 
     pixel: tuple[int, int]
     scene: object
     crossing: Crossing | None = None
-    asked: bool = False
+    requested: bool = False
 
 
 @dataclass
 class WindowState:
-    """Window state, none of which is part of the document."""
+    """State of the window, none of which is part of the document.
+
+    Attributes
+    ----------
+    work : Workspace
+    view : ViewportRenderer
+    drag : int
+        Number of the last drag: all changes in one are one step of undo.
+    more, drawn : bool
+        There is more to do for the view; its picture is done.
+    waits : bool
+        Nothing can be drawn before other work is done.
+    pressed_at : (x, y)
+        Where a button of the mouse was pressed, in pixels.
+    dragging_split : bool
+    texts : dict
+        Texts in fields that are not entered yet.
+    hovered, pinned : (x, y), optional
+        Probed positions, of the mouse and of a script, in fractions of the viewport.
+    pointer : (x, y), optional
+        Position of the mouse that a script gives, in fractions of the window.
+    selected : int, optional
+        Number of the selected object.
+    dialogs : list of (kind, dialog)
+    export, baking : dict
+        Options of exported pictures and of maps.
+    dragged : str
+        Name of the preset that is dragged.
+    browser : Browser, optional
+    folders : list of str
+        Folders that were used last.
+    environments : EnvironmentFolder
+    keys_shown : bool
+        The page of keys is open.
+    """
 
     work: Workspace
     view: ViewportRenderer
@@ -55,7 +99,7 @@ class WindowState:
     pressed_at: tuple[float, float] = (0.0, 0.0)
     dragging_split: bool = False
     texts: dict[str, str] = field(default_factory=dict)
-    probed: Probed | None = None
+    probed: ProbedPixel | None = None
     hovered: tuple[float, float] | None = None
     pointer: tuple[float, float] | None = None
     pinned: tuple[float, float] | None = None
@@ -68,12 +112,43 @@ class WindowState:
     folders: list[str] = field(default_factory=list)
     environments: EnvironmentFolder = field(default_factory=EnvironmentFolder)
     keys_shown: bool = False
-    kept_of: str = ""
-    _textures: dict[str, Any] = field(default_factory=dict)
-    _inset: tuple[Any, Any] | None = None
+    _pictured: str = ""
+    _textures: dict[str, tuple[Any, Any]] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        self.comparing = Comparing(self.work)
+    def draw(self, pixels: tuple[int, int]) -> bool:
+        """Draw a step, and start measurements of a still view; returns whether more steps are to come."""
+        self.work.size = pixels
+        self.work.update()
+        more = self.view.draw(self.work, pixels)
+        self.drawn, self.waits = not more, self.view.waits or not more
+        # All pixels are there; edges may become smooth later.
+        self.work.thumbnails.begin_frame(idle=not more or self.view.state.startswith("full"))
+        if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:
+            self._keep_picture()
+        return self.work.compare(self.view.viewport.size) or more or bool(self.work.busy)
+
+    def _keep_picture(self) -> None:
+        """Keep a small picture of a model's first resting view, for the list of recent files."""
+        path = self.get("model.path")
+        if self._pictured == path or not os.path.isfile(path) or not self.work.document.display.pictured:
+            return
+        self._pictured = path
+        with self.view.current():
+            seen = self.view.viewport.pixels()
+        self.work.thumbnails.put(model_key(path), model_picture(seen))
+
+    def texture(self, key: str, pixels: Any) -> Any:
+        """Texture of a small picture."""
+        known = self._textures.get(key)
+        if known is None or known[0] is not pixels:
+            if known is not None:
+                known[1].release()
+            size, content = pixels.shape[1::-1], np.ascontiguousarray(pixels[..., :3]).tobytes()
+            known = pixels, self.view.renderer.gpu.context.gl.texture(size, 3, content, alignment=1)
+            self._textures[key] = known
+        return known[1]
+
+    # Fields, objects and materials
 
     def change(self, name: str, value: Any, *, step: bool = False) -> None:
         """Give a field a value; all changes while the mouse is down are one undo step.
@@ -92,20 +167,22 @@ class WindowState:
         return getattr(self.material if section == "material" else getattr(self.work.document, section), key)
 
     @property
-    def target(self) -> int | None:
-        """Number of the selected object, if there are others beside it; None: panels are about the whole model."""
-        objects = self.objects
-        return self.selected if self.selected is not None and 1 < len(objects) > self.selected else None
-
-    @property
     def objects(self) -> Sequence[Object]:
         """Objects of the model."""
         return () if self.work.loaded is None else self.work.loaded.scene.objects
 
     @property
-    def target_text(self) -> str:
-        """Target that a material is assigned to."""
-        return "fills the model" if self.target is None else f"assigns to {self.name_of(self.target)}"
+    def target(self) -> int | None:
+        """Number of the selected object, if there are others beside it; None: panels are about the whole model."""
+        return self.selected if self.selected is not None and 1 < len(self.objects) > self.selected else None
+
+    def select(self, number: int | None) -> None:
+        """Select an object, or none."""
+        self.selected = number
+
+    def name_of(self, number: int) -> str:
+        """Name of an object."""
+        return self.objects[number].mesh.name or f"object {number}"
 
     @property
     def material(self) -> Material:
@@ -122,6 +199,13 @@ class WindowState:
         filled = any(one is loaded.scene.objects[number] for one in fillable(loaded.scene))
         own_of_file = document.material.source == "file" or not filled
         return material_of(loaded.scene, number) if own_of_file else document.material
+
+    def _assign(self, number: int, change: Callable[[Material], Material], drag: int | None = None) -> None:
+        try:
+            material = change(self.material_of(number))
+        except TranslucentError as error:
+            return self.work.refuse(error)
+        return self.work.do(Assign(number, material, drag))
 
     def choose_preset(self, name: str, number: int | None = None) -> None:
         """Fill an object with a preset: this one, the selected one, or the model."""
@@ -141,8 +225,20 @@ class WindowState:
 
         self.pick(position, give)
 
+    def save_preset(self, words: str) -> bool:
+        """Save the material as an own preset; returns whether it is."""
+        try:
+            path, left_out = self.work.library.save(words, self.material)
+        except TranslucentError as error:
+            self.work.refuse(error)
+            return False
+        self.work.tell("info", f"saved {path}")
+        if left_out:
+            self.work.tell("warning", f"no preset keeps: {', '.join(left_out)}")
+        return True
+
     def pick(self, position: tuple[float, float], then: Callable[[int | None], None]) -> None:
-        """Find the first object at a position, in shares of the viewport, in the background; None: there is none."""
+        """Find the first object at a position, in fractions of the viewport, in the background; None: there is none."""
         scene, size = self.work.scene(), self.view.viewport.size
         if scene is None:
             return
@@ -158,38 +254,25 @@ class WindowState:
         else:
             self.work.cross(scene, size, (x, y), lambda found: take(found.body))
 
-    def select(self, number: int | None) -> None:
-        """Select an object, or none."""
-        self.selected = number
+    def hide(self, number: int) -> None:
+        """Hide an object, or show it again; the last one on show stays."""
+        self._require(number)
+        hidden = set(self.work.document.hidden) ^ {number}
+        if hidden >= set(range(len(self.objects))):
+            found = "it is the only one on show"
+            return self.work.refuse(InputError(f"hiding {self.name_of(number)}", found, "show another object first"))
+        return self.work.do(Hide(tuple(hidden)))
 
-    def name_of(self, number: int) -> str:
-        """Name of an object."""
-        return self.objects[number].mesh.name or f"object {number}"
+    def isolate(self, number: int) -> None:
+        """Show an object alone, or all if it is alone."""
+        self._require(number)
+        every = range(len(self.objects))
+        alone = self.work.document.shown_among(len(every)) == (number,)
+        self.work.do(Hide(() if alone else tuple(i for i in every if i != number)))
 
-    def _assign(self, number: int, change: Callable[[Material], Material], drag: int | None = None) -> None:
-        try:
-            material = change(self.material_of(number))
-        except TranslucentError as error:
-            return self.work.refuse(error)
-        return self.work.do(Assign(number, material, drag))
-
-    def draw(self, pixels: tuple[int, int]) -> bool:
-        """Draw a step, and start measurements of a still view; returns whether more steps are to come."""
-        self.work.size = pixels
-        self.work.update()
-        more = self.view.draw(self.work, pixels)
-        self.drawn = not more
-        self.waits = self.view.waits or not more
-        # All pixels are there; edges may become smooth later.
-        self.work.thumbnails.begin_frame(idle=not more or self.view.state.startswith("full"))
-        if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:
-            self._keep_picture()
-        uncompared = self.comparing.step(self.view.viewport.size)
-        return more or uncompared or bool(self.work.busy)
-
-    def frame(self) -> None:
-        """Frame the whole model, or the object that was clicked."""
-        self.work.frame(self.selected)
+    def _require(self, number: int) -> None:
+        if not 0 <= number < len(self.objects):
+            raise InputError(f"object {number}", f"the model has {len(self.objects)}", "give a number from 0 on")
 
     def turn_light(self, right: float, up: float) -> None:
         """Turn the light around and upwards, by degrees; it is switched on if it was off."""
@@ -198,8 +281,21 @@ class WindowState:
         self.change("look.light_yaw", math.remainder(self.get("look.light_yaw") + right, 360.0))
         self.change("look.light_pitch", min(max(self.get("look.light_pitch") + up, -89.0), 89.0))
 
+    def escape(self) -> None:
+        """Close what is on top: the file browser, the page of keys, or let go of the selected object."""
+        if self.browser is not None:
+            self.browser = None
+        elif self.keys_shown:
+            self.keys_shown = False
+        else:
+            self.select(None)
+
+    # Files
+
     def ask_file(self, kind: str, *, system: bool = True) -> None:
         """Ask for a file to read or to write: in a dialog of the system, or where it has none in the browser."""
+        if kind not in QUESTIONS:
+            raise InputError(f"ask {kind!r}", "there is no such question", f"use one of {', '.join(QUESTIONS)}")
         dialog = open_dialog(kind) if system else None
         if dialog is not None:
             self.dialogs.append((kind, dialog))
@@ -214,199 +310,147 @@ class WindowState:
         own = str(Path(model).resolve().parent) if os.path.isfile(model) else ""
         return [one for one in dict.fromkeys((*self.folders, own, os.getcwd(), str(Path.home()))) if os.path.isdir(one)]
 
-    def light_with(self, name: str) -> None:
-        """Light the model with an environment."""
-        self.change("look.environment", name, step=True)
+    def answer(self, path: str | None = None) -> None:
+        """Use the file that the browser names, or this one, and close it; else it says why not."""
+        if self.browser is None:
+            raise InputError(f"answer {path!r}", "nothing is asked", "ask first")
+        self.browser.text = self.browser.text if path is None else path
+        if (chosen := self.browser.accept()) is not None:
+            kind, self.browser = self.browser.kind, None
+            self.use_file(kind, chosen)
 
-    def escape(self) -> None:
-        """Close what is on top: the file browser, the page of keys, or let go of the selected object."""
-        if self.browser is not None:
-            self.browser = None
-        elif self.keys_shown:
-            self.keys_shown = False
-        else:
-            self.select(None)
+    def take_answers(self) -> None:
+        """Use the files of dialogs that have been answered."""
+        for entry in list(self.dialogs):
+            if (path := chosen_path(entry[1])) is not None:
+                self.dialogs.remove(entry)
+                if path:
+                    self.use_file(entry[0], path)
 
-    def _keep_picture(self) -> None:
-        """Keep a small picture of a model's first resting view, for the list of recent files."""
-        path = self.get("model.path")
-        if self.kept_of == path or not os.path.isfile(path) or not self.work.document.display.pictured:
+    def take_dropped(self, paths: Sequence[str]) -> None:
+        """Open the first session or model, light it with the first environment, and warn of the others."""
+        lights = [path for path in paths if Path(path).suffix.lower() in ENVIRONMENT_SUFFIXES]
+        models = [path for path in paths if path not in lights]
+        if lights:
+            self.environments.take(lights[0])
+            self.change("look.environment", lights[0], step=True)
+        if models and Path(models[0]).suffix.lower() == ".toml":
+            self.work.open_session(models[0])
+        elif models:
+            self.work.open(dataclasses.replace(self.work.document.model, path=models[0]))
+        if others := [*models[1:], *lights[1:]]:
+            names = ", ".join(Path(path).name for path in others[:3]) + (", ..." if len(others) > 3 else "")
+            text = f"{len(others)} dropped files are left out, as one model is shown at a time: {names}"
+            self.work.tell("warning", text)
+
+    def use_file(self, kind: str, path: str) -> None:
+        """Read or write a file, according to its dialog."""
+        work = self.work
+        self.folders = with_recent(self.folders, path)
+        match kind:
+            case "open":
+                work.open(Model(path, self.get("model.unit")))
+            case "open session":
+                work.open_session(path)
+            case "save session":
+                work.attempt(lambda: save_session(path, work.document), f"saved {path}")
+            case "environment" | "background":
+                work.do(SetField(f"look.{kind}", path))
+                self.environments.take(path)
+            case "save glb":
+                self._save_medium(path)
+            case "map":
+                if (bake := work.bake) is not None:
+                    work.write(path, lambda _: bake.map.save(path))
+            case "png" | "exr" | "turntable":
+                self._export(kind, path)
+            case _:
+                found = f"{kind!r} is nothing to read or write"
+                work.refuse(InputError(f"file {path!r}", found, f"use {', '.join(QUESTIONS)}"))
+
+    def _save_medium(self, path: str) -> None:
+        """Write the model's file with the medium in its materials; other types of files have none to keep."""
+        source, document, outside = self.get("model.path"), self.work.document, self.work.allow_outside
+        if Path(source).suffix.lower() not in SUFFIXES:
+            do = "copy the medium as glTF, or export the model as .glb first"
+            return self.work.refuse(InputError(f"saving into {path!r}", f"{Path(source).name} is no glTF file", do))
+        named = [(self.objects[one.object].mesh.name, one.material) for one in document.assigned]
+        whole = [] if named and document.material.source == "file" else [(None, document.material)]
+        fillings = [Filling(medium_of(one), one.distance, name) for name, one in (*whole, *named)]
+        return self.work.write(path, lambda _: write_media(source, path, fillings, allow_outside=outside))
+
+    def _export(self, kind: str, path: str) -> None:
+        scene, document = self.work.picture(), self.work.document
+        if scene is None:
             return
-        self.kept_of = path
-        with self.view.current():
-            seen = self.view.viewport.pixels()
-        self.work.thumbnails.put(model_key(path), model_picture(seen))
-
-    def texture(self, key: str, pixels: Any) -> Any:
-        """Texture of a small picture."""
-        if key not in self._textures:
-            height, width = pixels.shape[:2]
-            content = np.ascontiguousarray(pixels[..., :3]).tobytes()
-            self._textures[key] = self.view.renderer.gpu.context.gl.texture((width, height), 3, content, alignment=1)
-        return self._textures[key]
-
-    def inset_texture(self, pixels: Any) -> Any:
-        """Texture of the reference's small picture."""
-        if self._inset is None or self._inset[0] is not pixels:
-            if self._inset is not None:
-                self._inset[1].release()
-            height, width = pixels.shape[:2]
-            gl = self.view.renderer.gpu.context.gl
-            self._inset = pixels, gl.texture((width, height), 3, np.ascontiguousarray(pixels).tobytes(), alignment=1)
-        return self._inset[1]
-
-
-def em(count: float) -> float:
-    """Length of so many ems in pixels, whatever the display's scale."""
-    return float(hello_imgui.em_size(count))
-
-
-def begin_rows(name: str) -> bool:
-    """Begin a table of labels and fields."""
-    if not imgui.begin_table(name, 2, imgui.TableFlags_.sizing_stretch_prop):
-        return False
-    imgui.table_setup_column("label", imgui.TableColumnFlags_.width_fixed, em(9.2))
-    imgui.table_setup_column("field", imgui.TableColumnFlags_.width_stretch, 1.0)
-    return True
-
-
-def row(label: str, tip: str = "") -> None:
-    """Draw the label of the next field."""
-    imgui.table_next_row()
-    imgui.table_next_column()
-    imgui.align_text_to_frame_padding()
-    imgui.text(label)
-    tooltip(tip)
-    imgui.table_next_column()
-    imgui.set_next_item_width(-1.0)
-
-
-def slider(
-    state: WindowState,
-    label: str,
-    name: str,
-    low: float,
-    high: float,
-    form: str = "%.3f",
-    *,
-    log: bool = False,
-    unit: float = 1.0,
-) -> None:
-    """Slider for a number of the document, shown in a unit."""
-    row(label, TIPS.get(name, ""))
-    flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if log else 0)
-    changed, value = imgui.slider_float(f"##{name}", state.get(name) / unit, low / unit, high / unit, form, flags)
-    if not imgui.is_item_active():
-        tooltip(TIPS.get(name, ""))
-    if imgui.is_item_activated():
-        state.drag += 1
-    if changed and math.isfinite(value):
-        state.change(name, value * unit)
-
-
-def triple(state: WindowState, label: str, name: str, speed: float, form: str = "%.5g", *, tip: str = "") -> None:
-    """Fields for three numbers of the document, at least 0, on a line of their own; not in a table."""
-    wide_row(label, tip or TIPS.get(name, ""))
-    value = list(state.get(name))
-    changed, values = imgui.drag_float3(f"##{name}", value, speed, 0.0, min(RANGES[name].high, 1e9), form)
-    if imgui.is_item_activated():
-        state.drag += 1
-    if changed and all(math.isfinite(v) for v in values):
-        state.change(name, [max(v, 0.0) for v in values])
-
-
-def choice(state: WindowState, label: str, name: str, words: tuple[str, ...], *, tip: str = "") -> None:
-    """Choice of one of some words."""
-    row(label, tip or TIPS.get(name, ""))
-    now = state.get(name)
-    if imgui.begin_combo(f"##{name}", str(now)):
-        for word in words:
-            if imgui.selectable(word, word == now)[0]:
-                state.change(name, word, step=True)
-        imgui.end_combo()
-
-
-def tooltip(text: str) -> None:
-    """Draw a wrapped tooltip while the mouse is over the last item."""
-    if text and imgui.is_item_hovered() and imgui.begin_tooltip():
-        imgui.push_text_wrap_pos(em(30.0))
-        imgui.text(text)
-        imgui.pop_text_wrap_pos()
-        imgui.end_tooltip()
-
-
-def wide_row(label: str, tip: str = "") -> None:
-    """Label of a field on the whole line below it, outside a table."""
-    imgui.text(label)
-    tooltip(tip)
-    imgui.set_next_item_width(-1.0)
-
-
-def check(state: WindowState, label: str, name: str, *, tip: str = "") -> None:
-    """Checkbox."""
-    row(label, tip or TIPS.get(name, ""))
-    changed, value = imgui.checkbox(f"##{name}", bool(state.get(name)))
-    if changed:
-        state.change(name, value, step=True)
-
-
-def fact(label: str, text: str, color: tuple[float, float, float, float] | None = None) -> None:
-    """Label and text, wrapped over as many lines as it takes."""
-    imgui.table_next_row()
-    imgui.table_next_column()
-    imgui.text_colored(FAINT, label)
-    imgui.table_next_column()
-    imgui.push_text_wrap_pos(0.0)
-    if color is None:
-        imgui.text(text)
-    else:
-        imgui.text_colored(color, text)
-    imgui.pop_text_wrap_pos()
-
-
-def wrapped(text: str, color: tuple[float, float, float, float]) -> None:
-    """Draw wrapped text."""
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_colored(color, text)
-    imgui.pop_text_wrap_pos()
-
-
-#: Ems between two cards.
-GAP = 0.5
-
-CHOSEN, HOVERED, PLAIN = 0xFFFFB050, 0xFFC0C0C0, 0x40FFFFFF
-
-T = TypeVar("T")
-
-
-def draw_cards(
-    members: Sequence[T], least: float, height: Callable[[float], float], draw: Callable[[T, ImVec2], None]
-) -> None:
-    """Draw the cards of a list in rows, as far as they can be seen.
-
-    Parameters
-    ----------
-    members : sequence
-    least : float
-        Width of a card in ems, at least.
-    height : callable
-        From the width of a card to its height, in pixels.
-    draw : callable
-        Draws the card of a member, in a size.
-    """
-    room = imgui.get_content_region_avail().x
-    across = max(int((room + em(GAP)) / em(least + GAP)), 1)
-    width = (room - em(GAP) * (across - 1)) / across
-    size = ImVec2(width, height(width))
-    for i, member in enumerate(members):
-        if i % across:
-            imgui.same_line(0.0, em(GAP))
-        if imgui.is_rect_visible(size):
-            draw(member, size)
+        look = document.look.exposure, tone_of(document.look, scene)
+        shown = scene, method_of(document.display.method, document.material), self.view.viewport.size, look
+        choices = scattering_of(document.display.scattering), self._caustics(scene)
+        if kind == "turntable":
+            self.work.export(path, write_turntable, *shown, self.export["pictures"], *choices)
         else:
-            imgui.dummy(size)
+            self.work.export(path, write_picture, *shown, self.export["transparent"], *choices)
 
+    def copy_recipe(self, kind: str) -> str | None:
+        """Copy a ``command``, or ``python``, that makes the picture from here; None before there is one."""
+        work = self.work
+        if (scene := work.picture()) is None or work.loaded is None:
+            return None
+        if work.shown_bake is not None:
+            work.refuse(InputError("a recipe", "the model is painted with a map", "clear 'show on the model' first"))
+            return None
+        recipe = Recipe(work.document, work.loaded, scene, self.view.viewport.size, self._caustics(scene))
+        text, left_out = (python_code(recipe), []) if kind == "python" else command_line(recipe)
+        if left_out:
+            work.tell("warning", f"no option of the copied command says: {', '.join(left_out)}; Python does")
+        else:
+            work.tell("info", "copied as Python" if kind == "python" else "copied as a command")
+        imgui.set_clipboard_text(text)
+        return text
 
-def draw_frame(over: imgui.ImDrawList, low: ImVec2, high: ImVec2, *, chosen: bool, hovered: bool) -> None:
-    """Draw the frame of a card's picture, which tells whether it is chosen."""
-    over.add_rect(low, high, CHOSEN if chosen else HOVERED if hovered else PLAIN, 0.0, em(0.12) if chosen else 1.0)
+    def _caustics(self, scene: Scene) -> Caustics | None:
+        """Photons of a file: as many as the picture on show has, and what ``translucent render`` follows at least."""
+        document = self.work.document
+        if not document.display.caustics:
+            return None
+        light, method = self.view.photons.light, method_of(document.display.method, document.material)
+        caustics = Caustics(max(light.photons if light is not None else 0, Caustics().photons))
+        try:
+            self.view.renderer.plan(scene, method, caustics=caustics)
+        except InputError as error:
+            self.work.tell("warning", f"without caustics: {error}")
+            return None
+        return caustics
+
+    # Mouse, keys and panels, for scripts
+
+    @property
+    def io(self) -> Any:
+        """Input of the window."""
+        return imgui.get_io()
+
+    def press(self, name: str) -> None:
+        """Press and release a key, with modifiers before a plus sign, such as ``ctrl+z``."""
+        modifiers = {"ctrl": imgui.Key.mod_ctrl, "shift": imgui.Key.mod_shift, "alt": imgui.Key.mod_alt}
+        keys = [modifiers.get(word) or getattr(imgui.Key, word, None) for word in name.lower().split("+")]
+        if None in keys:
+            raise InputError(f"key {name!r}", "there is none of that name", "write for example escape, f1 or ctrl+z")
+        for down in (True, False):  # one after the other, in as many frames
+            for key in keys:
+                self.io.add_key_event(key, down)
+
+    def hold_pointer(self) -> None:
+        """Keep the mouse where a script has put it, whatever the system reports."""
+        if self.pointer is not None:
+            size = self.io.display_size
+            place = self.pointer[0] * size.x, self.pointer[1] * size.y
+            move_pointer(*place)
+            self.io.add_mouse_pos_event(*place)
+
+    def select_panel(self, panel: str) -> None:
+        """Bring a panel to the front of its tabs."""
+        docking = hello_imgui.get_runner_params().docking_params
+        names = [one.label for one in docking.dockable_windows if one.label != "Viewport"]
+        if panel not in names:
+            raise InputError(f"panel {panel!r}", "there is none", f"use {', '.join(names)}")
+        docking.dockable_window_of_name(panel).focus_window_at_next_frame = True

@@ -1,7 +1,9 @@
-"""One pool of worker processes, as libraries that hold the interpreter lock for seconds would freeze the window.
+"""Worker processes, as libraries that hold the interpreter lock for seconds would freeze the window.
 
-Processes start when there is work for them, and end when others are idle, too. Work that somebody waits for goes first.
-Large values are in files that all processes map: see `preview.sharing`.
+Processes start when there is work for them, and end when others are idle, too. Work that the picture waits for goes
+first. Large arrays travel in files that all processes map into memory. Such a file has no name: it ends with the last
+process that holds it, however that ends; and where memory is short, the system writes its pages to disk, which shared
+memory would keep.
 """
 
 from __future__ import annotations
@@ -23,13 +25,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import partial
+from functools import lru_cache
 from multiprocessing import reduction
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakKeyDictionary
 
+from translucent.assets import newest_shader
 from translucent.errors import RenderError, TranslucentWarning
 from translucent.files.reading import size_text
 from translucent.geometry.mesh import Mesh
@@ -38,149 +41,8 @@ from translucent.preview.tasks import CancelledError, Task
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.texture import Texture
 
-#: Bytes of an array from which on it lies in a file.
-LARGE = 1 << 20
-
-#: Arrays in a file begin at multiples of so many bytes.
-_ALIGNMENT = 64
-
-#: Finds the token that stands for a value, or None if the value itself is to be sent.
-Token = Callable[[object], int | None]
-
-
-class File:
-    """File without a name, closed with this object."""
-
-    def __init__(self, descriptor: int) -> None:
-        self.descriptor = descriptor
-
-    def __del__(self) -> None:
-        os.close(self.descriptor)
-
-
-@dataclass(frozen=True, eq=False)
-class WorkerMessage:
-    """Pickled value.
-
-    Attributes
-    ----------
-    text : bytes
-    spans : tuple of (begin, end)
-        Of its large arrays in the file.
-    file : File, optional
-        None where there are none.
-    """
-
-    text: bytes
-    spans: tuple[tuple[int, int], ...] = ()
-    file: File | None = None
-
-    @classmethod
-    def of(cls, value: object, token: Token | None = None) -> WorkerMessage:
-        """Pack a value; others in it are left out for which there is a token.
-
-        Raises
-        ------
-        RenderError
-            If there is no room for its arrays.
-        """
-        stream, arrays = io.BytesIO(), list[memoryview]()
-        _Pickler(stream, arrays, token).dump(value)
-        if not arrays:
-            return cls(stream.getvalue())
-        spans = []
-        try:
-            with tempfile.TemporaryFile() as file:
-                for array in arrays:
-                    begin = file.seek(-(-file.tell() // _ALIGNMENT) * _ALIGNMENT)
-                    file.write(array)
-                    spans.append((begin, begin + array.nbytes))
-                file.flush()
-                return cls(stream.getvalue(), tuple(spans), File(os.dup(file.fileno())))
-        except OSError as error:
-            size = size_text(sum(array.nbytes for array in arrays))
-            found = f"{tempfile.gettempdir()} has no room for {size} of meshes and pictures ({error.strerror})"
-            raise RenderError("work of another process", found, "make room, or set TMPDIR to another folder") from error
-
-    def open(self, known: Callable[[int], object] | None = None) -> Any:
-        """Unpack the value, whose large arrays are read-only views of the file; `known` has the values for tokens."""
-        views: list[memoryview] = []
-        if self.file is not None:
-            memory = memoryview(mmap.mmap(self.file.descriptor, 0, access=mmap.ACCESS_READ))
-            views = [memory[begin:end] for begin, end in self.spans]
-        return _Unpickler(io.BytesIO(self.text), views, known).load()
-
-
-class _Pickler(pickle.Pickler):
-    def __init__(self, stream: io.BytesIO, arrays: list[memoryview], token: Token | None) -> None:
-        super().__init__(stream, protocol=5, buffer_callback=partial(_stays, arrays))
-        self._token = token
-
-    def persistent_id(self, value: object) -> int | None:
-        return None if self._token is None else self._token(value)
-
-
-def _stays(arrays: list[memoryview], array: pickle.PickleBuffer) -> bool:
-    """True if an array stays in the text; if it is large, it is added to `arrays` instead."""
-    raw = array.raw()
-    if raw.nbytes >= LARGE:
-        arrays.append(raw)
-    return raw.nbytes < LARGE
-
-
-class _Unpickler(pickle.Unpickler):
-    def __init__(self, stream: io.BytesIO, views: list[memoryview], known: Callable[[int], object] | None) -> None:
-        super().__init__(stream, buffers=views)
-        self._known = known
-
-    def persistent_load(self, token: Any) -> object:
-        assert self._known is not None
-        return self._known(token)
-
-
-class Channel:
-    """End of a pipe for messages, each with a type and a number.
-
-    Parameters
-    ----------
-    pipe : Connection
-    peer : int
-        Number of the process at the other end.
-    """
-
-    def __init__(self, pipe: Connection, peer: int) -> None:
-        self.pipe, self._peer = pipe, peer
-
-    def send(self, kind: str, number: int, message: WorkerMessage) -> None:
-        """Send a message."""
-        self.pipe.send((kind, number, message.text, message.spans))
-        if message.file is not None:
-            reduction.send_handle(self.pipe, _handle(message.file.descriptor), self._peer)
-
-    def receive(self) -> tuple[str, int, WorkerMessage]:
-        """Kind, number and message that the other end has sent; waits for it."""
-        kind, number, text, spans = self.pipe.recv()
-        file = File(_descriptor(reduction.recv_handle(self.pipe))) if spans else None
-        return kind, number, WorkerMessage(text, spans, file)
-
-
-if sys.platform == "win32":
-    import msvcrt
-
-    def _handle(descriptor: int) -> int:
-        return msvcrt.get_osfhandle(descriptor)
-
-    def _descriptor(handle: int) -> int:
-        return msvcrt.open_osfhandle(handle, os.O_RDONLY)
-
-else:
-
-    def _handle(descriptor: int) -> int:
-        return descriptor
-
-    def _descriptor(handle: int) -> int:
-        return handle
-
+if TYPE_CHECKING:
+    from translucent.renderer import Renderer
 
 #: Seconds between checks whether the result is still wanted.
 PATIENCE = 0.1
@@ -202,15 +64,151 @@ MOST, MOST_IDLE = 5, 2
 #: Types of large immutable values: sent once, and cached for as long as they live here.
 KEPT = (Mesh, EnvironmentMap, Texture, DensityGrid)
 
+#: Bytes of an array from which on it lies in a file, where arrays begin at multiples of so many bytes.
+LARGE, ALIGNMENT = 1 << 20, 64
+
+#: Finds the token that replaces a value in a message, or None if the value itself is to be sent.
+Token = Callable[[object], int | None]
+
 Result = TypeVar("Result")
 
 
 class Urgency(IntEnum):
-    """Urgency of work: what the picture waits for, what the user waits for, and what is for later."""
+    """Urgency of work: the picture waits for it, the user does, or nobody."""
 
     PICTURE = 0
     ANSWER = 1
     LATER = 2
+
+
+@dataclass(frozen=True, eq=False)
+class WorkerMessage:
+    """Pickled value.
+
+    Attributes
+    ----------
+    text : bytes
+    spans : tuple of (begin, end)
+        Bytes of its large arrays in the file.
+    file : int, optional
+        Descriptor of the file with its large arrays, which closes with the message; None without any.
+    """
+
+    text: bytes = b""
+    spans: tuple[tuple[int, int], ...] = ()
+    file: int | None = None
+
+    @classmethod
+    def of(cls, value: object, token: Token | None = None) -> WorkerMessage:
+        """Pack a value; others in it are left out for which there is a token.
+
+        Raises
+        ------
+        RenderError
+            If there is no room for its arrays.
+        """
+        stream, arrays = io.BytesIO(), list[memoryview]()
+        _Pickler(stream, arrays, token).dump(value)
+        if not arrays:
+            return cls(stream.getvalue())
+        spans = []
+        try:
+            with tempfile.TemporaryFile() as file:
+                for array in arrays:
+                    begin = file.seek(-(-file.tell() // ALIGNMENT) * ALIGNMENT)
+                    file.write(array)
+                    spans.append((begin, begin + array.nbytes))
+                file.flush()
+                return cls(stream.getvalue(), tuple(spans), os.dup(file.fileno()))
+        except OSError as error:
+            size = size_text(sum(array.nbytes for array in arrays))
+            found = f"{tempfile.gettempdir()} has no room for {size} of meshes and pictures ({error.strerror})"
+            raise RenderError("work of another process", found, "make room, or set TMPDIR to another folder") from error
+
+    def open(self, known: Callable[[int], object] | None = None) -> Any:
+        """Unpack the value, whose large arrays are read-only views of the file; `known` has the values for tokens."""
+        views: list[memoryview] = []
+        if self.file is not None:
+            memory = memoryview(mmap.mmap(self.file, 0, access=mmap.ACCESS_READ))
+            views = [memory[begin:end] for begin, end in self.spans]
+        return _Unpickler(io.BytesIO(self.text), views, known).load()
+
+    def __del__(self) -> None:
+        if self.file is not None:
+            os.close(self.file)
+
+
+class _Pickler(pickle.Pickler):
+    """Pickler that leaves out values with tokens, and collects large arrays."""
+
+    def __init__(self, stream: io.BytesIO, arrays: list[memoryview], token: Token | None) -> None:
+        def stays(array: pickle.PickleBuffer) -> bool:
+            raw = array.raw()
+            if raw.nbytes >= LARGE:
+                arrays.append(raw)
+            return raw.nbytes < LARGE
+
+        super().__init__(stream, protocol=5, buffer_callback=stays)  # no method: the cycle would keep the values alive
+        self._token = token
+
+    def persistent_id(self, value: object) -> int | None:
+        return None if self._token is None else self._token(value)
+
+
+class _Unpickler(pickle.Unpickler):
+    """Unpickler that looks tokens up."""
+
+    def __init__(self, stream: io.BytesIO, views: list[memoryview], known: Callable[[int], object] | None) -> None:
+        super().__init__(stream, buffers=views)
+        self._known = known
+
+    def persistent_load(self, token: Any) -> object:
+        assert self._known is not None
+        return self._known(token)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """End of a pipe for messages, each with a type and a number.
+
+    Attributes
+    ----------
+    pipe : Connection
+    peer : int
+        Identifier of the process at the other end.
+    """
+
+    pipe: Connection
+    peer: int
+
+    def send(self, kind: str, number: int, message: WorkerMessage) -> None:
+        """Send a message."""
+        self.pipe.send((kind, number, message.text, message.spans))
+        if message.file is not None:
+            reduction.send_handle(self.pipe, _handle(message.file), self.peer)
+
+    def receive(self) -> tuple[str, int, WorkerMessage]:
+        """Type, number and message that the other end has sent; waits for it."""
+        kind, number, text, spans = self.pipe.recv()
+        file = _descriptor(reduction.recv_handle(self.pipe)) if spans else None
+        return kind, number, WorkerMessage(text, spans, file)
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _handle(descriptor: int) -> int:
+        return msvcrt.get_osfhandle(descriptor)
+
+    def _descriptor(handle: int) -> int:
+        return msvcrt.open_osfhandle(handle, os.O_RDONLY)
+
+else:
+
+    def _handle(descriptor: int) -> int:
+        return descriptor
+
+    _descriptor = _handle
 
 
 class Pool:
@@ -228,50 +226,47 @@ class Pool:
     def call(
         self, task: Task, work: Callable[..., Result], *arguments: Any, urgency: Urgency = Urgency.ANSWER
     ) -> Result:
-        """Run `work(report, *arguments)` and return its result, which calls ``report(share, detail)``; its warnings are
-        given here.
+        """Call ``work(*arguments)`` in a worker process, and return its result; its warnings are given here.
 
         Parameters
         ----------
         task : Task
-            Is told how far the work is. When nobody waits for it any more, the work ends at its next report, or if that
-            takes too long, the process.
+            Gets what the work reports, see `report`. Once it is canceled, the work ends at its next report, or if that
+            takes too long, with its process.
         work : callable
             A function of a module: the process finds it by its name.
         *arguments
-            What pickle can send.
+            Values that pickle can send.
         urgency : Urgency
 
         Raises
         ------
         CancelledError
-            If nobody waits.
+            If the task is canceled.
         RenderError
             If the process dies.
         Exception
-            What `work` raises.
+            Any that `work` raises.
         """
         worker = self._taken(task, work, urgency)
         try:
             worker.ask(work, arguments)
             failed, content = worker.answer(task)
         except (EOFError, ConnectionError):
-            status = worker.status()
+            worker.process.join(PARTING)
+            status = worker.process.exitcode
             self._end(worker)
             if self._closed:
                 raise CancelledError from None
-            raise RenderError(
-                task.name,
-                f"its process ended with status {status}, as when the memory is full",
-                "close other programs, or ask for less",
-            ) from None
+            found = f"its process ended with status {status}, as when the memory is full"
+            raise RenderError(task.name, found, "close other programs, or ask for less") from None
         except CancelledError:
-            self._give_back(worker) if worker.stop() else self._end(worker)
+            self._return(worker) if worker.stop() else self._end(worker)
             raise
         except BaseException:
             self._end(worker)
             raise
-        self._give_back(worker)
+        self._return(worker)
         if failed:
             raise content
         return content  # type: ignore[no-any-return]
@@ -280,10 +275,9 @@ class Pool:
         """End all processes for good, whatever they are doing; they have `patience` seconds to clean up."""
         with self._changed:
             self._closed = True
-            idle, self._idle = self._idle, []
-            running = [*idle, *self._busy]
+            running, self._idle = [*self._idle, *self._busy], []
         for worker in running:
-            worker.terminate()
+            worker.process.terminate()
         end = time.monotonic() + patience
         for worker in running:
             worker.close(max(end - time.monotonic(), 0.0))
@@ -303,7 +297,7 @@ class Pool:
             finally:
                 self._waiting.remove(ticket)
                 self._changed.notify_all()
-            self._idle = [worker for worker in self._idle if worker.alive]
+            self._idle = [worker for worker in self._idle if worker.process.is_alive()]
             known = [worker for worker in self._idle if work.__module__ in worker.modules]
             worker = (known or self._idle)[-1] if self._idle else _Worker(self._kept)
             if self._idle:
@@ -311,17 +305,17 @@ class Pool:
             self._busy.append(worker)
             return worker
 
-    def _give_back(self, worker: _Worker) -> None:
+    def _return(self, worker: _Worker) -> None:
         with self._changed:
             self._busy.remove(worker)
             self._idle.append(worker)
             surplus = [self._idle.pop(0) for _ in range(len(self._idle) - MOST_IDLE)]
-            with suppress(ConnectionError):  # whoever has died is told by its next work
+            with suppress(ConnectionError):  # one that has died is noticed at its next work
                 for idle in self._idle:
                     idle.forget()
             self._changed.notify_all()
-        for worker in surplus:
-            worker.close(PARTING)
+        for other in surplus:
+            other.close(PARTING)
 
     def _end(self, worker: _Worker) -> None:
         worker.close(PARTING)
@@ -331,7 +325,7 @@ class Pool:
 
 
 class _Kept:
-    """Tokens of large values, and what they were packed into, for as long as they live here."""
+    """Tokens and messages of large values, for as long as these live here."""
 
     def __init__(self) -> None:
         self._numbers = itertools.count(1)
@@ -348,7 +342,7 @@ class _Kept:
             return found
 
     def take(self, value: object, message: WorkerMessage) -> tuple[int, WorkerMessage]:
-        """Token of a value that came in a message."""
+        """Token for a value that came in a message, and that message."""
         with self._lock:
             found = self._packed[value] = next(self._numbers), message
             return found
@@ -365,20 +359,25 @@ class _Worker:
 
     Attributes
     ----------
+    process : BaseProcess
     modules : set of str
-        That it has done work of, and has made ready what that needs.
+        Modules of the work that it has done, for which it is prepared.
     """
 
     def __init__(self, kept: _Kept) -> None:
         # Spawned, not forked: OpenGL and threads do not survive a fork.
         context = multiprocessing.get_context("spawn")
         pipe, theirs = context.Pipe()
-        self._process: BaseProcess = context.Process(target=_run, args=(theirs,), daemon=True)
-        self._process.start()
+        self.process: BaseProcess = context.Process(target=_run, args=(theirs,), daemon=True)
+        self.process.start()
         theirs.close()
-        assert self._process.pid is not None
-        _give_way(self._process.pid)
-        self._channel = Channel(pipe, self._process.pid)
+        assert self.process.pid is not None
+        with suppress(OSError):  # containers may forbid it, or it has ended
+            if IDLE is not None:
+                os.sched_setscheduler(self.process.pid, IDLE, os.sched_param(0))
+            elif hasattr(os, "setpriority"):
+                os.setpriority(os.PRIO_PROCESS, self.process.pid, NICENESS)
+        self._channel = Channel(pipe, self.process.pid)
         self._kept, self._sent = kept, set[int]()
         self._closing = threading.Lock()
         self._known: dict[int, object] = {}
@@ -407,9 +406,9 @@ class _Worker:
         self.modules.add(work.__module__)
 
     def forget(self) -> None:
-        """Have it drop what nobody here holds any more."""
+        """Have the process drop all values that nobody here holds any more."""
         for number in self._sent - self._kept.tokens:
-            self._channel.send("drop", number, WorkerMessage(b""))
+            self._channel.send("drop", number, WorkerMessage())
             self._sent.discard(number)
 
     def answer(self, task: Task) -> tuple[bool, Any]:
@@ -434,46 +433,49 @@ class _Worker:
     def stop(self) -> bool:
         """Stop the work at its next report; returns whether it did so in time."""
         end = time.monotonic() + PARTING
-        try:
-            self._channel.send("stop", self._number, WorkerMessage(b""))
+        with suppress(EOFError, ConnectionError):
+            self._channel.send("stop", self._number, WorkerMessage())
             while self._channel.pipe.poll(max(end - time.monotonic(), 0.0)):
                 if self._channel.receive()[0] in ("done", "failed"):
                     return True
-        except (EOFError, ConnectionError):
-            pass
         return False
-
-    @property
-    def alive(self) -> bool:
-        """True if the worker process is there."""
-        return self._process.is_alive()
-
-    def status(self) -> int | None:
-        """Exit status of the worker process."""
-        self._process.join(PARTING)
-        return self._process.exitcode
-
-    def terminate(self) -> None:
-        """Ask the worker process to end."""
-        self._process.terminate()
 
     def close(self, patience: float) -> None:
         """End the worker process; it has some seconds to remove unfinished files."""
-        self._process.terminate()
-        self._process.join(patience)
-        with self._closing:  # whoever waits for its work, and whoever closes the pool, may do so at the same time
-            self._process.kill()
-            self._process.join()  # only then it lets go of the file that it has half written
+        self.process.terminate()
+        self.process.join(patience)
+        with self._closing:  # the thread that waits for its work, and the one that closes the pool, may both do so
+            self.process.kill()
+            self.process.join()  # only then it lets go of the file that it has half written
             self._channel.pipe.close()
 
 
-def _give_way(process: int) -> None:
-    """Have a process that has just begun, and all its threads to come, let others run first."""
-    with suppress(OSError):  # containers may forbid it, or it has ended
-        if IDLE is not None:
-            os.sched_setscheduler(process, IDLE, os.sched_param(0))
-        elif hasattr(os, "setpriority"):
-            os.setpriority(os.PRIO_PROCESS, process, NICENESS)
+#: Takes the progress of the work of this process; None in the window's own.
+_listener: Callable[[float | None, str], None] | None = None
+
+
+def report(share: float | None, detail: str = "") -> None:
+    """Report the progress of work in a worker process: the finished fraction, if that is known, and the current step.
+
+    Raises
+    ------
+    CancelledError
+        If nobody waits for the work any more.
+    """
+    if _listener is not None:
+        _listener(share, detail)
+
+
+def worker_renderer() -> Renderer:
+    """Renderer of this worker process, with the shaders as they are on disk."""
+    return _renderer(newest_shader())
+
+
+@lru_cache(maxsize=1)
+def _renderer(written: float) -> Renderer:
+    from translucent.renderer import Renderer
+
+    return Renderer()
 
 
 def _run(pipe: Connection) -> None:
@@ -505,7 +507,7 @@ def _end(*_: object) -> None:
 
 
 def _follow_parent() -> None:
-    """End this process when the window is gone, which work that does not report would not hear of."""
+    """End this process when the window is gone, which work without reports would not notice."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()
@@ -515,7 +517,9 @@ def _follow_parent() -> None:
 
 
 def _work(channel: Channel, kept: dict[int, object], number: int, message: WorkerMessage) -> None:
-    def report(share: float | None, detail: str = "") -> None:
+    global _listener
+
+    def listen(share: float | None, detail: str) -> None:
         while channel.pipe.poll():
             if channel.receive()[:2] == ("stop", number):
                 raise CancelledError
@@ -533,11 +537,11 @@ def _work(channel: Channel, kept: dict[int, object], number: int, message: Worke
             channel.send("made", -len(made), WorkerMessage.of(value))
         return numbers[id(value)]
 
-    kind = "done"
+    kind, _listener = "done", listen
     try:
         work, arguments = message.open(kept.__getitem__)
-        answer = WorkerMessage.of(work(report, *arguments), token)
+        answer = WorkerMessage.of(work(*arguments), token)
     except Exception as error:  # noqa: BLE001 - raised where the result is waited for
         kind, answer = "failed", WorkerMessage.of(error)
-    with suppress(OSError):  # nobody is there any more
+    with suppress(OSError):  # the window may have gone
         channel.send(kind, number, answer)

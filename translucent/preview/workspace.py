@@ -12,15 +12,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from translucent.errors import InputError, RenderError, TranslucentError
+from translucent.errors import RenderError, TranslucentError
 from translucent.files.paths import remove_partial
 from translucent.planning.methods import Method
-from translucent.preview import document as orbiting
 from translucent.preview.actions import Action, Adopt, History, Open, Replace, SetOrbit
-from translucent.preview.compiling import Compiler
-from translucent.preview.document import Display, Document, Model
+from translucent.preview.document import Display, Document, Model, framed
 from translucent.preview.exports import Bake, bake_map, check_export
-from translucent.preview.library import Library
+from translucent.preview.library import Library, ThumbnailCache
 from translucent.preview.measuring import (
     Crossing,
     Measurement,
@@ -28,9 +26,10 @@ from translucent.preview.measuring import (
     crossing,
     measurable,
     measure,
-    truth_frame,
-    truth_plan,
+    reference_frame,
+    reference_plan,
 )
+from translucent.preview.preparation import Compiler
 from translucent.preview.scenes import (
     Lighting,
     Loaded,
@@ -43,9 +42,8 @@ from translucent.preview.scenes import (
     scene_of,
     stage_name,
 )
-from translucent.preview.session import load_session, save_session
+from translucent.preview.session import load_session
 from translucent.preview.tasks import Lane, Task, problem
-from translucent.preview.thumbnails import ThumbnailCache
 from translucent.preview.worker import Pool, Urgency
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import fillable
@@ -56,14 +54,17 @@ MAX_MESSAGES = 50
 #: Number of models that are cached for undo.
 KEPT_MODELS = 2
 
-#: Seconds for which a closed window waits for work, so that files are complete and no processes are left behind.
-PATIENCE = {"write": 60.0, "bake": 12.0}
-
-#: Kinds of background work, of which each does one thing at a time.
-LANES = ("load", "draw", "diffuse", "trace", "truth", "bake", "ray", "light", "write", "thumbnails")
-
 #: Largest number of recently opened files.
 MAX_RECENT = 8
+
+#: Seconds after which a view is still.
+STILL = 0.25
+
+#: Names of background threads, each of which does one thing at a time.
+LANES = ("load", "draw", "diffuse", "trace", "truth", "bake", "ray", "light", "write", "thumbnails")
+
+#: Seconds for which a closed window waits for work, so that files are complete and no processes are left behind.
+PATIENCE = {"write": 60.0, "bake": 12.0}
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class Message:
 
 
 class Workspace:
-    """Workspace of a document.
+    """Workspace of a document: its history, the loaded model, and the work under way.
 
     Attributes
     ----------
@@ -87,24 +88,25 @@ class Workspace:
         The model on show: that of the document, or the one before while that is being read.
     messages : deque of Message
     failure : Exception, optional
-        The first error that was told, by which a script fails.
+        The first error that was shown, by which a script fails.
     recent : list of str
     size : (width, height)
         Of the viewport in pixels.
     measured : Measurement, optional
-        How the picture compares with the reference; None while that is not known.
+        The last comparison with the reference.
     truth : ReferencePicture, optional
         The reference of the whole picture, if the split shows it.
     bake : Bake, optional
         The last map.
+    show_bake : bool
+        Whether the model is painted with it.
     thumbnails : ThumbnailCache
-        Small pictures of media, environments and models.
     library : Library
         Presets of the toolkit and of the user.
     pool : Pool
         Worker processes.
     compiler : Compiler
-        Compiles shaders in the background, for a stage that waits for them.
+        Compiles shaders in the background, for a viewport renderer that waits for them.
     """
 
     def __init__(self, document: Document | None = None, allow_outside: bool = False) -> None:
@@ -126,9 +128,9 @@ class Workspace:
         self.library = Library(self.refuse)
         self._lighting = Lighting(self.lanes["light"])
         self._models: list[Loaded] = []
-        self._refused: Model | None = None
         self._scene: tuple[Document, Loaded, Scene] | None = None
-        self.changed = time.monotonic()
+        self._view: object = None
+        self._still_since, self._compared = 0.0, False
         self._want(self.document.model)
 
     @property
@@ -137,7 +139,7 @@ class Workspace:
         return self.history.present
 
     def do(self, action: Action) -> None:
-        """Apply an action to the document, or tell why not."""
+        """Apply an action to the document; if that fails, show why."""
         if isinstance(action, Open):
             return self.open(Model(action.path, action.unit))
         try:
@@ -174,12 +176,8 @@ class Workspace:
             return self.refuse(error)
         return self.open(document.model, document)
 
-    def save_session(self, path: str) -> None:
-        """Write the document to a file."""
-        self.attempt(lambda: save_session(path, self.document), f"saved {path}")
-
     def attempt(self, work: Callable[[], object], done: str) -> None:
-        """Do quick work on files, and tell how it went."""
+        """Do quick work on files, and show a message: `done`, or why not."""
         try:
             work()
         except TranslucentError as error:
@@ -193,20 +191,13 @@ class Workspace:
             objects = self.loaded.scene.objects
             shown = [objects[i] for i in self.document.shown_among(len(objects))]
             chosen = [objects[number]] if number is not None and number < len(objects) else shown
-            self.do(SetOrbit(orbiting.framed(self.document.orbit, chosen, self.size)))
-
-    def reframe(self) -> None:
-        """Reset the view of the model to that at its opening."""
-        self._complete()
+            self.do(SetOrbit(framed(self.document.orbit, chosen, self.size)))
 
     def update(self) -> None:
         """Take over results of background work, and request missing ones."""
         for lane in self.lanes.values():
             lane.poll(self.refuse)
-        if self.loaded is None or self.document.model != self.loaded.model:
-            self._want(self.document.model)
-        else:
-            self._complete()  # a stage may be ready
+        self._set(self.history)  # a model or a stage may be ready
 
     def scene(self) -> Scene | None:
         """Scene on show; the same object for as long as nothing about it changes."""
@@ -216,16 +207,9 @@ class Workspace:
         document = self._lighting.lit(self.document, loaded)
         if (bake := self.shown_bake) is not None:
             return bake.seen_from(self.document.orbit)
-        if self._scene is not None:
-            known, model, scene = self._scene
-            same = all(
-                getattr(known, name) == getattr(document, name) for name in ("material", "assigned", "hidden", "orbit")
-            )
-            if same and model is loaded and _lit_alike(known, document):
-                return scene
-        scene = scene_of(document, loaded)
-        self._scene = document, loaded, scene
-        return scene
+        if self._scene is None or self._scene[1] is not loaded or not _shows_alike(self._scene[0], document):
+            self._scene = document, loaded, scene_of(document, loaded)
+        return self._scene[2]
 
     def picture(self) -> Scene | None:
         """Scene of a picture from here, whatever quantity is on show."""
@@ -246,22 +230,63 @@ class Workspace:
         tasks = [lane.task for lane in self.lanes.values() if lane.task is not None]
         return [task for task in tasks if task.name or task not in (self.compiler.lane.task, self.thumbnails.lane.task)]
 
+    @property
+    def relights(self) -> bool:
+        """True if another environment or stage is being prepared, so that the picture drawn now will not stay."""
+        task = self.lanes["light"].task
+        return task is not None and bool(task.name)
+
+    @property
+    def prepares(self) -> bool:
+        """True if processes prepare what the picture waits for, which may take all the memory that there is."""
+        lanes = self.lanes["trace"], self.compiler.lane
+        return self.relights or any(lane.task is not None and lane.task.name for lane in lanes)
+
     def prepare(self) -> None:
         """Prepare later pictures, now that the first is there."""
         self._lighting.begun = True
         if self.lanes["light"].task is None:
-            self.lanes["light"].start("", prepare, lambda _: None)
+            self.lanes["light"].start("", prepare)
 
-    def measure(
-        self, scene: Scene, method: Method | None, size: tuple[int, int], then: Callable[[Measurement], None]
-    ) -> None:
+    def compare(self, size: tuple[int, int]) -> bool:
+        """Compare the view with the reference, once it is still and its picture has all that it needs.
+
+        Parameters
+        ----------
+        size : (width, height)
+            Of the viewport, in pixels.
+
+        Returns
+        -------
+        bool
+            True if the comparison has still to begin.
+        """
+        scene, display = self.scene(), self.document.display
+        measured = scene is not None and (display.inset or measurable(scene))
+        view = scene, display.method, display.compare, measured
+        if view != self._view:
+            self._view, self._still_since, self._compared = view, time.monotonic(), False
+            if (last := self.lanes["draw"].task) is not None:
+                last.cancel()
+        if scene is None or self._compared:
+            return False
+        if time.monotonic() - self._still_since <= STILL or self.prepares:
+            return True
+        self._compared = True
+        method = method_of(display.method, self.document.material)
+        if measured and self.shown_bake is None:
+            self.measure(scene, method, size)
+        if display.compare in ("reference", "error") and self.shown_bake is None:
+            self.draw_reference(scene, method, size, (1,) if display.compare == "error" else None)
+        return False
+
+    def measure(self, scene: Scene, method: Method | None, size: tuple[int, int]) -> None:
         """Compare a small picture with the reference, in the background."""
 
-        def work(task: Task) -> Measurement:
-            found = self.pool.call(task, measure, scene, method, size)
-            return Measurement(**vars(found), scene=scene, method=method)
+        def take(found: Measurement) -> None:
+            self.measured = dataclasses.replace(found, scene=scene)
 
-        self.lanes["draw"].start("measuring", work, then)
+        self.lanes["draw"].start("measuring", lambda task: self.pool.call(task, measure, scene, method, size), take)
 
     def cross(
         self, scene: Scene, size: tuple[int, int], pixel: tuple[int, int], then: Callable[[Crossing], None]
@@ -269,20 +294,20 @@ class Workspace:
         """Follow the ray of a pixel in the reference, in the background."""
         self.lanes["ray"].start("", lambda task: self.pool.call(task, crossing, scene, size, pixel), then)
 
-    def draw_truth(
+    def draw_reference(
         self, scene: Scene, method: Method | None, size: tuple[int, int], levels: tuple[int, ...] | None
     ) -> None:
         """Draw the reference of the whole picture in the background; `truth` is the finest that is there."""
-        seen, shares = truth_plan(scene, levels)
+        seen, divisors = reference_plan(scene, levels)
 
         def work(task: Task) -> None:
-            for number, level in enumerate(shares):
-                task.report(number / len(shares), f"at 1/{level}")
+            for number, level in enumerate(divisors):
+                task.report(number / len(divisors), f"at 1/{level}")
                 small = max(size[0] // level, 1), max(size[1] // level, 1)
-                frame = self.pool.call(task, truth_frame, seen, method, small, urgency=Urgency.LATER)
+                frame = self.pool.call(task, reference_frame, seen, method, small, urgency=Urgency.LATER)
                 self.truth = ReferencePicture(scene, method, frame, level, straight=levels is not None)
 
-        self.lanes["truth"].start("float64 reference", work, lambda _: None)
+        self.lanes["truth"].start("float64 reference", work)
 
     def start_bake(self, mode: str, size: int, rays: int) -> None:
         """Bake a map of the first body, and show it."""
@@ -294,17 +319,11 @@ class Workspace:
         def show(bake: Bake) -> None:
             self.bake, self.show_bake = bake, True
 
-        def work(task: Task) -> Bake:
-            return bake_map(task, self.pool, body, medium, mode, size, rays)
-
+        work = partial(bake_map, pool=self.pool, body=body, medium=medium, mode=mode, size=size, rays=rays)
         self.lanes["bake"].start(f"baking {mode}", work, show)
 
     def export(self, path: str, work: Callable[..., None], *arguments: Any) -> None:
-        """Have another process draw a file by ``work(report, path, *arguments)``."""
-        try:
-            check_export(path)
-        except TranslucentError as error:
-            return self.refuse(error)
+        """Have another process draw a file by ``work(path, *arguments)``."""
 
         def write(task: Task) -> None:
             try:
@@ -313,13 +332,14 @@ class Workspace:
                 remove_partial(Path(path))  # of a process that had to be killed
                 raise
 
-        return self._write(path, write)
+        try:
+            check_export(path)
+        except TranslucentError as error:
+            return self.refuse(error)
+        return self.write(path, write)
 
-    def write(self, path: str, work: Callable[[str], object]) -> None:
+    def write(self, path: str, work: Callable[[Task], object]) -> None:
         """Write a file in the background."""
-        self._write(path, lambda _: work(path))
-
-    def _write(self, path: str, work: Callable[[Task], object]) -> None:
         if (other := self.lanes["write"].task) is not None:
             found = f"{other.name} is under way"
             return self.refuse(RenderError(f"{path!r} is not written", found, "wait for it, or cancel it"))
@@ -342,7 +362,7 @@ class Workspace:
         for lane in self.lanes.values():
             if lane.task is not None:
                 lane.task.cancel()
-        self.pool.close(0.5)  # nobody will see what it is at
+        self.pool.close(0.5)  # nobody will see its results
         for name, lane in self.lanes.items():
             lane.close(PATIENCE.get(name, 0.5))
 
@@ -352,21 +372,20 @@ class Workspace:
         return all(lane.ended for lane in self.lanes.values())
 
     def _set(self, history: History) -> None:
-        if history.present != self.history.present:
-            self.changed = time.monotonic()
+        """Show the present of a history, once its model is there."""
         self.history = history
-        if self.document.model != (self.loaded.model if self.loaded else None):
-            self._want(self.document.model)
-        else:
+        if self.loaded is not None and self.document.model == self.loaded.model:
             self._complete()
+        else:
+            self._want(self.document.model)
 
     def _want(self, model: Model) -> None:
-        """Request the document's model to be loaded."""
+        """Show the document's model: one that is cached, or request it."""
         for loaded in self._models:
             if loaded.model == model:
                 self._keep(loaded)
                 return self._complete()
-        if self.lanes["load"].task is None and model != self._refused:
+        if self.lanes["load"].task is None and not self.lanes["load"].failed(model):
             self._load(model, self._take)
         return None
 
@@ -378,18 +397,14 @@ class Workspace:
     def _load(self, model: Model, then: Callable[[Loaded], None]) -> None:
         def work(task: Task) -> Loaded:
             task.report(None, f"reading {Path(model.path).name}")
-            try:
-                return load_with(task, self.pool, model, self.allow_outside, pictured=self.loaded is not None)
-            except InputError:
-                self._refused = model
-                raise
+            return load_with(task, self.pool, model, self.allow_outside, pictured=self.loaded is not None)
 
-        self.lanes["load"].start(f"opening {Path(model.path).name}", work, then)
+        self.lanes["load"].start(f"opening {Path(model.path).name}", work, then).key = model
 
     def _keep(self, loaded: Loaded) -> None:
         self._models = [loaded, *(one for one in self._models if one.model != loaded.model)][:KEPT_MODELS]
         if self.loaded is not loaded:
-            self.loaded, self.bake, self.changed = loaded, None, time.monotonic()
+            self.loaded, self.bake = loaded, None
 
     def _complete(self) -> None:
         """Complete the document from the model: its own material, and the camera."""
@@ -408,69 +423,8 @@ class Workspace:
             self.history = self.history.done(SetOrbit(first_orbit(self.loaded, self.size, stage)))
 
 
-def _lit_alike(first: Document, second: Document) -> bool:
-    """True if two looks differ only in exposure and tone curve, before the same kind of backdrop."""
+def _shows_alike(first: Document, second: Document) -> bool:
+    """True if two documents show the same scene, except for exposure and tone curve."""
     developed = dataclasses.replace(first.look, exposure=second.look.exposure, tone=second.look.tone)
-    return developed == second.look and first.display.pictured == second.display.pictured
-
-
-def relights(workspace: Workspace) -> bool:
-    """True if another environment or stage is being prepared, so that what is drawn now will not stay."""
-    task = workspace.lanes["light"].task
-    return task is not None and bool(task.name)
-
-
-def prepares(workspace: Workspace) -> bool:
-    """True if processes are at work on what the picture waits for, which may take all the memory that there is."""
-    lanes = workspace.lanes["trace"], workspace.compiler.lane
-    return relights(workspace) or any(lane.task is not None and lane.task.name for lane in lanes)
-
-
-#: Seconds after which a view is still.
-STILL = 0.25
-
-
-@dataclass
-class Comparing:
-    """Comparer of the views of a workspace, one after the other."""
-
-    work: Workspace
-    _view: object = None
-    _since: float = 0.0
-    _begun: bool = False
-
-    def step(self, size: tuple[int, int]) -> bool:
-        """Begin, if it is time; returns whether a view is still to be compared.
-
-        Parameters
-        ----------
-        size : (width, height)
-            Of the viewport, in pixels.
-        """
-        scene, display = self.work.scene(), self.work.document.display
-        measured = scene is not None and (display.inset or measurable(scene))
-        view = scene, display.method, display.compare, measured
-        if view != self._view:
-            self._view, self._since, self._begun = view, time.monotonic(), False
-            if (last := self.work.lanes["draw"].task) is not None:
-                last.cancel()
-        if scene is None or self._begun:
-            return False
-        if time.monotonic() - self._since <= STILL or prepares(self.work):
-            return True
-        self._begun = True
-        if self.work.shown_bake is None:
-            self._begin(scene, size, measured=measured)
-        return False
-
-    def _begin(self, scene: Scene, size: tuple[int, int], *, measured: bool) -> None:
-        display = self.work.document.display
-        method = method_of(display.method, self.work.document.material)
-        if measured:
-            self.work.measure(scene, method, size, self._take)
-        if display.compare in ("reference", "error"):
-            levels = (1,) if display.compare == "error" else None
-            self.work.draw_truth(scene, method, size, levels)
-
-    def _take(self, measured: Measurement) -> None:
-        self.work.measured = measured
+    same = all(getattr(first, name) == getattr(second, name) for name in ("material", "assigned", "hidden", "orbit"))
+    return same and developed == second.look and first.display.pictured == second.display.pictured

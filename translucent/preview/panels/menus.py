@@ -2,102 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from imgui_bundle import ImVec2, hello_imgui, imgui
 
 from translucent.assets import mesh_names
 from translucent.errors import shortened
+from translucent.preview.actions import Hide
 from translucent.preview.document import Model
-from translucent.preview.panels.scene import hide, isolate, show_all
-from translucent.preview.thumbnails import model_key
-from translucent.preview.window_state import FAINT, WindowState, em, tooltip
+from translucent.preview.library import model_key
+from translucent.preview.panels.widgets import FAINT, em, tooltip
+from translucent.preview.window_state import WindowState
 from translucent.units import METRES_PER_UNIT
 
+PAGE = "Mouse and keys"
 
-def menus(state: WindowState) -> None:
-    """File, Edit, Help."""
-    if imgui.begin_menu("File"):
-        _file(state)
-        imgui.end_menu()
-    if imgui.begin_menu("Edit"):
-        history = state.work.history
-        if imgui.menu_item("Undo", "Ctrl Z", False, bool(history.past))[0]:
-            state.work.undo()
-        if imgui.menu_item("Redo", "Ctrl Y", False, bool(history.future))[0]:
-            state.work.redo()
-        if imgui.menu_item("Frame the model", "F", False, True)[0]:
-            state.frame()
-        if imgui.menu_item("Reload shaders", "", False, True)[0]:
-            state.view.reload(state.work)
-        imgui.end_menu()
-    if imgui.begin_menu("Help"):
-        if imgui.menu_item("Mouse and keys", "?", False, True)[0]:
-            state.keys_shown = True
-        imgui.end_menu()
-
-
-def _file(state: WindowState) -> None:
-    unit = state.get("model.unit")
-    if imgui.menu_item("Open ...", "Ctrl O", False, True)[0]:
-        state.ask_file("open")
-    if imgui.begin_menu("Recent", bool(state.work.recent)):
-        for path in state.work.recent:
-            _recent(state, path, unit)
-        imgui.end_menu()
-    if imgui.begin_menu("The toolkit's own"):
-        for name in mesh_names():
-            if imgui.menu_item(name, "", name == state.get("model.path"), True)[0]:
-                state.work.open(Model(name))
-        imgui.end_menu()
-    if imgui.begin_menu("Unit of the file"):
-        for word in METRES_PER_UNIT:
-            if imgui.menu_item(word, "", word == unit, True)[0] and word != unit:
-                state.work.open(Model(state.get("model.path"), word))
-        imgui.end_menu()
-    imgui.separator()
-    if imgui.menu_item("Open session ...", "", False, True)[0]:
-        state.ask_file("open session")
-    if imgui.menu_item("Save session ...", "", False, True)[0]:
-        state.ask_file("save session")
-    imgui.separator()
-    if imgui.menu_item("Quit", "", False, True)[0]:
-        hello_imgui.get_runner_params().app_shall_exit = True
-
-
-def _recent(state: WindowState, path: str, unit: str) -> None:
-    """Draw a recent file, with the picture that it had."""
-    size = ImVec2(em(4.5), em(3.0))
-    picture = state.work.thumbnails.picture(model_key(path))
-    if picture is not None:
-        imgui.image(imgui.ImTextureRef(state.texture(model_key(path), picture).glo), size)
-    else:
-        imgui.dummy(size)
-    imgui.same_line()
-    if imgui.menu_item(f"{Path(path).name}\n{shortened(str(Path(path).parent), 60)}##{path}", "", False, True)[0]:
-        state.work.open(Model(path, unit))
-    tooltip(path)
-
-
-def status(state: WindowState) -> None:
-    """Status line: the model, how it is drawn, and work under way."""
-    loaded, stage = state.work.loaded, state.view
-    if loaded is not None:
-        name = Path(loaded.model.path).name
-        imgui.text(f"{name}: {loaded.triangles} triangles, {stage.renderer.provenance['renderer']}")
-        imgui.same_line()
-        imgui.text(f"|  {stage.state}")
-    task = next((one for one in state.work.busy if one.name), None)
-    if task is None:
-        return
-    imgui.same_line()
-    imgui.text(f"|  {task.told}")
-    imgui.same_line()
-    if imgui.small_button("cancel"):
-        task.cancel()
-
-
-#: What mouse and keys do.
+#: Keys, and what they do.
 KEYS = (
     ("drag", "orbit"),
     ("right drag, Shift drag", "pan"),
@@ -118,11 +39,85 @@ KEYS = (
     ("Escape", "close what is on top, or select nothing"),
 )
 
-PAGE = "Mouse and keys"
+
+def menu_item(label: str, act: Callable[[], object], keys: str = "", *, enabled: bool = True) -> None:
+    """Item of a menu, which acts when it is chosen."""
+    if imgui.menu_item(label, keys, False, enabled)[0]:
+        act()
+
+
+def menus(state: WindowState) -> None:
+    """File, Edit, Help."""
+    work = state.work
+    if imgui.begin_menu("File"):
+        _file(state)
+        imgui.end_menu()
+    if imgui.begin_menu("Edit"):
+        menu_item("Undo", work.undo, "Ctrl Z", enabled=bool(work.history.past))
+        menu_item("Redo", work.redo, "Ctrl Y", enabled=bool(work.history.future))
+        menu_item("Frame the model", lambda: work.frame(state.selected), "F")
+        menu_item("Reload shaders", lambda: state.view.reload(work))
+        imgui.end_menu()
+    if imgui.begin_menu("Help"):
+        menu_item(PAGE, lambda: setattr(state, "keys_shown", True), "?")
+        imgui.end_menu()
+
+
+def _file(state: WindowState) -> None:
+    path, unit = state.get("model.path"), state.get("model.unit")
+    menu_item("Open ...", lambda: state.ask_file("open"), "Ctrl O")
+    if imgui.begin_menu("Recent", bool(state.work.recent)):
+        for recent in state.work.recent:
+            _recent(state, recent, unit)
+        imgui.end_menu()
+    if imgui.begin_menu("The toolkit's own"):
+        for name in mesh_names():
+            if imgui.menu_item(name, "", name == path, True)[0]:
+                state.work.open(Model(name))
+        imgui.end_menu()
+    if imgui.begin_menu("Unit of the file"):
+        for word in METRES_PER_UNIT:
+            if imgui.menu_item(word, "", word == unit, True)[0] and word != unit:
+                state.work.open(Model(path, word))
+        imgui.end_menu()
+    imgui.separator()
+    menu_item("Open session ...", lambda: state.ask_file("open session"))
+    menu_item("Save session ...", lambda: state.ask_file("save session"))
+    imgui.separator()
+    menu_item("Quit", lambda: setattr(hello_imgui.get_runner_params(), "app_shall_exit", True))
+
+
+def _recent(state: WindowState, path: str, unit: str) -> None:
+    """Draw a recent file, with its thumbnail."""
+    size, key = ImVec2(em(4.5), em(3.0)), model_key(path)
+    if (picture := state.work.thumbnails.picture(key)) is not None:
+        imgui.image(imgui.ImTextureRef(state.texture(key, picture).glo), size)
+    else:
+        imgui.dummy(size)
+    imgui.same_line()
+    label = f"{Path(path).name}\n{shortened(str(Path(path).parent), 60)}##{path}"
+    menu_item(label, lambda: state.work.open(Model(path, unit)))
+    tooltip(path)
+
+
+def status(state: WindowState) -> None:
+    """Status line: the model, the state of its picture, and work under way."""
+    loaded, view = state.work.loaded, state.view
+    if loaded is not None:
+        name = Path(loaded.model.path).name
+        imgui.text(f"{name}: {loaded.triangles} triangles, {view.renderer.provenance['renderer']}")
+        imgui.same_line()
+        imgui.text(f"|  {view.state}")
+    if (task := next((one for one in state.work.busy if one.name), None)) is not None:
+        imgui.same_line()
+        imgui.text(f"|  {task.progress}")
+        imgui.same_line()
+        if imgui.small_button("cancel"):
+            task.cancel()
 
 
 def keys_page(state: WindowState) -> None:
-    """Draw the page, if it is asked for."""
+    """Draw the page of keys, if it is open."""
     if not state.keys_shown:
         return
     if not imgui.is_popup_open(PAGE):
@@ -150,40 +145,43 @@ def keys_page(state: WindowState) -> None:
 
 
 def handle_keys(state: WindowState) -> None:
-    """Do what keys ask for; not while somebody types."""
-    io = imgui.get_io()
-    if imgui.is_key_pressed(imgui.Key.escape, False) and not _closes_itself(state):
+    """Act on pressed keys; not while somebody types."""
+    io, work, key = imgui.get_io(), state.work, imgui.Key
+
+    def pressed(which: imgui.Key) -> bool:
+        return imgui.is_key_pressed(which, False)
+
+    def switch(name: str) -> None:
+        state.change(name, not state.get(name), step=True)
+
+    # Escape is for a menu, a list or a field in which somebody types, which see to it themselves; or for ours.
+    own = state.browser is not None or state.keys_shown
+    others = io.want_text_input or imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    if pressed(key.escape) and (own or not others):
         state.escape()
     if io.want_text_input or state.browser is not None:
         return
-    if imgui.is_key_pressed(imgui.Key.f1, False) or (io.key_shift and imgui.is_key_pressed(imgui.Key.slash, False)):
+    if pressed(key.f1) or (io.key_shift and pressed(key.slash)):
         state.keys_shown = not state.keys_shown
     if state.keys_shown:
         return
-    if imgui.is_key_pressed(imgui.Key.f, False):
-        state.frame()
-    if imgui.is_key_pressed(imgui.Key.h, False) and io.key_alt:
-        show_all(state)
-    elif imgui.is_key_pressed(imgui.Key.h, False) and state.target is not None:
-        hide(state, state.target)
-    if imgui.is_key_pressed(imgui.Key.i, False) and state.target is not None:
-        isolate(state, state.target)
-    if imgui.is_key_pressed(imgui.Key.c, False) and not io.key_ctrl:
-        state.change("display.converge", not state.get("display.converge"), step=True)
-    if imgui.is_key_pressed(imgui.Key.p, False):
-        state.change("display.caustics", not state.get("display.caustics"), step=True)
-    if io.key_ctrl and imgui.is_key_pressed(imgui.Key.z):
-        (state.work.redo if io.key_shift else state.work.undo)()
-    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.y):
-        state.work.redo()
-    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.o, False):
+    if pressed(key.f):
+        work.frame(state.selected)
+    if pressed(key.h) and io.key_alt:
+        work.do(Hide(()))
+    elif pressed(key.h) and state.target is not None:
+        state.hide(state.target)
+    if pressed(key.i) and state.target is not None:
+        state.isolate(state.target)
+    if pressed(key.c) and not io.key_ctrl:
+        switch("display.converge")
+    if pressed(key.p):
+        switch("display.caustics")
+    if io.key_ctrl and imgui.is_key_pressed(key.z):
+        (work.redo if io.key_shift else work.undo)()
+    elif io.key_ctrl and imgui.is_key_pressed(key.y):
+        work.redo()
+    elif io.key_ctrl and pressed(key.o):
         state.ask_file("open")
-    elif imgui.is_key_pressed(imgui.Key.o, False) and state.work.document.orbit is not None:
-        state.change("orbit.orthographic", not state.get("orbit.orthographic"), step=True)
-
-
-def _closes_itself(state: WindowState) -> bool:
-    """True if Escape is for a menu, a list or a field that is being typed in, which see to it themselves."""
-    own = state.browser is not None or state.keys_shown
-    typing = imgui.get_io().want_text_input
-    return not own and (typing or imgui.is_popup_open("", imgui.PopupFlags_.any_popup))
+    elif pressed(key.o) and work.document.orbit is not None:
+        switch("orbit.orthographic")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -11,10 +13,9 @@ from translucent.arrays import Array
 from translucent.frames.aovs import false_colors, marks
 from translucent.preview.actions import Pan, Turn, Zoom
 from translucent.preview.document import camera_of, length_text, triple_text
-from translucent.preview.measuring import Crossing
-from translucent.preview.panels.material import PRESET
+from translucent.preview.panels.widgets import accepts_preset, begin_drag, em, packed
 from translucent.preview.viewport_renderer import thickest, worst
-from translucent.preview.window_state import Probed, WindowState, em
+from translucent.preview.window_state import ProbedPixel, WindowState
 from translucent.scene.camera import Camera
 from translucent.units import metres_per_unit
 
@@ -48,7 +49,9 @@ def viewport_panel(state: WindowState) -> None:
         imgui.set_cursor_screen_pos(corner)
     buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
     imgui.invisible_button("##viewport", room, buttons | imgui.ButtonFlags_.mouse_button_middle)
-    _take_dragged(state, corner, room)
+    if accepts_preset():
+        place = imgui.get_io().mouse_pos
+        state.drop_preset(state.dragged, ((place.x - corner.x) / room.x, (place.y - corner.y) / room.y))
     _mouse(state, corner, room)
     over = imgui.get_window_draw_list()
     over.push_clip_rect(corner, ImVec2(corner.x + room.x, corner.y + room.y), True)
@@ -61,20 +64,10 @@ def viewport_panel(state: WindowState) -> None:
     over.pop_clip_rect()
 
 
-def _take_dragged(state: WindowState, corner: ImVec2, room: ImVec2) -> None:
-    """Take a preset that is dragged from the library."""
-    if not imgui.begin_drag_drop_target():
-        return
-    if imgui.accept_drag_drop_payload_py_id(PRESET) is not None:
-        place = imgui.get_io().mouse_pos
-        state.drop_preset(state.dragged, ((place.x - corner.x) / room.x, (place.y - corner.y) / room.y))
-    imgui.end_drag_drop_target()
-
-
 def _mouse(state: WindowState, corner: ImVec2, room: ImVec2) -> None:
     io = imgui.get_io()
+    begin_drag(state)
     if imgui.is_item_activated():
-        state.drag += 1
         state.pressed_at = io.mouse_pos.x, io.mouse_pos.y
     if imgui.is_item_active() and (io.mouse_delta.x or io.mouse_delta.y):
         right, down = io.mouse_delta.x, io.mouse_delta.y
@@ -154,7 +147,7 @@ def _split(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
         name = type(plans[1].method).__name__
     if display.compare in ("reference", "error"):
         truth = state.work.truth
-        if not state.view.has_truth():
+        if not state.view.has_truth:
             name += ": being drawn ..."
         elif truth is not None and truth.level > 1:
             name += f", 1/{truth.level} so far"
@@ -164,7 +157,7 @@ def _split(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
         _label(over, ImVec2(x - width - em(0.8), top), left)
     if corner.x + room.x - x > imgui.calc_text_size(name).x + em(1.2):
         _label(over, ImVec2(x + em(0.8), top), name)
-    if display.compare == "error" and state.view.has_truth():
+    if display.compare == "error" and state.view.has_truth:
         _error_scale(state, over, ImVec2(corner.x + room.x, corner.y + room.y))
 
 
@@ -176,15 +169,18 @@ def _error_scale(state: WindowState, over: imgui.ImDrawList, end: ImVec2) -> Non
     left, top = end.x - width - em(1.4), end.y - em(1.6) - height - line
     over.add_rect_filled(ImVec2(left - em(0.6), top - 1.3 * line), ImVec2(end.x - em(0.6), end.y - em(0.7)), SHADE)
     over.add_text(ImVec2(left, top - 1.2 * line), WHITE, f"error of thickness, {unit}; orange: not valid")
-    parts = 48
-    for i in range(parts):
-        red, green, blue = (int(255 * v) for v in error_color(2.0 * (i + 0.5) / parts - 1.0))
-        begin, stop = left + width * i / parts, left + width * (i + 1) / parts
-        color = 0xFF000000 | blue << 16 | green << 8 | red
-        over.add_rect_filled(ImVec2(begin, top), ImVec2(stop + 1.0, top + height), color)
+    _color_bar(over, left, top, width, [error_color(2.0 * (i + 0.5) / 48 - 1.0) for i in range(48)])
     for share, text in ((0.0, f"-{most:.2g}"), (0.5, "0"), (1.0, f"+{most:.2g}")):
         wide = imgui.calc_text_size(text).x
         over.add_text(ImVec2(left + share * (width - wide), top + height), WHITE, text)
+
+
+def _color_bar(
+    over: imgui.ImDrawList, left: float, top: float, width: float, colors: Sequence[Sequence[float]]
+) -> None:
+    for i, color in enumerate(colors):
+        begin, end = left + width * i / len(colors), left + width * (i + 1) / len(colors)
+        over.add_rect_filled(ImVec2(begin, top), ImVec2(end + 1.0, top + em(0.8)), packed(color))
 
 
 def error_color(share: float) -> tuple[float, float, float]:
@@ -208,12 +204,8 @@ def _scale(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
     top = bottom - height - em(1.5)
     over.add_rect_filled(ImVec2(left - em(0.6), top - em(2.0)), ImVec2(left + width + em(0.9), bottom + em(0.3)), SHADE)
     over.add_text(ImVec2(left, top - em(1.6)), WHITE, f"thickness, {display.unit}")
-    colors, parts = false_colors(), 64
-    for i in range(parts):
-        red, green, blue = (int(v) for v in colors[round(i * 255 / (parts - 1))])
-        color = 0xFF000000 | blue << 16 | green << 8 | red
-        begin, end = left + width * i / parts, left + width * (i + 1) / parts
-        over.add_rect_filled(ImVec2(begin, top), ImVec2(end + 1.0, top + height), color)
+    colors = false_colors()
+    _color_bar(over, left, top, width, [(colors[round(i * 255 / 63)] / 255.0).tolist() for i in range(64)])
     most = thickest(state.work) / metres_per_unit(display.unit)
     free = left - em(1.0)
     for value in marks(most):
@@ -231,7 +223,7 @@ def _inset(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
     measured = state.work.measured
     if not state.get("display.inset") or measured is None or measured.scene is not state.work.scene():
         return
-    texture = state.inset_texture(measured.truth)
+    texture = state.texture("inset", measured.truth)
     width = min(em(14.0), 0.3 * room.x)
     height = width * texture.height / texture.width
     low = ImVec2(corner.x + room.x - width - em(0.6), corner.y + room.y - height - em(0.6))
@@ -275,22 +267,26 @@ def probe_lines(state: WindowState, position: tuple[float, float]) -> list[str]:
     display = state.work.document.display
     right = display.compare == "method" and position[0] > display.split
     probe = state.view.probe(*pixel, 1 if right else 0)
-    if state.probed is None or state.probed.pixel != pixel or state.probed.scene is not scene:
-        state.probed = Probed(pixel, scene)
+    probed = state.probed
+    if probed is None or probed.pixel != pixel or probed.scene is not scene:
+        probed = state.probed = ProbedPixel(pixel, scene)
     if probe is None:
         return []
-    known = state.probed.crossing
-    if known is None and not state.probed.asked:
-        _ask_crossing(state, state.probed)
+    known = probed.crossing
+    if known is None and not probed.requested and state.work.lanes["ray"].task is None:
+        probed.requested = True
+        state.work.cross(scene, viewport.size, pixel, partial(setattr, probed, "crossing"))
     if not probe.covered and probe.valid:
         return ["no medium"]
     with np.errstate(under="ignore"):
         passed = np.exp(-np.asarray(probe.optical_depth))
+    plan = state.view.plans[1 if right else 0]
+    why = "; ".join(plan.limits) if plan is not None and plan.limits else "its surfaces do not balance"
     lines = [
         f"thickness {length_text(probe.thickness, display.unit)}",
         f"sigma_t d {triple_text(probe.optical_depth)}",
         f"T {triple_text(passed)}",
-        "valid" if probe.valid else f"not valid: {why_not(state, right)}",
+        "valid" if probe.valid else f"not valid: {why}",
     ]
     if known is not None:
         lines.insert(1, f"reference {length_text(known.thickness, display.unit)}, {known.layers} layers")
@@ -299,33 +295,11 @@ def probe_lines(state: WindowState, position: tuple[float, float]) -> list[str]:
     return lines
 
 
-def why_not(state: WindowState, right: bool) -> str:
-    """Reason why a pixel is invalid."""
-    plan = state.view.plans[1 if right else 0]
-    return "; ".join(plan.limits) if plan is not None and plan.limits else "its surfaces do not balance"
-
-
-def _ask_crossing(state: WindowState, probed: Probed) -> None:
-    scene, size = state.work.scene(), state.view.viewport.size
-    if scene is None or state.work.lanes["ray"].task is not None:
-        return
-    probed.asked = True
-
-    def take(found: Crossing) -> None:
-        probed.crossing = found
-
-    state.work.cross(scene, size, probed.pixel, take)
-
-
 def _status(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
     """Draw the status: why the picture is incomplete or simpler, and work under way."""
     y = corner.y + em(0.4) + (em(1.8) if state.get("display.compare") != "off" else 0.0)
-    stage = state.view
-    known = stage.simpler, *stage.quality.told, stage.converging.told, stage.photons.told
-    lines = [text for text in (stage.problem, stage.shader_problem, *known) if text]
-    slow = [task for task in state.work.busy if task.name and task.seconds > 1.0]
-    lines += [task.told for task in slow]
-    for text in lines:
+    slow = [task.progress for task in state.work.busy if task.name and task.seconds > 1.0]
+    for text in (*state.view.notes, *slow):
         for line in folded(text, room.x - em(2.0)):
             _label(over, ImVec2(corner.x + em(0.6), y), line)
             y += em(1.5)
