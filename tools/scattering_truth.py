@@ -7,34 +7,15 @@ for the same seeds; all of them take about twenty minutes of one processor.
 from __future__ import annotations
 
 import sys
-import time
 from pathlib import Path
-
-import numpy as np
 
 import translucent as tl
 from translucent.bench.cases import CASES, Case
-from translucent.bench.truth import StoredTruth, scene_parameters, stored_truth, truth_file
+from translucent.bench.truth import StoredTruth, stored_truth, truth_file
 from translucent.errors import InputError
 from translucent.files.paths import write_atomically
 
 FOLDER = Path(tl.__file__).parent / "bench"
-
-#: Seeds of the two halves.
-SEEDS = (1, 2)
-
-
-def trace(one: Case) -> StoredTruth:
-    """Path trace two independent halves of a scene."""
-    size = one.compared, one.compared
-    scene = one.scene(size)
-    began = time.perf_counter()
-    found = [tl.reference.path_trace(scene, size, one.paths, seed) for seed in SEEDS]
-    seconds = time.perf_counter() - began
-    mask = found[0][0].coverage
-    halves = np.stack([frame.radiance[mask] for frame, _ in found])
-    error = 0.5 * np.sqrt(sum(spread[mask] ** 2 for _, spread in found))
-    return StoredTruth(halves, error, mask, scene_parameters(scene), 2 * one.paths, seconds)
 
 
 def is_current(one: Case) -> bool:
@@ -61,7 +42,8 @@ def main(arguments: list[str]) -> None:
         wanted = one.name in arguments if arguments and "--all" not in arguments else not is_current(one)
         if not wanted and "--all" not in arguments:
             continue
-        truth = trace(one)
+        size = one.compared, one.compared
+        truth = StoredTruth.traced(one.scene(size), size, one.paths)
         content = truth.to_bytes()
         store(one, content)
         print(

@@ -9,6 +9,17 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from translucent.bench.drawing import (
+    FEWEST,
+    FEWEST_LONG,
+    FEWEST_UNSURE,
+    MOST,
+    MOST_REPEATED,
+    Sample,
+    interleaved,
+    ratio,
+    timing,
+)
 from translucent.bench.hard_light import HARD_CASES
 from translucent.bench.judgement import Agreement, agreement, beats, compare_reports, machines_differ, mark_frontier
 from translucent.bench.record import (
@@ -27,17 +38,6 @@ from translucent.bench.record import (
     TimeStatistics,
 )
 from translucent.bench.run import experiments
-from translucent.bench.timing import (
-    FEWEST,
-    FEWEST_LONG,
-    FEWEST_UNSURE,
-    MOST,
-    MOST_REPEATED,
-    Sample,
-    interleaved,
-    ratio,
-    timing,
-)
 
 from .test_record import PROVENANCE
 
@@ -286,18 +286,17 @@ def test_everything_is_measured_in_turns_with_the_floor_between() -> None:
     found = interleaved(draw("floor", 0.01), drawings, 0.0, lambda name, error: failures.update({name: str(error)}))
     assert failures == {"c": "lost"}
     assert found.keys() == {"a", "b"}
-    assert len(found["a"].wall) == len(found["b"].wall) >= 3
+    assert len(found["a"].drawn) == len(found["b"].drawn) >= 3
     measured = order[order.index("floor") + 10 :]
-    assert measured == ["floor", "a", "floor", "b", "floor"] * len(found["a"].wall)
-    rounds = len(found["b"].wall)
-    assert (found["b"].part, found["b"].whole) == ([0.04] * rounds, [0.06] * rounds)
-    assert (found["b"].floor, found["b"].floor_wall) == ([0.02] * rounds, [0.01] * rounds)
+    assert measured == ["floor", "a", "floor", "b", "floor"] * len(found["a"].drawn)
+    assert {(one.part, one.whole) for one in found["b"].drawn} == {(0.04, 0.06)}
+    assert {(one.part, one.wall) for one in found["b"].floors} == {(0.02, 0.01)}
 
 
 def test_the_fastest_need_no_more_than_so_many_rounds() -> None:
     tiny = Sample(1e-9, 1e-9, 1e-9, 1e-9, 1e-9)
     found = interleaved(lambda: tiny, {"a": lambda: tiny}, 0.01, lambda *_: None)
-    assert len(found["a"].wall) == len(found["a"].gpu) == MOST
+    assert len(found["a"].drawn) == len(found["a"].floors) == MOST
 
 
 def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_longer() -> None:
@@ -311,12 +310,12 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
     # A share of 0.1 s: five rounds of 0.01 s with a floor of as much, and four times as many.
     drawings = {"sure": steady(0.01), "unsure": unsteady(0.01)}
     found = interleaved(steady(0.01), drawings, 0.23, lambda *_: None, patience=4.0)
-    assert len(found["sure"].wall) == 5
-    assert 19 <= len(found["unsure"].wall) <= 21
+    assert len(found["sure"].drawn) == 5
+    assert 19 <= len(found["unsure"].drawn) <= 21
     # In haste: three rounds, more only of what is unsure and cheap.
     drawings = {"sure": steady(0.008), "unsure": unsteady(0.007), "dear": unsteady(0.1)}
     hasty = interleaved(steady(0.005), drawings, 0.0, lambda *_: None)
-    assert {name: len(one.wall) for name, one in hasty.items()} == {
+    assert {name: len(one.drawn) for name, one in hasty.items()} == {
         "sure": FEWEST,
         "unsure": FEWEST_UNSURE,
         "dear": FEWEST,
@@ -324,7 +323,7 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
     # A pace for those who wait: two rounds of what is long.
     drawings = {"sure": steady(0.008), "unsure": unsteady(0.007), "long": unsteady(0.1)}
     quick = interleaved(steady(0.005), drawings, 0.0, lambda *_: None, long=0.05)
-    assert {name: len(one.wall) for name, one in quick.items()} == {
+    assert {name: len(one.drawn) for name, one in quick.items()} == {
         "sure": FEWEST,
         "unsure": FEWEST_UNSURE,
         "long": FEWEST_LONG,
@@ -332,5 +331,5 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
     # Sixteen drawings make a sample, whose mean is steady; all of them count as spent.
     tiny = interleaved(steady(2.5e-4), {"tiny": unsteady(1e-4)}, 0.1, lambda *_: None)["tiny"]
     assert tiny.times == tiny.floor_times == MOST_REPEATED
-    assert tiny.wall == pytest.approx([1e-4] * len(tiny.wall))
+    assert [one.wall for one in tiny.drawn] == pytest.approx([1e-4] * len(tiny.drawn))
     assert 0.085 <= tiny.spent < 0.1

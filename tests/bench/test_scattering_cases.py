@@ -83,8 +83,13 @@ def test_a_truth_is_the_same_after_writing_and_reading(rng: np.random.Generator)
     np.testing.assert_array_equal(found.halves, halves)
 
 
+def jade_truth() -> CaseTruth:
+    scene = SCENES[0].scene((0, 0))
+    return CaseTruth.of_paths(scene, stored_truth("jade ring", scene))
+
+
 def test_errors_are_shares_of_the_mean_without_the_noise() -> None:
-    truth = CaseTruth.stored("jade ring", SCENES[0].scene((0, 0)))
+    truth = jade_truth()
     used = truth.compared
     mean = truth.frame.radiance[used].mean(axis=0)
     shown = dataclasses.replace(truth.frame, radiance=truth.frame.radiance + 0.1 * mean)

@@ -70,7 +70,9 @@ class Case:
     tolerance : float
         Relative error of scattered light in the reference.
     paths : int
-        Of each pixel, in each of the two halves of a truth that is path traced beforehand; 0: it is traced here.
+        Of each pixel, in each of the two halves of a truth that is path traced; 0: along rays of pixels.
+    stored : bool
+        The package brings this truth.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Case:
     compared: int = 240
     tolerance: float = 1e-4
     paths: int = 0
+    stored: bool = True
 
 
 def _body(make: Callable[[], Mesh], size: Size) -> Scene:

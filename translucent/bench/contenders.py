@@ -7,7 +7,7 @@ import difflib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, NamedTuple, Self, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -38,10 +38,14 @@ from translucent.planning.notes import NoteKind
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
+from translucent.renderer import Renderer
 from translucent.scene.scene import Object, Scene
 
 #: Effects of a scene, which decide on the contenders that are measured.
 Effect = Literal["absorption", "emission", "scattering", "density", "sheet", "interfaces", "multiple scattering"]
+
+#: Contender whose target has half of the bits.
+IN_FLOAT16 = "SignedDepth in float16"
 
 #: Refraction index of the thin layers that bend rays.
 REFRACTED_IOR = 1.5
@@ -93,7 +97,7 @@ _PATHS = (2, 4, 16)
 
 @dataclass(frozen=True, kw_only=True)
 class Contender:
-    """Method of the public API, drawn by the plan for it: one row of every case that it fits.
+    """Method of the public API, or what is compared with it: one row of every case that it fits.
 
     Attributes
     ----------
@@ -104,7 +108,12 @@ class Contender:
         does not know the truth: no choice would do better.
     choices : mapping of str to object
         Requested of the planner in place of `method`, which then follows from the scene.
+    shortcut : callable, optional
+        Makes what finds the thickness in place of a plan's passes, of the context and the thickness that is assumed.
+    engine : Engine, optional
+        Its light, on a frame of our own, is what is drawn.
     kind : {"method", "counter-example", "cpu"}
+        Without OpenGL, it is drawn by the backend ``cpu``; a method that marches, by the reference.
     effects : tuple of str
         Cases in which it is measured.
     brief : bool
@@ -116,8 +125,10 @@ class Contender:
     ior : {"matched", "refracted"}, optional
         Drawn with media of the index of refraction 1 and without surfaces, or else of `REFRACTED_IOR` where they have
         none of their own.
-    said : str
-        What it promises, where that does not follow from the plan.
+    fits : bool
+        A shortcut that assumes a thickness.
+    said, shown : str
+        Its promise where that does not follow from the plan, and its parameters where they are not the method's.
     thickness : float
         That it assumes, in metres, once it is fitted.
     """
@@ -126,19 +137,23 @@ class Contender:
     family: str
     method: Method = field(default_factory=SignedDepth)
     choices: Mapping[str, Any] = field(default_factory=dict)
+    shortcut: Callable[[BenchContext, float], Shortcut] | None = None
+    engine: Engine | None = None
     kind: RowKind = "method"
     effects: tuple[Effect, ...] = _ALL
     brief: bool = True
     quick: bool = True
     pictured: tuple[Effect, ...] = ()
     ior: Literal["matched", "refracted"] | None = None
+    fits: bool = False
     said: str = ""
+    shown: str = ""
     thickness: float = 0.0
 
     @property
     def samplable(self) -> bool:
         """True if several samples of a pixel are another picture."""
-        return not isinstance(self.method, PathTraced)
+        return self.shortcut is None and not isinstance(self.method, PathTraced)
 
     def scene(self, scene: Scene) -> Scene:
         """Scene with the contender's index of refraction."""
@@ -158,69 +173,87 @@ class Contender:
     def refusal(self, scene: Scene) -> str | None:
         """Reason why it is not measured on a scene, though the planner would run it."""
         interfaces = self.choices.get("interfaces")
+        if self.shortcut is not None and scene.opaque:
+            return "the shortcuts are drawn without opaque objects"
+        if self.name == IN_FLOAT16 and any(body.sheet_thickness is not None for body in scene.bodies):
+            return "signed distances of a sheet mean nothing"
         if interfaces is not None and interfaces.one_interface and _sheets(scene):
             return "sheets have one interface, at which nothing bends"
         return None
 
     def plan(self, bench: BenchContext, scene: Scene) -> RenderPlan:
         """Plan of the contender; raises `InputError` if the planner refuses."""
-        return bench.renderer.plan(scene, **(self.choices or {"method": self.method}))
+        if self.kind != "cpu":
+            return bench.renderer.plan(scene, **(self.choices or {"method": self.method}))
+        if bench.cpu is None:
+            raise InputError(self.name, "Embree cannot be loaded", "pip install embreex")
+        return bench.cpu.plan(scene, scattering=SingleScattering())  # as the reference has it
 
     def drawing(self, bench: BenchContext, scene: Scene, plan: RenderPlan, targets: Targets) -> Drawing:
         """Frame of the contender, ready to be drawn."""
+        if self.shortcut is not None:
+            return ShortcutDrawing(bench, scene, targets, plan, self.shortcut(bench, self.thickness))
+        if self.engine is not None:
+            return FrameDrawing(bench, partial(_engine_frame, bench.renderer, scene, targets.size, self.engine))
+        if self.kind == "cpu" and isinstance(self.method, RayMarched):
+            return FrameDrawing(bench, partial(reference.march, scene, targets.size, self.method))
+        if self.kind == "cpu":
+            return FrameDrawing(bench, partial(self.sampled, bench, scene, targets.size, 1))
         return PlanDrawing(bench, scene, targets, plan)
 
     def sampled(self, bench: BenchContext, scene: Scene, size: Size, samples: int) -> Frame:
         """Frame with several samples of each pixel."""
-        return bench.renderer.render(scene, size, samples=samples, **self.choices)
+        if self.kind != "cpu":
+            return bench.renderer.render(scene, size, samples=samples, **self.choices)
+        assert bench.cpu is not None, "there is a plan for it"
+        return bench.cpu.render(scene, size, samples=samples, scattering=SingleScattering())
 
     def passes_of(self, plan: RenderPlan) -> int | None:
-        """Draws of the geometry; None without OpenGL."""
-        return plan.geometry_passes
+        """Draws of the geometry, one where the nearest face is all; None without OpenGL."""
+        if self.kind == "cpu":
+            return None
+        return 1 if self.fits or self.engine is not None else plan.geometry_passes
 
     def parameters(self, plan: RenderPlan | None) -> str:
         """The configuration as Python writes it, with that of interfaces behind it."""
-        if scattering := self.choices.get("scattering"):
+        if scattering := self.engine or self.choices.get("scattering"):
             return str(scattering)
         interfaces = self.choices.get("interfaces") if plan is None else plan.interfaces
-        found = self._method(self.method if plan is None or not self.choices else plan.method)
+        found = self.shown or str(self.method if plan is None or not self.choices else plan.method)
         if self.thickness:
             found = f"{self.thickness:.4g} m, of least squared error"
         return found if interfaces is None else f"{found}, {interfaces}"
 
-    def _method(self, method: Method) -> str:
-        return str(method)
-
     def fitted(self, bench: BenchContext, scene: Scene, truth: Frame) -> Contender:
-        """The contender with the thickness of least squared error, where it assumes one.
+        """The contender with the thickness, or the settings of an engine, of least squared error.
 
         Thickness is proportional to what is assumed, so one picture tells: with t for 1 m, the best is <t d> / <t t>
-        over all pixels that truth or picture cover.
+        over all pixels that truth or picture cover. That of sheets is declared.
         """
-        probe = float(scene.diagonal)
-        if not self._assumes(scene):
+        if self.engine is not None:
+            seen = visible_points(bench.renderer, scene, truth.size)
+            return dataclasses.replace(self, engine=self.engine.fitted(seen, truth.radiance))
+        if not (self.fits or (self.method.makes_sheets and not _sheets(scene))):
             return self
-        trial = self.assuming(probe)
+        probe = float(scene.diagonal)
+        trial = self._assuming(probe)
         frame = drawn_once(bench, trial, scene, trial.plan(bench, scene), truth.size).frame
         used = truth.valid & (truth.coverage | frame.coverage)
         shape = np.asarray(frame.thickness, np.float64)[used] / probe
         best = float(np.sum(shape * truth.thickness[used]) / max(np.sum(shape**2), np.finfo(np.float64).tiny))
-        return self.assuming(best)
+        return self._assuming(best)
 
-    def _assumes(self, scene: Scene) -> bool:
-        """True if its thickness is chosen to fit the truth: that of sheets is declared."""
-        return self.method.makes_sheets and not _sheets(scene)
-
-    def assuming(self, thickness: float) -> Self:
-        """The contender with a thickness in metres."""
-        return dataclasses.replace(self, method=ThinLayer(thickness), thickness=thickness)
+    def _assuming(self, thickness: float) -> Contender:
+        method = ThinLayer(thickness) if self.method.makes_sheets else self.method
+        return dataclasses.replace(self, method=method, thickness=thickness)
 
     def promise(self, plan: RenderPlan, scene: Scene, quantity: Quantity) -> tuple[str, bool]:
         """Promise of its row in a quantity, in words, and whether it is exact: the planner's notes."""
         if self.said:
             return self.said, False
         points = self.method.light_points
-        if self.method.marches and any(map(_shines, scene.bodies)):
+        media = [(body.medium, body.density) for body in scene.bodies if body.medium is not None]
+        if self.method.marches and any(medium.emits or medium.scatters or density for medium, density in media):
             return f"sums over {points} steps in each interval", False
         if plan.has(PassName.LIGHT_VIEWS):
             return f"{points} points of an interval look at the lights; {'; '.join(plan.limits)}".rstrip("; "), False
@@ -229,120 +262,9 @@ class Contender:
         return "; ".join(map(str, limits)) or "exact", not limits
 
 
-@dataclass(frozen=True, kw_only=True)
-class ShortcutContender(Contender):
-    """Shortcut of other renderers, over the shading of signed depth.
-
-    Attributes
-    ----------
-    shown : str
-        Its parameters, in words.
-    passes : callable
-        Makes the passes that find its thickness, of the context and the thickness that is assumed.
-    fits : bool
-        It assumes a thickness.
-    solids : bool
-        It needs bodies with an inside.
-    """
-
-    kind: RowKind = "counter-example"
-    shown: str
-    passes: Callable[[BenchContext, float], Shortcut]
-    fits: bool = False
-    solids: bool = False
-
-    @property
-    def samplable(self) -> bool:
-        """False: no renderer draws it."""
-        return False
-
-    def refusal(self, scene: Scene) -> str | None:
-        """Reason why it is not measured on a scene."""
-        if scene.opaque:
-            return "the shortcuts are drawn without opaque objects"
-        if self.solids and any(body.sheet_thickness is not None for body in scene.bodies):
-            return "signed distances of a sheet mean nothing"
-        return super().refusal(scene)
-
-    def drawing(self, bench: BenchContext, scene: Scene, plan: RenderPlan, targets: Targets) -> Drawing:
-        """Frame of the shortcut, ready to be drawn."""
-        return ShortcutDrawing(bench, scene, targets, plan, self.passes(bench, self.thickness))
-
-    def passes_of(self, plan: RenderPlan) -> int | None:
-        """Draws of the geometry: one, of the nearest face, where a thickness is assumed."""
-        return 1 if self.fits else super().passes_of(plan)
-
-    def _method(self, method: Method) -> str:
-        return self.shown
-
-    def _assumes(self, scene: Scene) -> bool:
-        return self.fits
-
-    def assuming(self, thickness: float) -> Self:
-        """The shortcut with a thickness in metres."""
-        return dataclasses.replace(self, thickness=thickness)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CpuContender(Contender):
-    """Drawing without OpenGL: by the backend ``cpu``, or by the march of the reference where `marched`."""
-
-    kind: RowKind = "cpu"
-    marched: RayMarched | None = None
-
-    def plan(self, bench: BenchContext, scene: Scene) -> RenderPlan:
-        """Plan of the backend ``cpu``."""
-        if bench.cpu is None:
-            raise InputError(self.name, "Embree cannot be loaded", "pip install embreex")
-        return bench.cpu.plan(scene, scattering=SingleScattering())  # as the reference has it
-
-    def drawing(self, bench: BenchContext, scene: Scene, plan: RenderPlan, targets: Targets) -> Drawing:
-        """Frame on the processor."""
-        if self.marched is not None:
-            return FrameDrawing(bench, partial(reference.march, scene, targets.size, self.marched))
-        return FrameDrawing(bench, partial(self.sampled, bench, scene, targets.size, 1))
-
-    def sampled(self, bench: BenchContext, scene: Scene, size: Size, samples: int) -> Frame:
-        """Frame with several samples of each pixel."""
-        assert bench.cpu is not None, "there is a plan for it"
-        return bench.cpu.render(scene, size, samples=samples, scattering=SingleScattering())
-
-    def passes_of(self, plan: RenderPlan) -> int | None:
-        """None: no OpenGL draws anything."""
-        return None
-
-    def _method(self, method: Method) -> str:
-        return 'Renderer(backend="cpu")' if self.marched is None else f"reference.march with {self.marched}"
-
-
-@dataclass(frozen=True, kw_only=True)
-class EngineContender(Contender):
-    """What an engine would show: of NumPy in place of its shaders, on a frame of our own."""
-
-    engine: Engine
-    kind: RowKind = "counter-example"
-
-    def drawing(self, bench: BenchContext, scene: Scene, plan: RenderPlan, targets: Targets) -> Drawing:
-        """Frame of the engine."""
-
-        def make() -> Frame:
-            seen = visible_points(bench.renderer, scene, targets.size)
-            return seen.frame(self.engine.light(seen))
-
-        return FrameDrawing(bench, make)
-
-    def fitted(self, bench: BenchContext, scene: Scene, truth: Frame) -> Contender:
-        """The engine with its best settings."""
-        seen = visible_points(bench.renderer, scene, truth.size)
-        return dataclasses.replace(self, engine=self.engine.fitted(seen, truth.radiance))
-
-    def passes_of(self, plan: RenderPlan) -> int | None:
-        """Draws of the geometry: one."""
-        return 1
-
-    def parameters(self, plan: RenderPlan | None) -> str:
-        """Its settings."""
-        return str(self.engine)
+def _engine_frame(renderer: Renderer, scene: Scene, size: Size, engine: Engine) -> Frame:
+    seen = visible_points(renderer, scene, size)
+    return seen.frame(engine.light(seen))
 
 
 class Drawn(NamedTuple):
@@ -371,57 +293,51 @@ def _sheets(scene: Scene) -> bool:
     return all(body.sheet_thickness is not None for body in scene.bodies)
 
 
-def _shines(body: Object) -> bool:
-    """True if steps through the body add up any light."""
-    medium = body.medium
-    return medium is not None and (medium.emits or medium.scatters or body.density is not None)
-
-
 def _nearest_face(sphere: bool) -> Callable[[BenchContext, float], Shortcut]:
     return lambda bench, thickness: NearestFace(bench.own(NearestFacePass), sphere=sphere, size=thickness)
 
 
 def _straight_lines() -> Iterable[Contender]:
     """Thickness along straight rays: shortcuts, and methods that need no order."""
+    shortcut = partial(Contender, kind="counter-example")
     nearest = "none: the nearest face alone, with the best thickness that there is"
-    constant, ball = "constant thickness", "sphere assumption"
-    meters = "best constant in metres", "best diameter in metres"
-    faces = _nearest_face(sphere=False), _nearest_face(sphere=True)
-    yield ShortcutContender(
-        name=constant, family=constant, said=nearest, shown=meters[0], passes=faces[0], fits=True, pictured=_ALL
-    )
-    yield ShortcutContender(name=ball, family=ball, said=nearest, shown=meters[1], passes=faces[1], fits=True)
+    for name, size, sphere in (("constant thickness", "constant", False), ("sphere assumption", "diameter", True)):
+        yield shortcut(
+            name=name,
+            family=name,
+            said=nearest,
+            shown=f"best {size} in metres",
+            shortcut=_nearest_face(sphere),
+            fits=True,
+            pictured=() if sphere else _ALL,
+        )
     yield Contender(name="ThinLayer", family="ThinLayer", method=ThinLayer(), ior="matched")
     yield Contender(name="ThinLayer, refracted", family="ThinLayer", method=ThinLayer(), ior="refracted", brief=False)
     for method in METHODS.values():
         # Those without parameters worth rows of their own, whichever there are.
         if method not in (SignedDepth, ThinLayer, DepthPeeling, FragmentLists, KBuffer, RayMarched, PathTraced):
             yield Contender(name=method.__name__, family=method.__name__, method=method())
-    yield ShortcutContender(
+    yield shortcut(
         name="BackFaceDepth, unmarked",
         family="BackFaceDepth",
         method=BackFaceDepth(),
         said="exact for convex bodies; says nothing where a body is not",
         shown="BackFaceDepth() without its mask",
-        passes=lambda bench, _: bench.own(UnmarkedBackFacePass),
+        shortcut=lambda bench, _: bench.own(UnmarkedBackFacePass),
         pictured=("absorption", "emission"),
     )
-    yield Contender(name="SignedDepth", family="SignedDepth", pictured=_ALL)
-    yield Contender(
-        name="SignedDepth from the camera",
-        family="SignedDepth",
-        method=SignedDepth(anchored=False),
+    signed = partial(Contender, family="SignedDepth")
+    pictured: tuple[Effect, ...] = ("absorption",)
+    camera = SignedDepth(anchored=False)
+    yield signed(name="SignedDepth", pictured=_ALL)
+    yield signed(name="SignedDepth from the camera", method=camera, kind="counter-example", pictured=pictured)
+    yield signed(
+        name=IN_FLOAT16,
         kind="counter-example",
-        pictured=("absorption",),
-    )
-    yield ShortcutContender(
-        name="SignedDepth in float16",
-        family="SignedDepth",
         said="none: 11 bits for sums of signed distances",
         shown="SignedDepth(anchored=True) into float16",
-        passes=lambda bench, _: bench.own(HalfFloatPass),
-        solids=True,
-        pictured=("absorption",),
+        shortcut=lambda bench, _: bench.own(HalfFloatPass),
+        pictured=pictured,
     )
 
 
@@ -455,11 +371,13 @@ def _in_order() -> Iterable[Contender]:
             brief=steps in (8, 64),
             pictured=_SOURCES if steps == 8 else (),
         )
-        yield CpuContender(
+        yield Contender(
             name=f"RayMarched on the CPU, {steps} steps",
             family="RayMarched on the CPU",
-            marched=RayMarched(steps=steps),
+            kind="cpu",
+            method=RayMarched(steps=steps),
             said=f"sums over {steps} steps in each interval",
+            shown=f"reference.march with {RayMarched(steps=steps)}",
             effects=("density",),
             brief=steps in (8, 64),
             quick=steps == 8,
@@ -477,15 +395,15 @@ def _with_interfaces() -> Iterable[Contender]:
     """Treatments of interfaces; and what viewers of glTF do, one interface before a constant thickness."""
     made = partial(Contender, effects=_INTERFACES)
     front, screen = FrontInterface(), ScreenInterfaces()
-    yield ShortcutContender(
+    yield made(
         name="constant thickness, one interface",
         family="constant thickness",
         choices={"interfaces": front},
         said="none: the best constant thickness, and rays that bend once, where they enter",
         shown="best constant in metres",
-        passes=_nearest_face(sphere=False),
+        shortcut=_nearest_face(sphere=False),
         fits=True,
-        effects=_INTERFACES,
+        kind="counter-example",
         pictured=_INTERFACES,
     )
     yield made(
@@ -514,8 +432,15 @@ def _with_scattering() -> Iterable[Contender]:
     """Treatments of light that is scattered many times, and what engines show of it."""
     often: dict[str, Any] = {"effects": _SCATTERING, "pictured": _SCATTERING}
     for engine in (PaintLayer(), NormalizedDiffusion(), Frostbite()):
-        name, once = engine.name, {"scattering": SingleScattering()}
-        yield EngineContender(name=name, family=name, engine=engine, said=engine.promise, choices=once, **often)
+        yield Contender(
+            name=engine.name,
+            family=engine.name,
+            kind="counter-example",
+            engine=engine,
+            said=engine.promise,
+            choices={"scattering": SingleScattering()},
+            **often,
+        )
     for name, (scattering, brief, said) in _SCATTERINGS.items():
         family, choices = type(scattering).__name__, {"scattering": scattering}
         yield Contender(name=name, family=family, brief=brief, said=said, choices=choices, **often)
@@ -539,9 +464,11 @@ CONTENDERS: tuple[Contender, ...] = (
     *_with_interfaces(),
     *_with_scattering(),
     *_path_traced(),
-    CpuContender(
+    Contender(
         name="cpu backend",
         family="cpu backend",
+        kind="cpu",
+        shown='Renderer(backend="cpu")',
         method=FragmentLists(),
         effects=(*_ALL, "interfaces"),
         brief=False,

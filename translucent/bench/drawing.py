@@ -1,14 +1,24 @@
-"""Drawings that are timed: frames prepared once, drawn again and again, and read at the end."""
+"""Drawings that are timed in turns: frames prepared once, drawn again and again, and read at the end.
+
+All is measured in turns, A B C A B C, and the floor before and after each: what slows the machine down for longer than
+a drawing slows both, and their quotient stays. Medians and quartiles are over rounds, so that single hiccups do not
+count either. Slow drawings leave the rounds early, once they have had their share of the time; those whose rounds
+differ much stay longer. What takes less than clocks can tell apart is drawn several times for one sample.
+"""
 
 from __future__ import annotations
 
 import copy
+import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar, cast
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, Protocol, TypeVar, cast
 
-from translucent.bench.timing import Sample
+import numpy as np
+import numpy.typing as npt
+
+from translucent.bench.record import Ratio, TimeStatistics
 from translucent.frames.frame import Frame
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
@@ -33,6 +43,47 @@ Made = TypeVar("Made")
 #: Passes of a plan that shade the thickness of a shortcut, those that find and shade an interface included.
 _AFTER_SHORTCUTS = (PassName.INTERFACES, PassName.TRANSMITTANCE, PassName.SURFACES)
 
+#: Rounds that even the slowest takes part in, and that the fastest needs no more than.
+FEWEST, MOST = 3, 60
+
+#: A drawing that is called long needs no more rounds than this, and less from `LONGEST` seconds on: its own noise
+#: averages out within it.
+FEWEST_LONG = 2
+FEWEST_LONGEST, LONGEST = 1, 2.0
+
+#: What differs much between rounds takes part in so many at least, while it and its floors have taken fewer seconds: of
+#: three rounds, one hiccup in a floor and one in a drawing are most.
+FEWEST_UNSURE, CHEAP = 9, 0.1
+
+#: Seconds of a sample, below which a drawing is repeated in it, and the largest number of repetitions.
+SHORTEST, MOST_REPEATED = 4e-3, 16
+
+#: Standard error of the median ratio, as a share of it, from which on more rounds are asked for.
+UNSURE = 0.03
+
+#: Draws of the floor on each side of a sample take this share of the time of the sample, up to `MOST_FLOORS` draws.
+FLOOR_SHARE, MOST_FLOORS = 0.3, 10
+
+
+class Sample(NamedTuple):
+    """Sample: seconds of one drawing.
+
+    Attributes
+    ----------
+    wall, frame : float
+        By the clock: until the passes that find thickness are done, and until all are.
+    gpu : float or None
+        Of those passes, by the GPU's timer.
+    part, whole : float
+        The same two, by the clock that drawings are compared by: see `translucent.bench.drawing.BenchContext`.
+    """
+
+    wall: float
+    frame: float
+    gpu: float | None
+    part: float
+    whole: float
+
 
 @dataclass(frozen=True)
 class Effort:
@@ -45,7 +96,7 @@ class Effort:
     compared : float
         Width and height of the frames that are compared with the reference, as a fraction of those of the case.
     patience, long : float
-        As in `translucent.bench.timing.interleaved`.
+        As in `translucent.bench.drawing.interleaved`.
     """
 
     case_seconds: float
@@ -296,6 +347,231 @@ class FloorDrawing:
     def release(self) -> None:
         """Free the uniform buffers."""
         self._job.release()
+
+
+def timed_beside_floor(
+    bench: BenchContext,
+    scene: Scene,
+    size: Size,
+    makers: Mapping[str, Callable[[Targets], Drawing]],
+    seconds: float,
+    finished: Callable[[str, Drawing], None] = lambda *_: None,
+) -> tuple[dict[str, Samples], dict[str, Exception]]:
+    """Make drawings of a scene and measure them in turns.
+
+    Parameters
+    ----------
+    bench : BenchContext
+    scene : Scene
+        Of the floor.
+    size : (width, height)
+    makers : mapping of str to callable
+        Make the drawings, into targets.
+    seconds : float
+        In all.
+    finished : callable
+        Called with each drawing that has been measured.
+
+    Returns
+    -------
+    samples, failures : dict
+        By the names of those that can be drawn, and of those that cannot.
+    """
+    targets = Targets(bench.gl, size)
+    floor = FloorDrawing(bench, scene, targets)
+    drawings: dict[str, Drawing] = {}
+    failures: dict[str, Exception] = {}
+    try:
+        for name, make in makers.items():
+            try:
+                drawings[name] = make(targets)
+            except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row
+                failures[name] = error
+        draws = {name: drawing.draw for name, drawing in drawings.items()}
+        patience, long = bench.effort.patience, bench.effort.long
+        found = interleaved(floor.draw, draws, seconds, failures.__setitem__, patience, long)
+        for name in found:
+            finished(name, drawings[name])
+        return found, failures
+    finally:
+        for drawing in drawings.values():
+            drawing.release()
+        floor.release()
+        targets.release()
+
+
+@dataclass
+class Samples:
+    """Samples of one drawing over the rounds.
+
+    Attributes
+    ----------
+    drawn, floors : list of Sample
+        Of the drawing, and of the floor around each.
+    times, floor_times : int
+        How often the drawing, and the floor, are drawn for a sample.
+    """
+
+    drawn: list[Sample] = field(default_factory=list)
+    floors: list[Sample] = field(default_factory=list)
+    times: int = 1
+    floor_times: int = 1
+
+    @property
+    def spent(self) -> float:
+        """Total time in seconds so far."""
+        floors = self.floor_times * sum(one.wall for one in self.floors)
+        return self.times * sum(one.frame for one in self.drawn) + floors
+
+    @property
+    def of_whole_frames(self) -> Samples:
+        """Samples of whole frames, for cases without passes that find thickness; the GPU's timer had only these."""
+        return replace(self, drawn=[Sample(one.frame, one.frame, None, one.whole, one.whole) for one in self.drawn])
+
+    def timing(self, name: str) -> TimeStatistics | None:
+        """Statistics of one of the times of samples."""
+        return timing([value for one in self.drawn if (value := getattr(one, name)) is not None])
+
+    def ratio(self, name: str) -> Ratio | None:
+        """Statistics of the ratio of one of the times of samples to that of the floor."""
+        return ratio([getattr(one, name) for one in self.drawn], [one.part for one in self.floors])
+
+
+def interleaved(
+    floor: Callable[[], Sample],
+    drawings: Mapping[str, Callable[[], Sample]],
+    seconds: float,
+    failed: Callable[[str, Exception], None],
+    patience: float = 1.0,
+    long: float = 0.3,
+) -> dict[str, Samples]:
+    """Measure all drawings, in turns, for about as many seconds; each gets an equal share, and at least a few rounds.
+
+    Parameters
+    ----------
+    floor : callable
+        Draws the floor.
+    drawings : mapping of str to callable
+    seconds : float
+        In all.
+    failed : callable
+        Called with the name and the error of a drawing that raises, which is left out of the other rounds.
+    patience : float
+        How many times its share a drawing is timed at most while its ratio to the floor is `UNSURE`.
+    long : float
+        Seconds of a drawing from which on `FEWEST_LONG` rounds do.
+    """
+    warming = seconds / 8 / max(len(drawings), 1)
+    warmed = {name: draw for name, draw in drawings.items() if _warm_up(name, draw, warming, failed)}
+    for _ in range(5):
+        floor()
+    base, repeated = _Repeated(floor), {name: _Repeated(draw) for name, draw in warmed.items()}
+    found = {name: Samples() for name in warmed}
+    share = 0.85 * seconds / max(len(warmed), 1)
+    typical = float(np.median([base.sample().wall for _ in range(5)]))
+    while running := [name for name in warmed if not _enough(found[name], share, patience, long)]:
+        before = _floor(base, typical, 0.0)
+        for name in running:
+            try:
+                sample = repeated[name].sample()
+            except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row, and the others go on
+                failed(name, error)
+                del warmed[name], found[name]
+                continue
+            after = _floor(base, typical, sample.wall * repeated[name].times / base.times)
+            found[name].times, found[name].floor_times = repeated[name].times, base.times
+            found[name].drawn.append(sample)
+            found[name].floors.append(_middle([before, after], np.mean))
+            before = after
+    return found
+
+
+def _warm_up(name: str, draw: Callable[[], Sample], seconds: float, failed: Callable[[str, Exception], None]) -> bool:
+    """Warm up for some seconds, with at least one draw: shaders compile, buffers grow, caches fill."""
+    begin = time.perf_counter()
+    try:
+        draw()
+        while time.perf_counter() - begin < seconds:
+            draw()
+    except Exception as error:  # noqa: BLE001 - as above
+        failed(name, error)
+        return False
+    return True
+
+
+def _floor(floor: _Repeated, typical: float, beside: float) -> Sample:
+    """Medians of a few draws of the floor, the longer the sample beside it takes the more."""
+    count = int(np.clip(round(FLOOR_SHARE * beside / typical), 1, MOST_FLOORS))
+    return _middle([floor.sample() for _ in range(count)], np.median)
+
+
+class _Repeated:
+    """Drawing that is drawn as often for a sample as it takes to tell it from the noise of clocks.
+
+    Attributes
+    ----------
+    times : int
+    """
+
+    def __init__(self, draw: Callable[[], Sample]) -> None:
+        self._draw, self.times = draw, 0
+
+    def sample(self) -> Sample:
+        """Draw, and return the means of the times; the first sample decides how many they are."""
+        samples = [self._draw()]
+        if not self.times:
+            self.times = math.ceil(min(SHORTEST / max(samples[0].frame, SHORTEST / MOST_REPEATED), MOST_REPEATED))
+        samples += [self._draw() for _ in range(self.times - 1)]
+        return _middle(samples, np.mean)
+
+
+def _middle(samples: list[Sample], of: Callable[..., Any]) -> Sample:
+    """Sample of the means or medians of all times."""
+    known = [[value for value in values if value is not None] for values in zip(*samples, strict=True)]
+    return Sample(*(float(of(values)) if values else None for values in known))  # type: ignore[arg-type]
+
+
+def _enough(samples: Samples, share: float, patience: float, long: float) -> bool:
+    rounds = len(samples.drawn)
+    first = samples.drawn[0].frame if rounds else 0.0
+    fewest = FEWEST_LONGEST if first > LONGEST else FEWEST_LONG if first > long else FEWEST
+    most = MOST * patience
+    if rounds >= most or rounds < fewest or samples.spent < share:
+        return rounds >= most
+    if rounds < FEWEST_UNSURE and samples.spent < CHEAP and _unsure(samples):
+        return False
+    return samples.spent >= patience * share or not _unsure(samples)
+
+
+def _unsure(samples: Samples) -> bool:
+    found = samples.ratio("part")
+    return found is not None and found.noise > UNSURE * found.median
+
+
+def timing(seconds: list[float]) -> TimeStatistics | None:
+    """Statistics in milliseconds; None without samples."""
+    if not seconds:
+        return None
+    low, median, high, p95 = np.quantile(np.array(seconds) * 1e3, (0.25, 0.5, 0.75, 0.95))
+    return TimeStatistics(float(median), float(p95), float(high - low), len(seconds))
+
+
+def ratio(seconds: list[float], floor: list[float]) -> Ratio | None:
+    """Statistics of the ratios of rounds."""
+    if not seconds:
+        return None
+    quotients: npt.NDArray[np.float64] = np.array(seconds) / np.array(floor)
+    low, median, high = np.quantile(quotients, (0.25, 0.5, 0.75))
+    # The quartiles of a normal distribution are 1.349 standard deviations apart; the median of n samples has a
+    # standard error of sqrt(pi / 2) = 1.253 standard deviations over sqrt(n).
+    noise = 1.253 * (high - low) / 1.349 / np.sqrt(len(quotients))
+    return Ratio(float(median), float(high - low), float(noise))
+
+
+def floor_times(found: Mapping[str, Samples]) -> Samples:
+    """Samples of the floor itself, over all draws of it beside the others."""
+    floors = [one for samples in found.values() for one in samples.floors]
+    return Samples(floors, floors)
 
 
 def is_software(renderer: Renderer) -> bool:

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, get_args
 
 from translucent.bench.cases import CASES, Case
 from translucent.bench.claims import METHOD_CLAIMS, SCATTERING_CLAIMS, Judge
 from translucent.bench.contenders import Contender, Drawn, contenders, drawn_once
-from translucent.bench.drawing import BenchContext, Drawing, FloorDrawing
+from translucent.bench.drawing import BenchContext, Drawing, Samples, floor_times, timed_beside_floor
 from translucent.bench.experiment import Experiment, one_line
 from translucent.bench.judgement import mark_frontier
 from translucent.bench.record import CaseRecord, MethodRow, Part, Quantity
-from translucent.bench.timing import Samples, interleaved, ratio, timing
-from translucent.bench.truth import CaseTruth
+from translucent.bench.truth import CaseTruth, StoredTruth, stored_truth
 from translucent.errors import InputError, TranslucentError
 from translucent.frames.frame import Frame
 from translucent.gpu.targets import Targets
@@ -61,6 +60,8 @@ class MethodComparison(Experiment[Case]):
         Names or families of contenders; default: all.
     quick : bool
         Fewer contenders.
+    chosen : sequence of Contender
+        These alone, on all scenes.
     """
 
     part: ClassVar[Part] = "scenes"
@@ -71,6 +72,7 @@ class MethodComparison(Experiment[Case]):
     shown: Sequence[Case] = CASES
     methods: Sequence[str] = ()
     quick: bool = False
+    chosen: Sequence[Contender] = ()
 
     def blank(self, bench: BenchContext, case: Case) -> CaseRecord:
         """Record of a case without numbers."""
@@ -85,7 +87,8 @@ class MethodComparison(Experiment[Case]):
         part = min(1.0, round(case.compared * bench.effort.compared) / max(size))
         small = max(1, round(size[0] * part)), max(1, round(size[1] * part))
         if case.paths:
-            truth = CaseTruth.stored(case.name, scene)
+            found = stored_truth(case.name, scene) if case.stored else StoredTruth.traced(scene, small, case.paths)
+            truth = CaseTruth.of_paths(scene, found)
         else:
             trace = CaseTruth.over_pixels if case.effect == "interfaces" else CaseTruth.of
             truth = trace(scene, small, case.tolerance)
@@ -116,7 +119,7 @@ class MethodComparison(Experiment[Case]):
         case = on.case
         if not on.record.compared_pixels:
             return ()
-        return contenders(case.effect, quick=self.quick, brief=case.brief, only=self.methods)
+        return self.chosen or contenders(case.effect, quick=self.quick, brief=case.brief, only=self.methods)
 
     def row(self, bench: BenchContext, on: MeasuredScene, contender: Contender) -> Trial:
         """Draw the contender once, small, and compare it with the truth."""
@@ -147,12 +150,25 @@ class MethodComparison(Experiment[Case]):
         quantity = on.record.quantity
         shown = [("reference", on.truth.frame), *((one.row.method, one.frame) for one in rows if one.frame is not None)]
         pictures = tuple(on.truth.picture(name, frame, quantity) for name, frame in shown)
-        found, failures = _timed(bench, on, rows)
+        working = {one.row.method: one for one in rows if one.row.failure is None and one.row.refusal is None}
+
+        def maker(one: Trial) -> Callable[[Targets], Drawing]:
+            return lambda targets: one.contender.drawing(
+                bench, one.scene, one.contender.plan(bench, one.scene), targets
+            )
+
+        def finished(name: str, drawing: Drawing) -> None:
+            if working[name].contender.method.peels:
+                working[name].row = _peeled(working[name].row, drawing)
+
+        makers = {name: maker(one) for name, one in working.items()}
+        seconds = bench.effort.case_seconds
+        found, failures = timed_beside_floor(bench, on.scene, on.record.size, makers, seconds, finished)
         if on.case.effect in _WHOLE_FRAMES:
             found = {name: one.of_whole_frames for name, one in found.items()}
         timed = [_with_times(one, found.get(one.row.method), failures.get(one.row.method)) for one in rows]
         bench.forget_light()
-        marked = mark_frontier([_floor_row(list(found.values())), *timed], quantity)
+        marked = mark_frontier([_floor_row(floor_times(found)), *timed], quantity)
         return dataclasses.replace(on.record, rows=marked, pictures=pictures)
 
 
@@ -197,42 +213,6 @@ def _layers(frame: Frame) -> int | None:
     return None if frame.layers is None or frame.truncated is None else int((frame.layers - frame.truncated).max())
 
 
-def _timed(
-    bench: BenchContext, on: MeasuredScene, entries: Sequence[Trial]
-) -> tuple[dict[str, Samples], dict[str, Exception]]:
-    """Samples of all rows that have worked so far, in turns, and the errors of those that work no longer."""
-    targets = Targets(bench.gl, on.record.size)
-    floor = FloorDrawing(bench, on.scene, targets)
-    failures: dict[str, Exception] = {}
-    drawings: dict[str, Drawing] = {}
-    try:
-        for one in entries:
-            if one.row.failure is None and one.row.refusal is None:
-                try:
-                    plan = one.contender.plan(bench, one.scene)
-                    drawings[one.row.method] = one.contender.drawing(bench, one.scene, plan, targets)
-                except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row
-                    failures[one.row.method] = error
-        effort = bench.effort
-        found = interleaved(
-            floor.draw,
-            {name: drawing.draw for name, drawing in drawings.items()},
-            effort.case_seconds,
-            failures.__setitem__,
-            effort.patience,
-            effort.long,
-        )
-        for one in entries:
-            if one.contender.method.peels and one.row.method in found:
-                one.row = _peeled(one.row, drawings[one.row.method])
-        return found, failures
-    finally:
-        for drawing in drawings.values():
-            drawing.release()
-        floor.release()
-        targets.release()
-
-
 def _peeled(row: MethodRow, drawing: Drawing) -> MethodRow:
     """The row with the layers and passes of the timed frame: few pixels may need most of them."""
     drawing.draw()
@@ -252,24 +232,23 @@ def _with_times(entry: Trial, samples: Samples | None, error: Exception | None) 
         if isinstance(error, TranslucentError):
             return dataclasses.replace(row, refusal=one_line(error))
         return dataclasses.replace(row, failure=one_line(error))
-    wall = timing(samples.wall)
+    wall = samples.timing("wall")
     peeled = entry.contender.method.peels and wall is not None and row.layers is not None
     return dataclasses.replace(
         row,
         wall=wall,
-        gpu=timing(samples.gpu),
-        frame=timing(samples.frame),
-        ratio=ratio(samples.part, samples.floor),
-        frame_ratio=ratio(samples.whole, samples.floor),
+        gpu=samples.timing("gpu"),
+        frame=samples.timing("frame"),
+        ratio=samples.ratio("part"),
+        frame_ratio=samples.ratio("whole"),
         ms_per_layer=wall.median / row.layers if peeled else None,  # type: ignore[union-attr,operator]
     )
 
 
-def _floor_row(found: Sequence[Samples]) -> MethodRow:
+def _floor_row(floor: Samples) -> MethodRow:
     """The floor; its time is over all draws of it beside the others."""
-    floor = [seconds for samples in found for seconds in samples.floor_wall]
     promise = "the cost of drawing the geometry: no thickness"
     row = MethodRow("depth only", "depth only", "", "floor", promise, False, passes=1)
-    if not floor:
+    if not floor.drawn:
         return dataclasses.replace(row, refusal="nothing else has been timed on this scene")
-    return dataclasses.replace(row, wall=timing(floor), ratio=ratio(floor, floor))
+    return dataclasses.replace(row, wall=floor.timing("wall"), ratio=floor.ratio("part"))

@@ -7,8 +7,8 @@ import os
 import platform
 import subprocess
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -126,6 +126,39 @@ def measure_all(
     size = check_size(size or (QUICK_SIZE if quick else FULL_SIZE))
     check_names(methods)
     parts = tuple(part for part in get_args(Part) if part in only or not only)
+    with opened(backend, size, effort or (QUICK if quick else FULL)) as bench:
+        made = provenance(bench.renderer, command, quick=quick)
+        every = experiments(quick, extra, methods)
+        begin = time.perf_counter()
+
+        def stamped(found: Report, *, complete: bool) -> Report:
+            seconds = time.perf_counter() - begin
+            if base is None:
+                return dataclasses.replace(found, seconds=seconds, complete=complete)
+            renewals = (*base.without(parts).renewals, Renewal(parts, made, seconds))
+            return dataclasses.replace(found, renewals=renewals, complete=complete and base.complete)
+
+        report = stamped(Report(made) if base is None else base.without(parts), complete=False)
+        try:
+            for found in measured(bench, every, parts, report, progress):
+                report = stamped(found, complete=False)
+                keep(report)
+        except KeyboardInterrupt:
+            return report
+        report = stamped(report, complete=True)
+    keep(report)
+    return report
+
+
+@contextmanager
+def opened(backend: str | None, size: Size, effort: Effort) -> Iterator[BenchContext]:
+    """Open the renderers that measurements need.
+
+    Raises
+    ------
+    RenderError
+        If there is no OpenGL to measure.
+    """
     with ExitStack() as stack:
         renderer = stack.enter_context(Renderer(backend))
         if renderer.provenance["backend"] == "cpu":
@@ -135,33 +168,27 @@ def measure_all(
         except RenderError:  # Embree cannot be loaded
             cpu = None
         stack.enter_context(renderer.gpu.context.current())
-        bench = BenchContext(renderer, cpu, size, effort or (QUICK if quick else FULL))
+        bench = BenchContext(renderer, cpu, size, effort)
         stack.callback(bench.release)
-        made, begin = provenance(renderer, command, quick=quick), time.perf_counter()
-        every = experiments(quick, extra, methods)
-        report = Report(made) if base is None else base.without(parts)
+        yield bench
 
-        def stamped(found: Report, *, complete: bool) -> Report:
-            seconds = time.perf_counter() - begin
-            claims = tuple(judge(found) for experiment in every for judge in experiment.claims)
-            if base is None:
-                return dataclasses.replace(found, claims=claims, seconds=seconds, complete=complete)
-            renewals = (*base.without(parts).renewals, Renewal(parts, made, seconds))
-            complete = complete and base.complete
-            return dataclasses.replace(found, claims=claims, renewals=renewals, complete=complete)
 
-        steps = [(one, scene) for one in every if one.part in parts for scene in one.scenes(bench)]
-        try:
-            for done, (experiment, scene) in enumerate(steps):
-                progress(f"{experiment.label}{scene.name}", done, len(steps))
-                report = stamped(experiment.added(report, experiment.measure(bench, scene)), complete=False)
-                renderer.gpu.context.drain()
-                keep(report)
-        except KeyboardInterrupt:
-            return dataclasses.replace(report, complete=False)
-        report = stamped(report, complete=True)
-    keep(report)
-    return report
+def measured(
+    bench: BenchContext,
+    every: Sequence[Experiment[Any]],
+    parts: Sequence[Part],
+    report: Report,
+    progress: Progress = lambda *_: None,
+) -> Iterator[Report]:
+    """Measure the experiments of some parts: the report after each scene, with the claims of all that it has."""
+    steps = [(one, scene) for one in every if one.part in parts for scene in one.scenes(bench)]
+    for done, (experiment, scene) in enumerate(steps):
+        progress(f"{experiment.label}{scene.name}", done, len(steps))
+        report = experiment.added(report, experiment.measure(bench, scene))
+        claims = tuple(judge(report) for one in every for judge in one.claims)
+        report = dataclasses.replace(report, claims=claims)
+        bench.renderer.gpu.context.drain()
+        yield report
 
 
 def provenance(renderer: Renderer, command: str, *, quick: bool) -> Provenance:

@@ -10,11 +10,18 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from translucent.bench.contenders import CONTENDERS
-from translucent.bench.drawing import BenchContext, FloorDrawing, PlanDrawing, Size
+from translucent.bench.drawing import (
+    BenchContext,
+    Drawing,
+    PlanDrawing,
+    Samples,
+    Size,
+    floor_times,
+    timed_beside_floor,
+)
 from translucent.bench.experiment import Experiment, one_line
 from translucent.bench.record import Part, Report, ScalePoint, Series
 from translucent.bench.shapes import lying_torus, placed, plates
-from translucent.bench.timing import Samples, interleaved, ratio, timing
 from translucent.errors import TranslucentError
 from translucent.geometry.solids import Sphere
 from translucent.gpu.targets import Targets
@@ -88,17 +95,21 @@ class CostScaling(Experiment[ScalingStep]):
 
     def measure(self, bench: BenchContext, step: ScalingStep) -> list[Series]:
         """Series of one point each, the floor first."""
-        failures: dict[str, Exception] = {}
         found: dict[str, Samples] = {}
         try:
-            found = _timed(bench, *step.make(), failures)
+            scene, size = step.make()
+
+            def maker(method: Method) -> Callable[[Targets], Drawing]:
+                return lambda targets: PlanDrawing(bench, scene, targets, bench.renderer.plan(scene, method))
+
+            makers = {name: maker(method) for name, method in METHODS.items()}
+            found, failures = timed_beside_floor(bench, scene, size, makers, bench.effort.step_seconds)
         except Exception as error:  # noqa: BLE001 - a step that cannot be measured leaves the others alone
             failures = dict.fromkeys(METHODS, error)
-        floor = [seconds for samples in found.values() for seconds in samples.floor_wall]
-        points = {"depth only": ScalePoint(step.x, timing(floor), ratio(floor, floor))}
+        points = {"depth only": _point(step.x, floor_times(found))}
         for name in METHODS:
             if (samples := found.get(name)) is not None:
-                points[name] = ScalePoint(step.x, timing(samples.wall), ratio(samples.part, samples.floor))
+                points[name] = _point(step.x, samples)
             elif isinstance(failures[name], TranslucentError):  # said on purpose: no room for so many surfaces
                 points[name] = ScalePoint(step.x, refusal=one_line(failures[name]))
             else:
@@ -111,29 +122,8 @@ class CostScaling(Experiment[ScalingStep]):
         return [Series(step.axis, labels.get(name, name), name, step.fixed, (at,)) for name, at in points.items()]
 
 
-def _timed(bench: BenchContext, scene: Scene, size: Size, failures: dict[str, Exception]) -> dict[str, Samples]:
-    targets = Targets(bench.gl, size)
-    floor = FloorDrawing(bench, scene, targets)
-    drawings: dict[str, PlanDrawing] = {}
-    try:
-        for name, method in METHODS.items():
-            try:
-                drawings[name] = PlanDrawing(bench, scene, targets, bench.renderer.plan(scene, method))
-            except Exception as error:  # noqa: BLE001 - the other methods go on
-                failures[name] = error
-        return interleaved(
-            floor.draw,
-            {name: drawing.draw for name, drawing in drawings.items()},
-            bench.effort.step_seconds,
-            failures.__setitem__,
-            bench.effort.patience,
-            bench.effort.long,
-        )
-    finally:
-        for drawing in drawings.values():
-            drawing.release()
-        floor.release()
-        targets.release()
+def _point(x: int, samples: Samples) -> ScalePoint:
+    return ScalePoint(x, samples.timing("wall"), samples.ratio("part"))
 
 
 def _axes(software: bool) -> dict[Axis, tuple[str, Mapping[int, Callable[[], tuple[Scene, Size]]]]]:

@@ -15,7 +15,7 @@ import numpy as np
 from translucent import reference
 from translucent.arrays import Array, Integers
 from translucent.bench.claims import SHADOW_MAP_CLAIMS, USUAL, Judge
-from translucent.bench.drawing import BenchContext, ShortcutDrawing
+from translucent.bench.drawing import BenchContext, Sample, Samples, ShortcutDrawing, interleaved
 from translucent.bench.experiment import Experiment, one_line
 from translucent.bench.record import (
     CONSTANT,
@@ -28,7 +28,6 @@ from translucent.bench.record import (
     ShadowRow,
 )
 from translucent.bench.shapes import across, placed, toolkit
-from translucent.bench.timing import Sample, Samples, interleaved, ratio, timing
 from translucent.bench.truth import picture_of
 from translucent.errors import RenderError
 from translucent.frames.frame import Frame
@@ -276,7 +275,7 @@ class ShadowMapComparison(Experiment[LightScene]):
             row = dataclasses.replace(row, errors=errors, edges=ground.edges(found))
             if row.kind == "method":
                 times = map_times(bench, ground.scene, row.size, self.seconds)
-                row = dataclasses.replace(row, wall=timing(times.wall), ratio=ratio(times.part, times.floor))
+                row = dataclasses.replace(row, wall=times.timing("wall"), ratio=times.ratio("part"))
             if row.size == self.usual:
                 ground.picture(row.method, found)
         except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row

@@ -115,14 +115,13 @@ class CaseTruth:
         return cls._of_frame(scene, frame, time.perf_counter() - begin, halves)
 
     @classmethod
-    def stored(cls, name: str, scene: Scene) -> CaseTruth:
-        """Truth of a scene that the package brings; raises `InputError` where it is that of another scene."""
-        found = stored_truth(name, scene)
+    def of_paths(cls, scene: Scene, found: StoredTruth) -> CaseTruth:
+        """Truth of a scene that was path traced; raises `InputError` where it is that of another scene."""
         size = found.mask.shape[1], found.mask.shape[0]
         # All but the light that media scatter.
         frame, _ = reference.path_trace(scene, size, paths=2, max_events=0)
         if not np.array_equal(frame.coverage, found.mask):
-            raise InputError(f"truth of {name!r}", "it covers other pixels", "run tools/scattering_truth.py")
+            raise InputError("truth of a scene", "it covers other pixels", "run tools/scattering_truth.py")
         halves = frame.radiance.copy(), frame.radiance.copy()
         for half, radiance in zip(halves, found.halves, strict=True):
             half[found.mask] = radiance
@@ -277,6 +276,17 @@ class StoredTruth:
     parameters: Array
     paths: int
     seconds: float
+
+    @classmethod
+    def traced(cls, scene: Scene, size: Size, paths: int) -> StoredTruth:
+        """Path trace two independent halves of a scene, of so many paths for each pixel."""
+        began = time.perf_counter()
+        found = [reference.path_trace(scene, size, paths, seed) for seed in (1, 2)]
+        seconds = time.perf_counter() - began
+        mask = found[0][0].coverage
+        halves = np.stack([frame.radiance[mask] for frame, _ in found])
+        error = 0.5 * np.sqrt(sum(spread[mask] ** 2 for _, spread in found))
+        return cls(halves, error, mask, scene_parameters(scene), 2 * paths, seconds)
 
     @property
     def noise(self) -> float:
