@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.files.paths import require_file
 from translucent.files.reading import open_file, require_memory, require_room, shown, size_text
@@ -55,6 +56,7 @@ _SCENES_OF_PROGRAMS = (
 )
 
 
+@checked
 def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False) -> Mesh:
     """Read a triangle mesh from a file, weld it and wind it consistently.
 

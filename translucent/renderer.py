@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from translucent.arguments import checked
 from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.formulas.tone import tone_curve
 from translucent.frames.frame import Frame, check_exposure
@@ -48,6 +49,7 @@ BACKENDS = (*get_args(Backend), "cpu")
 MAX_SAMPLES = 4096
 
 
+@checked
 class Renderer:
     """Renderer of scenes with OpenGL, or on the CPU. Use it as a context manager: leaving it frees everything.
 
@@ -365,7 +367,7 @@ def _engine(backend: str | None, context: moderngl.Context | None) -> GpuRendere
             engine = _cpu_renderer()
         except RenderError as other:
             raise error from other
-        warnings.warn(f"rendering on the CPU, for want of OpenGL: {error}", TranslucentWarning, stacklevel=3)
+        warnings.warn(f"rendering on the CPU, for want of OpenGL: {error}", TranslucentWarning, stacklevel=4)
         return engine
 
 

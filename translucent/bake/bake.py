@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.bake.atlas import Atlas, Unwrapped, in_tile, pad, unwrap
 from translucent.bake.measure import Measure, Measured
@@ -30,6 +31,7 @@ from translucent.geometry.normals import corner_angles
 MOST_HIDDEN, ENOUGH_TEXELS = 0.1, 4
 
 
+@checked
 def bake_thickness(
     mesh: Mesh,
     settings: BakeSettings | int | None = None,
@@ -103,7 +105,7 @@ def bake_thickness(
     if kept is not None:
         kept.remove()
     for text in report.warnings:
-        warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=2)
+        warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=3)
     return ThicknessMap(canvas.values, canvas.coverage, canvas.errors, report.escaped, unwrapped.mesh, settings, report)
 
 
@@ -202,6 +204,7 @@ _OF_MAPS: dict[str, Any] = {"size": 1, "supersample": 1, "padding": 0, "tile": N
 PART = 1 << 13
 
 
+@checked
 def bake_vertex_thickness(
     mesh: Mesh,
     settings: BakeSettings | str | None = None,
@@ -256,7 +259,7 @@ def bake_vertex_thickness(
     used[mesh.faces[surface.faces]] = True
     report = _vertex_report(mesh, surface, parts, errors[used], time.perf_counter() - started)
     for text in report.warnings:
-        warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=2)
+        warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=3)
     return VertexThickness(values, errors, mesh, settings, report)
 
 

@@ -22,6 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
+from translucent.arguments import checked
 from translucent.bake.jobs import Job, bake_file, check_job, content_hash, is_done
 from translucent.bake.record import Record, files_of, parts_of, read_record
 from translucent.cpu.threads import processors
@@ -239,6 +240,7 @@ def asset_line(asset: Record, width: int = 0) -> str:
     return told + "".join(f"; {line}" for line in [*asset.get("doubts", []), *turned, *asset.get("warnings", [])])
 
 
+@checked
 def bake_many(
     jobs: Iterable[Job],
     executor: Executor | None = None,

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.bake.check import labeled, look
 from translucent.errors import InputError
@@ -66,6 +67,7 @@ class Lithophane:
     contrast: float
     rms: float
 
+    @checked
     def save(self, path: str | Path) -> None:
         """Write the mesh as binary .stl in millimetres, as slicers read it.
 
@@ -88,6 +90,7 @@ class Lithophane:
 
         write_atomically(path, fill)
 
+    @checked
     def save_check(self, path: str | Path) -> None:
         """Write a .png of what is asked for, and beside it of what the relief shows; as bright as its colors allow."""
         asked = np.repeat(self.target[..., None], 3, axis=-1)
@@ -104,6 +107,7 @@ def check_lithophane_output(path: Path) -> Path:
     return path
 
 
+@checked
 def lithophane(
     picture: str | Path | npt.ArrayLike,
     medium: Medium,

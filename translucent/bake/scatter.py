@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array, Floats, Mask
 from translucent.bake.atlas import Atlas, pad, unwrap
 from translucent.bake.gltf_builder import GlbBuilder, mesh_file
@@ -245,6 +246,7 @@ class ScatterMap(BakedScatter):
     def _counted(self) -> Floats:
         return self.values[self.coverage]
 
+    @checked
     def save(self, path: str | Path, about: Record | None = None) -> Record:
         """Write the map as .exr, its record beside it, and if its uv are new, ``FILE.uv.glb``; returns the record.
 
@@ -275,6 +277,7 @@ class VertexScatter(BakedScatter):
     warnings : tuple of str
     """
 
+    @checked
     def save(self, path: str | Path, about: Record | None = None) -> Record:
         """Write the mesh with the values as attributes of its vertices, .glb, its record beside it; returns the record.
 
@@ -292,6 +295,7 @@ class VertexScatter(BakedScatter):
         write_scatter_glb(path, builder, {key: values}, {key: self.meaning()})
         return write_record(path, {**(about or {}), "kind": "vertex scatter", **self.summary()})
 
+    @checked
     def at(self, positions: Array) -> Floats:
         """Values (k, 9, 3) of the vertices that are nearest to positions (k, 3) in metres."""
         from scipy.spatial import cKDTree
@@ -319,6 +323,7 @@ def save_scatter_map(result: ScatterMap, path: str | Path, about: Record | None,
 BLOCK = 1 << 16
 
 
+@checked
 def bake_scatter(
     mesh: Mesh,
     medium: Medium,
@@ -398,6 +403,7 @@ def bake_scatter(
     )
 
 
+@checked
 def bake_vertex_scatter(
     mesh: Mesh, medium: Medium, *, resolution: int = 32, roughness: float = 0.0, body: Mesh | None = None
 ) -> VertexScatter:
@@ -447,4 +453,4 @@ def _transfer(mesh: Mesh, medium: Medium, resolution: int, roughness: float) -> 
 
 def _warn(mesh: Mesh, said: list[str]) -> None:
     for text in said:
-        warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=3)
+        warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=4)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.media.medium import Medium
 
@@ -34,6 +35,7 @@ MAX_RAYS = 65536
 LOCAL_REACH = 0.1
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class BakeSettings:
     """Settings of a bake.

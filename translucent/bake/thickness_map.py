@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 
+from translucent.arguments import checked
 from translucent.arrays import Array, Floats, Mask
 from translucent.bake.gltf_builder import GlbBuilder, mesh_file
 from translucent.bake.gltf_targets import PrimitiveKey, Target
@@ -157,6 +158,7 @@ class ThicknessMap:
     settings: BakeSettings
     report: BakeReport
 
+    @checked
     def save(self, path: str | Path) -> None:
         """Write the map as .exr, .png, .npy or, into a copy of the model, .glb.
 
@@ -202,6 +204,7 @@ class VertexThickness:
     settings: BakeSettings
     report: BakeReport
 
+    @checked
     def save(self, path: str | Path) -> None:
         """Write the values as .ply or .glb attribute, or as .npy.
 
@@ -497,6 +500,7 @@ def write_vertices(
     return write_record(path, {**(about or {}), **shared(told), "primitives": told})
 
 
+@checked
 def load_thickness_map(path: str | Path) -> Array:
     """Values of a map that `bake_thickness` or ``translucent bake`` wrote as .exr, .png, .npz or .npy.
 

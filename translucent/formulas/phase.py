@@ -20,6 +20,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 
@@ -134,6 +135,7 @@ class PhaseFunction(ABC):
     def moments(self, count: int) -> Array:
         """(count,): mean Legendre polynomials of the cosine, from order 0, which is 1, upwards."""
 
+    @checked
     def value(self, cos_scatter: npt.ArrayLike) -> Array:
         """Phase function in 1/sr at the cosine of the angle that light turns by: 1 is straight on."""
         return phase_value(self.parameters, cos_scatter)
@@ -142,6 +144,7 @@ class PhaseFunction(ABC):
         return " ".join([self.name, *map(repr, astuple(self))])  # type: ignore[call-overload]
 
 
+@checked
 @dataclass(frozen=True)
 class HenyeyGreenstein(PhaseFunction):
     """Phase function of Henyey and Greenstein.
@@ -165,12 +168,14 @@ class HenyeyGreenstein(PhaseFunction):
         """(g, 0, 0, 0)."""
         return self.anisotropy, 0.0, 0.0, 0.0
 
+    @checked
     def moments(self, count: int) -> Array:
         """Powers of g."""
         with np.errstate(under="ignore"):
             return np.asarray(self.anisotropy ** np.arange(count), dtype=np.float64)
 
 
+@checked
 @dataclass(frozen=True)
 class Draine(PhaseFunction):
     """Phase function of Draine 2003, for dust and small grains: it sends more light back.
@@ -199,6 +204,7 @@ class Draine(PhaseFunction):
         """(0, g, alpha, 1)."""
         return 0.0, self.g, self.alpha, 1.0
 
+    @checked
     def moments(self, count: int) -> Array:
         """Those of Henyey and Greenstein's g^n, with cos^2 P_n as a sum of P_(n-2), P_n and P_(n+2)."""
         # cos P_n = (1 - d_n) P_(n+1) + d_n P_(n-1)
@@ -211,6 +217,7 @@ class Draine(PhaseFunction):
         return np.asarray((powers[:-2] + self.alpha * squares) / (1.0 + self.alpha * squares[0]))
 
 
+@checked
 @dataclass(frozen=True)
 class WaterDroplets(PhaseFunction):
     """Phase function of the droplets of fog and clouds: the fit of Jendersie and d'Eon 2023 to Mie's theory.
@@ -241,6 +248,7 @@ class WaterDroplets(PhaseFunction):
         weight = np.exp(-0.599085 / (d - 0.641583) - 0.665888)
         return float(g), float(draine_g), float(alpha), float(weight)
 
+    @checked
     def moments(self, count: int) -> Array:
         """Those of both parts, by their shares."""
         g, draine_g, alpha, weight = self.parameters

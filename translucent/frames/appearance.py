@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas import optics
@@ -83,6 +84,7 @@ class Appearance:
             return html_swatches([(self.color, "average"), *parts])
 
 
+@checked
 def appearance_of(seen: Frame | npt.ArrayLike, medium: Medium) -> Appearance:
     """Appearance of a medium on a mesh, from any frame of the mesh or from thickness in metres per pixel.
 
@@ -124,6 +126,7 @@ def thickness_samples(seen: Frame | npt.ArrayLike) -> Array:
     return thickness
 
 
+@checked
 def average_color(seen: Frame | npt.ArrayLike, medium: Medium) -> Array:
     """(3,): linear color of a mesh before white light, averaged over the pixels that it covers.
 
@@ -164,6 +167,7 @@ def extinction_for_average_color(seen: Frame | npt.ArrayLike, color: str | npt.A
     )
 
 
+@checked
 def medium_for_average_color(seen: Frame | npt.ArrayLike, color: str | npt.ArrayLike, ior: float = 1.0) -> Medium:
     """Absorbing medium with which a mesh has `color` on average, for a frame or thickness in metres per pixel.
 

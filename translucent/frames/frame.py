@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.formulas.color import exposure_scale, linear_to_srgb
 from translucent.formulas.tone import tone_curve
@@ -228,6 +229,7 @@ class Frame:
             found["layers"] = {"max": int(self.layers.max()), "truncated_pixels": int((self.truncated > 0).sum())}
         return found
 
+    @checked
     def to_srgb8(self, exposure: float = 0.0, tone: str = "none") -> npt.NDArray[np.uint8]:
         """(h, w, 3) uint8: radiance, `exposure` stops brighter, through a tone curve and sRGB-encoded.
 
@@ -261,6 +263,7 @@ class Frame:
         color = np.divide(mixed, alpha, out=np.zeros_like(mixed), where=alpha > 0)
         return np.rint(np.concatenate([np.clip(color, 0.0, 1.0), alpha], axis=-1) * 255.0).astype(np.uint8)
 
+    @checked
     def save(self, path: str | Path, exposure: float = 0.0, tone: str = "none") -> None:
         """Write the frame: ``.png`` (sRGB picture), ``.exr`` (float picture and quantities) or ``.npz`` (all arrays).
 
@@ -283,6 +286,7 @@ class Frame:
         """
         write_frame(Path(path), self.arrays, partial(self.to_srgb8, exposure, tone))
 
+    @checked
     def save_aovs(self, folder: str | Path, truth: Frame | None = None) -> list[Path]:
         """Write the quantities as pictures to look at, into a folder that is made if need be.
 
@@ -307,6 +311,7 @@ class Frame:
         pictures = aov_pictures(self.arrays, None if truth is None else truth.arrays)
         return write_pictures(Path(folder), pictures.items())
 
+    @checked
     def to_html(self, exposure: float = 0.0, tone: str = "neutral", *, name: str | None = None) -> str:
         """Text of a page that shows the frame's scene in any browser with WebGL2, as `write_page` writes it.
 

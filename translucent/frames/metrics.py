@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
 
@@ -57,6 +58,7 @@ class Errors:
 
 
 @np.errstate(under="ignore")  # of squares of what a dense medium leaves
+@checked
 def compare(
     frame: Frame, truth: Frame, quantity: Quantity = "thickness", mask: npt.NDArray[np.bool_] | None = None
 ) -> Errors:
@@ -110,6 +112,7 @@ def compare(
     )
 
 
+@checked
 def interior(hit_counts: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     """(h, w) bool: pixels whose 3 x 3 neighborhood has equal hit counts, away from every silhouette.
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.files.reading import read_text, shown, toml_value
@@ -81,6 +82,7 @@ _OUTLIER = 5.0
 MOST_PIXELS = 1 << 20
 
 
+@checked
 @dataclass(frozen=True)
 class Photograph:
     """Photograph of patches of known thickness, lit from behind, and of the light beside them.
@@ -109,6 +111,7 @@ class _Mean(NamedTuple):
     saturated: Array
 
 
+@checked
 def fit_photographs(photographs: Sequence[Photograph], ior: float | None = None) -> StepFit:
     """Fit a medium to photographs of patches of known thickness, each against its own white.
 

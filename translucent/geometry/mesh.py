@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.diagnosis import Diagnosis, diagnose
@@ -33,6 +34,7 @@ PER_TRIANGLE = 150
 _ONE_CLOSED_PART = "_one_closed_part"
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Mesh(Frozen):
     """Triangle mesh with shared vertices. Compared by identity; its arrays are read-only.
@@ -176,10 +178,12 @@ class Mesh(Frozen):
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         return np.where(length > 0, normals / np.where(length > 0, length, 1.0), (0.0, 0.0, 1.0))
 
+    @checked
     def winding_number(self, point: npt.ArrayLike) -> float:
         """Winding number of the surface around `point`: 0 outside, 1 inside, a fraction on it or near a hole."""
         return winding_number(self.vertices[self.faces], point)
 
+    @checked
     def is_near(self, point: npt.ArrayLike, distance: float) -> bool:
         """True if the surface comes within `distance` metres of `point`."""
         from trimesh.triangles import closest_point
@@ -279,7 +283,7 @@ def mended(raw: Mesh) -> Mesh:
         warnings.warn(
             f"mesh {raw.name!r}: {'; '.join(repairs[-(bool(flipped) + bool(turned)) :])}",
             TranslucentWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     if merged:
         renumbered = np.cumsum(used, dtype=np.int32) - np.int32(1)

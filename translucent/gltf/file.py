@@ -301,11 +301,11 @@ def embed_images(file: GltfFile, tree: Json, binary: bytearray) -> None:
         try:
             data = file.resource(image)
         except InputError as error:
-            warnings.warn(f"{error}; the image stays a link", TranslucentWarning, stacklevel=4)
+            warnings.warn(f"{error}; the image stays a link", TranslucentWarning, stacklevel=5)
             continue
         if (kind := _picture_kind(data)) is None:
             told = f"glTF {str(file.path)!r}: {image['uri']!r} is no picture that glTF knows; it stays a link"
-            warnings.warn(told, TranslucentWarning, stacklevel=4)
+            warnings.warn(told, TranslucentWarning, stacklevel=5)
             continue
         start, views = _append(binary, data), tree.setdefault("bufferViews", [])
         del tree["images"][index]["uri"]
@@ -413,7 +413,7 @@ def _with_images(file: GltfFile, tree: Json, chunks: bytes) -> tuple[Json, bytes
     binary = bytearray(chunks[CHUNK.size : end])
     if not binary and tree.get("buffers"):
         told = f"glTF {str(file.path)!r}: its first buffer is a link, so its images stay links, too"
-        warnings.warn(told, TranslucentWarning, stacklevel=4)
+        warnings.warn(told, TranslucentWarning, stacklevel=5)
         return tree, chunks
     embed_images(file, tree, binary)
     return tree, _binary_chunk(bytes(binary)) + chunks[end:]

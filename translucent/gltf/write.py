@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from translucent.arguments import checked
 from translucent.errors import InputError, TranslucentWarning
 from translucent.gltf.file import GltfFile, Json, check_gltf_output, read_gltf, write_gltf
 from translucent.gltf.materials import (
@@ -58,6 +59,7 @@ def volume_extensions(medium: Medium, distance: float | None, thickness: float, 
     return {TRANSMISSION: {"transmissionFactor": 1}, VOLUME: volume, IOR: {"ior": ior}}
 
 
+@checked
 def write_medium(
     path_in: str | Path,
     path_out: str | Path,
@@ -155,7 +157,7 @@ def write_media(
         lost = "glTF holds absorption only: scattering is written as extinction, emission is lost"
         if draft_extensions is not None:
             lost = "glTF holds no emission of volumes: it is lost"
-        warnings.warn(lost, TranslucentWarning, stacklevel=3)
+        warnings.warn(lost, TranslucentWarning, stacklevel=4)
     write_gltf(edited, path_out)
     return sorted(held)
 

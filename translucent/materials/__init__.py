@@ -17,6 +17,7 @@ from xml.etree.ElementTree import ParseError
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.files.reading import read_text
 from translucent.materials.blender import BLENDER
@@ -48,6 +49,7 @@ TARGETS: dict[str, ExportTarget] = {
 _SAME_COLOR = 1e-3
 
 
+@checked
 def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: float, roughness: float = 0.0) -> str:
     """Copy-ready block of text that describes the medium for another system.
 
@@ -92,6 +94,7 @@ def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: floa
     return wanted.write(medium, float(distance), float(roughness)).rstrip("\n")
 
 
+@checked
 def load_medium(path: str | Path, unit: str = "m") -> Medium:
     """Load the medium of a material file of another system.
 

@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.media.colors import parse_color
@@ -91,6 +92,7 @@ def chiang_color(albedo: npt.ArrayLike) -> Array:
     return c
 
 
+@checked
 def scattering_medium(
     color: str | npt.ArrayLike,
     mean_free_path: npt.ArrayLike,

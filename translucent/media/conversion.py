@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas import optics
@@ -33,6 +34,7 @@ CHANNELS = ("red", "green", "blue")
 _BLOCK = 8192  # numbers that stay in the first cache between the check, the logarithm and the division
 
 
+@checked
 def extinction_from_colors(colors: npt.ArrayLike, distances: npt.ArrayLike) -> Array:
     """Extinction of many colors, each left of white light after its distance: sigma_t = -log(t_c) / d.
 
@@ -73,6 +75,7 @@ def extinction_from_colors(colors: npt.ArrayLike, distances: npt.ArrayLike) -> A
     return result
 
 
+@checked
 def clamp_colors(colors: npt.ArrayLike) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Clamp channels of 0 to `CLAMP` (1e-4), which has a finite extinction; returns colors and mask of these channels.
 
@@ -91,6 +94,7 @@ def clamp_colors(colors: npt.ArrayLike) -> tuple[Array, npt.NDArray[np.bool_]]:
     return np.where(changed, CLAMP, t), changed
 
 
+@checked
 def color_at_distance(extinction: npt.ArrayLike, distances: npt.ArrayLike) -> Array:
     """(..., 3): linear color left of white light after `distances` (...,) metres, >= 0: exp(-sigma_t d).
 
@@ -121,6 +125,7 @@ def lengths(metres: npt.ArrayLike) -> Array:
     return found
 
 
+@checked
 def condition_number(colors: npt.ArrayLike) -> Array:
     """Relative error of sigma_t per relative error of t_c: 1 / -log(t_c).
 
@@ -171,6 +176,7 @@ class DistanceMatch:
         return html_swatches([(self.color, "asked for"), (found, f"after {length_text(self.distance)}")])
 
 
+@checked
 def distance_for_color(extinction: npt.ArrayLike, color: npt.ArrayLike) -> DistanceMatch:
     """Distance after which a medium leaves `color` of white light: the d that minimizes sum (sigma_t d + log t_c)^2.
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array, Frozen, Integers
 from translucent.errors import InputError
 from translucent.files.reading import open_file
@@ -29,6 +30,7 @@ CHUNK = 1 << 18
 _GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class DensityGrid(Frozen):
     """Density from a voxel grid: trilinear between the centers of the voxels, constant from there to the boundary.
@@ -69,6 +71,7 @@ class DensityGrid(Frozen):
         object.__setattr__(self, "values", values)
 
     @classmethod
+    @checked
     def load(cls, path: str | Path) -> DensityGrid:
         """Read the array of a NumPy file (``.npy``); raises `InputError` if there is none that can be used."""
         where = f"density grid {str(path)!r}"
@@ -83,6 +86,7 @@ class DensityGrid(Frozen):
         """Largest density."""
         return float(np.max(self.values))
 
+    @checked
     def at(self, points: npt.ArrayLike) -> Array:
         """(...,): density at points (..., 3)."""
         values = np.asarray(self.values)
@@ -95,6 +99,7 @@ class DensityGrid(Frozen):
         lower, upper = (np.stack([values[x[i], y[j], z[k]] for j in (0, 1) for k in (0, 1)], axis=-1) for i in (0, 1))
         return trilinear(lower, upper, share)
 
+    @checked
     def mean_between(self, start: Array, end: Array) -> Array:
         """(k,): mean density on straight lines from `start` (k, 3) to `end` (k, 3), exact up to rounding.
 
@@ -140,6 +145,7 @@ def _cuts(begin: Array, stop: Array, count: int) -> tuple[Integers, Array]:
     return line, np.clip((plane - begin[line]) / (stop - begin)[line], 0.0, 1.0)
 
 
+@checked
 @dataclass(frozen=True)
 class LinearDensity:
     """Density that changes linearly along an axis.
@@ -169,15 +175,18 @@ class LinearDensity:
         """Largest density."""
         return max(self.start, self.end)
 
+    @checked
     def at(self, points: npt.ArrayLike) -> Array:
         """(...,): density at points (..., 3)."""
         return linear_density(_along(points, self.axis), self.start, self.end)
 
+    @checked
     def mean_between(self, start: Array, end: Array) -> Array:
         """(k,): mean density on straight lines from `start` (k, 3) to `end` (k, 3), exact up to rounding."""
         return 0.5 * (self.at(start) + self.at(end))
 
 
+@checked
 @dataclass(frozen=True)
 class ExponentialDensity:
     """Density that changes exponentially along an axis, as that of an atmosphere.
@@ -207,10 +216,12 @@ class ExponentialDensity:
         """Largest density."""
         return max(self.start, self.end)
 
+    @checked
     def at(self, points: npt.ArrayLike) -> Array:
         """(...,): density at points (..., 3)."""
         return exponential_density(_along(points, self.axis), self.maximum, self.log_ratio)
 
+    @checked
     def mean_between(self, start: Array, end: Array) -> Array:
         """(k,): mean density on straight lines from `start` (k, 3) to `end` (k, 3), exact up to rounding."""
         ends = _along(start, self.axis), _along(end, self.axis)

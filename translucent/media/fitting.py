@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.media.colors import parse_color
@@ -339,9 +340,10 @@ class Fit:
         return self.medium._repr_html_()
 
 
+@checked
 def fit_medium(
     distances: npt.ArrayLike,
-    colors: npt.ArrayLike,
+    colors: npt.ArrayLike | Sequence[str],
     weights: npt.ArrayLike | None = None,
     ior: float = 1.0,
 ) -> Fit:
@@ -372,6 +374,7 @@ def fit_medium(
     return Fit(Medium(absorption=np.maximum(best, 0.0), ior=ior), error, residuals, d, t, w, clipped)
 
 
+@checked
 def fit_wedge(path: str | Path, unit: str = "m") -> Fit:
     """Fit an absorbing medium to a table of a photographed wedge: CSV, or a JSON list of objects.
 

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.formulas import optics
@@ -29,6 +30,7 @@ MAX_EMISSION = 1e18
 MAX_IOR = 100.0
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Medium(Frozen):
     """A homogeneous participating medium. Triples are linear Rec.709 channels; a single number stands for all three.
@@ -80,6 +82,7 @@ class Medium(Frozen):
             raise InputError(f"medium ior {self.ior}", f"not in 1 to {MAX_IOR:g}", "give for example 1.5 for glass")
 
     @classmethod
+    @checked
     def from_color(cls, color: str | npt.ArrayLike, distance: float, ior: float = 1.0) -> Medium:
         """Absorbing medium that turns white light into `color` after `distance`: sigma_a = -log(t_c) / d.
 
@@ -121,6 +124,7 @@ class Medium(Frozen):
         return cls(absorption=extinction, ior=ior)
 
     @classmethod
+    @checked
     def from_particles(
         cls,
         number_density: float,
@@ -175,6 +179,7 @@ class Medium(Frozen):
         total.setflags(write=False)
         return total
 
+    @checked
     def transmittance(self, distance: npt.ArrayLike) -> Array:
         """(..., 3): share of light per channel that passes `distance` (...,) metres of the medium, 0 and above.
 

@@ -15,6 +15,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.files.reading import json_value, read_text, toml_value
@@ -56,6 +57,7 @@ NEGLIGIBLE_SCATTERING = 0.05
 DOMINANT_ALBEDO = 0.5
 
 
+@checked
 @dataclass(frozen=True)
 class Preset:
     """A named medium.

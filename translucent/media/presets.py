@@ -9,6 +9,7 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
+from translucent.arguments import checked
 from translucent.errors import LEAST_PART, InputError, close_names, did_you_mean
 from translucent.files.folders import config_folder, make_folder
 from translucent.files.paths import write_text_atomically
@@ -113,6 +114,7 @@ def matching(found: Mapping[str, Preset], words: str) -> dict[str, Preset]:
     return {name: one for name, one in found.items() if all(any(w.startswith(x) for w in _words(one)) for x in wanted)}
 
 
+@checked
 def preset(name: str) -> Preset:
     """Preset of this name or alias, in any case and with any separators, or the user's own one of that name.
 

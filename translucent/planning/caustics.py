@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.methods.base import check_count
 
@@ -15,6 +16,7 @@ MAX_PHOTONS = 1 << 30
 LEAST_IN_MEDIA, MOST_IN_MEDIA = 1 << 16, 1 << 18
 
 
+@checked
 @dataclass(frozen=True)
 class Caustics:
     """Light of lamps and directional lights that interfaces bend and mirror onto opaque objects and media, by photons.

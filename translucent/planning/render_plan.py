@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from translucent.arguments import checked
 from translucent.planning.caustics import Caustics
 from translucent.planning.interfaces import Interfaces, TracedInterfaces
 from translucent.planning.interfaces.traced import RECORD_SIZE
@@ -14,6 +15,7 @@ from translucent.planning.scattering.choice import NOTHING_GIVEN_BACK, GivenBack
 from translucent.planning.shadow_maps import ShadowMaps
 
 
+@checked
 @dataclass(frozen=True)
 class Capabilities:
     """Capabilities of the machine that a plan is made for.

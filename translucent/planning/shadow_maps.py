@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import count_of, indices, media_differ
 from translucent.planning.methods import SignedDepth
@@ -18,6 +19,7 @@ UNITS_WITH_SHADOWS = 20
 LEAST_SIZE, MOST_SIZE = 64, 8192
 
 
+@checked
 @dataclass(frozen=True)
 class ShadowMaps:
     """Colored shadows on opaque objects: the transmittance of the straight way from each light.

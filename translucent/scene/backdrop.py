@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Frozen
 from translucent.errors import InputError
 from translucent.media.colors import ColorLike
@@ -15,6 +16,7 @@ from translucent.scene.environment import parse_radiance
 from translucent.scene.lights import MAX_RADIANCE
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Backdrop(Frozen):
     """Picture of everything opaque in a frame: rays through the media end at its depth, and its radiance is seen there.

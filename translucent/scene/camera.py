@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.geometry.grouping import extent
@@ -38,6 +39,7 @@ class Window:
     whole: tuple[int, int]
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Camera(Frozen):
     """Camera with a perspective or orthographic view.
@@ -80,6 +82,7 @@ class Camera(Frozen):
         object.__setattr__(self, "pose", pose)
 
     @classmethod
+    @checked
     def look_at(
         cls, eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0), fov_y: float = 45.0
     ) -> Camera:
@@ -93,6 +96,7 @@ class Camera(Frozen):
         return cls(_look_at(eye, target, up), fov_y=fov_y)
 
     @classmethod
+    @checked
     def orthographic(
         cls, eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0), height: float = 1.0
     ) -> Camera:
@@ -100,6 +104,7 @@ class Camera(Frozen):
         return cls(_look_at(eye, target, up), fov_y=None, height=height)
 
     @classmethod
+    @checked
     def framing(
         cls,
         points: npt.ArrayLike,
@@ -162,6 +167,7 @@ class Camera(Frozen):
         """(3,): unit vector of the view."""
         return -self.pose[:3, 2]
 
+    @checked
     def half_extent(self, size: tuple[int, int]) -> tuple[float, float]:
         """Half width and half height of the view: at distance 1 for a perspective camera, in metres for the other."""
         half_height = np.tan(np.radians(self.fov_y) / 2) if self.fov_y is not None else (self.height or 0.0) / 2
@@ -185,6 +191,7 @@ class Camera(Frozen):
             return 0, 0, 0, 0
         return window.left, window.top, window.whole[0] - size[0], window.whole[1] - size[1]
 
+    @checked
     def rays(
         self, size: tuple[int, int], offset: tuple[float, float] | tuple[Array, Array] = (0.0, 0.0)
     ) -> tuple[Array, Array]:

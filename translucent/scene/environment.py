@@ -16,6 +16,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.formulas.spherical_harmonics import COUNT, real_harmonics
@@ -32,6 +33,7 @@ MAX_EXPOSURE = 32.0
 _WHAT = "environment radiance"
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Environment(Frozen):
     """Environment: radiance from infinitely far away in all directions. Made by `constant`, `gradient`, `checkerboard`,
@@ -92,16 +94,19 @@ class Environment(Frozen):
         return f"Environment({self.kind}{size}{behind})"
 
     @classmethod
+    @checked
     def constant(cls, radiance: ColorLike) -> Environment:
         """Environment with the same radiance from all directions."""
         return cls("constant", parse_radiance(_WHAT, radiance), parse_radiance(_WHAT, radiance))
 
     @classmethod
+    @checked
     def gradient(cls, bottom: ColorLike, top: ColorLike) -> Environment:
         """Vertical gradient from `bottom` (rays along -Y) to `top` (rays along +Y), linear in the sine of elevation."""
         return cls("gradient", parse_radiance(_WHAT, bottom), parse_radiance(_WHAT, top))
 
     @classmethod
+    @checked
     def checkerboard(
         cls, first: ColorLike = (0.9, 0.9, 0.9), second: ColorLike = (0.6, 0.6, 0.6), tiles: float = 8.0
     ) -> Environment:
@@ -109,6 +114,7 @@ class Environment(Frozen):
         return cls("checkerboard", parse_radiance(_WHAT, first), parse_radiance(_WHAT, second), tiles)
 
     @classmethod
+    @checked
     def image(
         cls, source: str | Path | npt.ArrayLike | EnvironmentMap, rotation: float = 0.0, exposure: float = 0.0
     ) -> Environment:
@@ -139,6 +145,7 @@ class Environment(Frozen):
         return cls("image", np.zeros(3), np.zeros(3), map=source, rotation=rotation, exposure=exposure)
 
     @classmethod
+    @checked
     def studio(cls, rotation: float = 0.0, exposure: float = 0.0) -> Environment:
         """Procedural photographer's studio: soft boxes, dark cards and a warm floor, which flatter glass."""
         from translucent.scene.studio import studio_map
@@ -182,6 +189,7 @@ class Environment(Frozen):
             return _gradient_map(tuple(self.first.tolist()), tuple(self.second.tolist()))
         return _uniform_map(tuple(self.mean.tolist()))
 
+    @checked
     def radiance(self, directions: npt.ArrayLike, backdrop: npt.ArrayLike) -> Array:
         """Radiance seen along rays, (..., 3): that of the background, if there is one.
 
@@ -197,6 +205,7 @@ class Environment(Frozen):
             return seen.lighting(directions)
         return seen.first + (seen.second - seen.first) * checkerboard_share(backdrop, seen.tiles)[..., None]
 
+    @checked
     def lighting(self, directions: npt.ArrayLike) -> Array:
         """Radiance (..., 3) that arrives as light from unit vectors (..., 3), whatever the background.
 
@@ -210,6 +219,7 @@ class Environment(Frozen):
             share = np.full(np.asarray(directions).shape[:-1], 0.5)
         return self.first + (self.second - self.first) * share[..., None]
 
+    @checked
     def irradiance_on(self, normals: npt.ArrayLike) -> Array:
         """Irradiance on surfaces with unit `normals` (..., 3) that nothing shadows, (..., 3).
 

@@ -53,7 +53,7 @@ class EnvironmentMap(Frozen):
             doubts.append(f"{size}: a picture of all directions is twice as wide as high, so this one is stretched")
         for doubt in doubts:
             # The caller of tl.Environment.image, past this function, the constructor and `image`.
-            warnings.warn(f"environment image: {doubt}", TranslucentWarning, stacklevel=4)
+            warnings.warn(f"environment image: {doubt}", TranslucentWarning, stacklevel=5)
         usable.setflags(write=False)
         object.__setattr__(self, "pixels", usable)
 

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.formulas.light import ALL_AROUND, cone_attenuation, light_cone
@@ -71,6 +72,7 @@ class PositionalLight(Frozen):
         return np.asarray(np.minimum(irradiance, MAX_RADIANCE))
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class PointLight(PositionalLight):
     """Light that shines alike in all directions and falls off with the inverse square (KHR_lights_punctual).
@@ -87,6 +89,7 @@ class PointLight(PositionalLight):
     intensity: npt.ArrayLike
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class SpotLight(PositionalLight):
     """Light that shines in a cone and falls off with the inverse square (KHR_lights_punctual).
@@ -143,6 +146,7 @@ class SpotLight(PositionalLight):
         return 0.5 * (within + (without - within) / 3.0)
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class DirectionalLight(Frozen):
     """Light from infinitely far away (KHR_lights_punctual).
@@ -162,6 +166,7 @@ class DirectionalLight(Frozen):
         object.__setattr__(self, "direction", _unit(self.direction))
         object.__setattr__(self, "irradiance", positive_triple("light irradiance", self.irradiance))
 
+    @checked
     def irradiance_on(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> Array:
         """Irradiance on surfaces with unit `normals` (..., 3) that nothing shadows, (..., 3) in W/m^2, at any point."""
         with np.errstate(under="ignore"):

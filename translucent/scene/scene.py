@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array, Frozen, Mask
 from translucent.errors import InputError
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh
@@ -35,6 +36,7 @@ MOST_NAMES = 8
 MOST_ENVIRONMENT_SHADOWS = 256
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Object(Frozen):
     """Object of a scene: a mesh filled with a medium, or opaque.
@@ -212,6 +214,7 @@ class Object(Frozen):
         """Radius of a ball around the center of the bounds that holds the object."""
         return float(np.linalg.norm(self.matrix[:3, :3], ord=2)) * self.mesh.radius
 
+    @checked
     def open_from(self, camera: Camera) -> float:
         """Metres ahead of the eye, along the camera's axis, from which on the surface may be open; inf for a solid.
 
@@ -225,6 +228,7 @@ class Object(Frozen):
         corners = np.array([[found[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
         return float(((corners @ self.matrix[:3, :3].T + (self.matrix[:3, 3] - camera.eye)) @ camera.forward).min())
 
+    @checked
     def winding_number(self, point: npt.ArrayLike) -> float:
         """Winding number around a world-space point: 0 or 1 for a simple solid; quick outside the bounds."""
         local = np.linalg.solve(self.matrix[:3, :3], np.asarray(point, dtype=np.float64) - self.matrix[:3, 3])
@@ -234,6 +238,7 @@ class Object(Frozen):
         return -number if self.mesh.diagnosis.inverted else number
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Scene(Frozen):
     """Scene: the objects, camera, lights and environment of a picture.
@@ -345,6 +350,7 @@ class Scene(Frozen):
         """(2, 3): smallest and largest world coordinates of all objects."""
         return np.stack([self.boxes[:, 0].min(axis=0), self.boxes[:, 1].max(axis=0)])
 
+    @checked
     def source(self, body: Object) -> Array:
         """(3,): radiance per metre that a body's medium adds to all rays: q + sigma_s A, with the ambient radiance A.
 

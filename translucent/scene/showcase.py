@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.errors import InputError, close_names, did_you_mean
 from translucent.geometry.grouping import extent
 from translucent.geometry.mesh import Mesh
@@ -52,6 +53,7 @@ MOST_NAMES = 20
 AnyScene = TypeVar("AnyScene", bound=Scene)
 
 
+@checked
 def showcase(
     mesh: Mesh,
     medium: Medium | None = None,

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError, close_names, did_you_mean
 from translucent.geometry.grouping import used_vertices
@@ -158,6 +159,7 @@ GROUND_NAME = "ground"
 AnyScene = TypeVar("AnyScene", bound=Scene)
 
 
+@checked
 def staged(
     scene: AnyScene,
     stage: str | Stage = DEFAULT_STAGE,

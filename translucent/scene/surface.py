@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from translucent.arguments import checked
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.media.colors import ColorLike, parse_color
@@ -49,6 +50,7 @@ TEXTURE_FIELDS = (
 )
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Surface(Frozen):
     """Interface between a medium and the air around it, or the surface of an opaque object.

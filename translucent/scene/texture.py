@@ -8,12 +8,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked
 from translucent.arrays import Frozen
 from translucent.errors import InputError
 
 Wrap = Literal["repeat", "clamp"]
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Texture(Frozen):
     """Texture: values over texture coordinates 0 to 1, with bilinear interpolation.
@@ -73,6 +75,7 @@ class Texture(Frozen):
         turned = np.array([[c, -s], [s, c]]) * np.asarray(self.scale)
         return np.column_stack([turned, np.asarray(self.offset)])
 
+    @checked
     def sample(self, uv: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """(..., 3) or (..., 4): bilinear values at texture coordinates (..., 2), v upwards."""
         height, width = self.pixels.shape[:2]

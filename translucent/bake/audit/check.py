@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from translucent.arguments import checked
 from translucent.bake.audit.body import Body, Placement, measure_body
 from translucent.bake.audit.rules import (
     SEVERITIES,
@@ -44,6 +45,7 @@ from translucent.gltf.nodes import node_transforms
 _COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
+@checked
 def check_materials(path: str | Path, *, allow_outside: bool = False) -> MaterialCheck:
     """Check whether a glTF file's translucent materials say what its meshes are.
 
@@ -176,6 +178,7 @@ BAKED = frozenset(
 WRITTEN = frozenset({"metal", "double-sided"})
 
 
+@checked
 def fix_materials(
     path: str | Path,
     output: str | Path,

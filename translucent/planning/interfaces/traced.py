@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from translucent.arguments import checked
 from translucent.planning.interfaces.base import DRAW_COST, ONE_DRAWN, Interfaces
 from translucent.planning.interfaces.places import picture_cuts, with_interfaces
 from translucent.planning.interfaces.words import effects_of, owners
@@ -29,6 +30,7 @@ MAX_FORKS = 4
 TRACE_COST = 50.0
 
 
+@checked
 @dataclass(frozen=True)
 class TracedInterfaces(Interfaces):
     """All interfaces that a ray meets, found by rays through the meshes: a tree of reflected and refracted ones.

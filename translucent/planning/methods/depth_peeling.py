@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import solids_of
 from translucent.planning.methods.base import Method, check_count
@@ -18,6 +19,7 @@ MAX_LAYERS = 4096
 _GUESSED_LAYERS = 8
 
 
+@checked
 @dataclass(frozen=True)
 class DepthPeeling(Method):
     """Ordered intervals from a pass over the geometry for every layer or two (Everitt 2001), with OpenGL 3.3.

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from translucent.arguments import checked
 from translucent.planning.bodies import solids_of
 from translucent.planning.methods.base import MAX_LIGHT_POINTS, Method, check_count
 from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.scene import Scene
 
 
+@checked
 @dataclass(frozen=True)
 class FragmentLists(Method):
     """Ordered intervals from one pass: every pixel keeps the list of its surfaces (Yang et al. 2010). OpenGL 4.3.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from translucent.arguments import checked
 from translucent.planning.bodies import solids_of
 from translucent.planning.methods.base import MAX_LIGHT_POINTS, Method, check_count
 from translucent.planning.passes import PassName, PassSpec
@@ -14,6 +15,7 @@ from translucent.scene.scene import Scene
 MAX_K = 256
 
 
+@checked
 @dataclass(frozen=True)
 class KBuffer(Method):
     """Ordered intervals from one pass that keeps the k nearest surfaces (Bavoil et al. 2007). OpenGL 4.3.

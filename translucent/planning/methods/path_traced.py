@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import indices, open_bodies
 from translucent.planning.methods.base import Method, check_count
@@ -16,6 +17,7 @@ from translucent.scene.scene import Object, Scene, object_names
 MAX_PATHS = 1 << 20
 
 
+@checked
 @dataclass(frozen=True)
 class PathTraced(Method):
     """Random paths of light: all scattering, all interfaces; the error falls with the square root of their number.

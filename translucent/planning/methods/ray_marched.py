@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import solids_of
 from translucent.planning.methods.base import MAX_LIGHT_POINTS, Method, check_count
@@ -25,6 +26,7 @@ LEAST_SEEN = 1e-5
 Quadrature = Literal["left", "midpoint", "exponential", "jittered", "equiangular", "gauss"]
 
 
+@checked
 @dataclass(frozen=True)
 class RayMarched(Method):
     """Steps along each ray through every interval inside the bodies; the error depends on their number.

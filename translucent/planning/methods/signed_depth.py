@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from translucent.arguments import checked
 from translucent.planning.bodies import count_of, media_differ, solids_of
 from translucent.planning.methods.base import Method
 from translucent.planning.notes import Note, NoteKind
@@ -12,6 +13,7 @@ from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.scene import Scene
 
 
+@checked
 @dataclass(frozen=True)
 class SignedDepth(Method):
     """One unsorted pass: the sum of exit distances minus the sum of entry distances. Exact for closed meshes.

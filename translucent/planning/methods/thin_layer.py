@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.geometry.mesh import MAX_COORDINATE
 from translucent.planning.bodies import count_of, indices
@@ -14,6 +15,7 @@ from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.scene import Scene, object_names
 
 
+@checked
 @dataclass(frozen=True)
 class ThinLayer(Method):
     """Every face is a sheet of the given thickness: t / max(0.001, n.v) each (Drobot 2017), added up.

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.methods.base import check_count
 from translucent.planning.scattering.base import Scattering
@@ -26,6 +27,7 @@ MOST_IN_BOX = 2_000_000
 CELL_BYTES = 4000
 
 
+@checked
 @dataclass(frozen=True)
 class Diffusion(Scattering):
     """Light scattered many times, as it diffuses in the body and leaves through its surface.
@@ -64,6 +66,7 @@ class Diffusion(Scattering):
         """
         return self.resolution >= LEAST_CORRECTED
 
+    @checked
     def cell_size(self, body: Object) -> float:
         """Side of a cell in metres."""
         volume = abs(body.mesh.volume * float(np.linalg.det(body.matrix[:3, :3])))

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from translucent.arguments import checked
 from translucent.planning.methods.base import MAX_LIGHT_POINTS, check_count
 from translucent.planning.scattering.base import Scattering
 
 
+@checked
 @dataclass(frozen=True)
 class SingleScattering(Scattering):
     """Light of lights that is scattered once into each ray; what is scattered again is lost.

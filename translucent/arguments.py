@@ -1,0 +1,218 @@
+"""Types of the arguments of public functions and classes, checked against their annotations.
+
+What range a number has to be in is for each function to check. That it is a number, or an array an array of numbers, is
+checked here for all of them.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import reprlib
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import wraps
+from inspect import signature
+from pathlib import Path
+from types import UnionType
+from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError, TranslucentError
+
+T = TypeVar("T")
+
+
+class _Test(NamedTuple):
+    """Test of a type: what is wrong with a value (nothing if it is right), and what to give."""
+
+    wrong: Callable[[Any], str]
+    give: str
+
+
+def checked(thing: T) -> T:
+    """Make a function, or the constructor of a class, refuse arguments of a wrong type by an `InputError`.
+
+    A parameter whose annotation names what only type checkers import is let through.
+    """
+    if isinstance(thing, type):
+        thing.__init__ = _checked(thing.__init__, thing.__name__, thing.__module__)  # type: ignore[misc]
+        return thing
+    return _checked(thing, thing.__name__, thing.__module__)  # type: ignore[attr-defined, no-any-return]
+
+
+def _checked(function: Any, title: str, module: str) -> Any:
+    annotations = {one.name: one.annotation for one in signature(function).parameters.values()}
+    names, tests = tuple(annotations), dict[str, _Test | None]()
+
+    def refusal(args: tuple[Any, ...], kwargs: dict[str, Any]) -> InputError | None:
+        for name, value in (*zip(names, args, strict=False), *kwargs.items()):
+            if name not in tests:
+                tests[name] = _test_of(annotations.get(name), vars(sys.modules[module]))
+            test = tests[name]
+            if test is not None and (found := test.wrong(value)):
+                return InputError(f"{title} {name} {shown(value)}", found, f"give {test.give}")
+        return None
+
+    @wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        refused = refusal(args, kwargs)
+        if refused is None:
+            return function(*args, **kwargs)
+        if function.__name__ == "__init__" or names[0] == "cls":
+            # A value is made in no time and without a trace, and what its own checks say is more.
+            try:
+                function(*args, **kwargs)
+            except TranslucentError:
+                raise
+            except Exception as error:
+                raise refused from error
+        raise refused
+
+    return call
+
+
+def shown(value: object) -> str:
+    """Short text of any value."""
+    try:
+        return reprlib.repr(value)
+    except Exception:  # noqa: BLE001 - a class of others, or a whole number of thousands of digits
+        return f"of type {type(value).__name__}"
+
+
+def _test_of(annotation: object, names: Mapping[str, Any]) -> _Test | None:
+    """Test of an annotation, as it is written; None if there is none, or a name in it is not known."""
+    if not isinstance(annotation, str):
+        return None
+    members, kinds = [ast.parse(annotation, mode="eval").body], list[Any]()
+    while members:  # one by one, since `array_like` holds texts: Python drops them beside it
+        member = members.pop(0)
+        if isinstance(member, ast.BinOp):
+            members[:0] = [member.left, member.right]
+            continue
+        if isinstance(member, ast.Name) and member.id == "ColorLike":
+            kinds += [str, npt.ArrayLike]
+            continue
+        try:
+            kinds.append(eval(ast.unparse(member), dict(names)))
+        except NameError:
+            return None
+    return _any_of(kinds)
+
+
+def _any_of(kinds: Sequence[Any]) -> _Test | None:
+    tests = [_test(kind) for kind in kinds if kind is not str or Path not in kinds]
+    known = [test for test in tests if test is not None]
+    if len(known) < len(tests):
+        return None
+
+    def wrong(value: Any) -> str:
+        reasons = [test.wrong(value) for test in known]
+        return "" if "" in reasons else reasons[0]
+
+    return _Test(wrong, " or ".join(dict.fromkeys(test.give for test in known)))
+
+
+def _test(kind: Any) -> _Test | None:
+    """Test of one type, generic or not; None where every value is let through."""
+    origin, inner = get_origin(kind), get_args(kind)
+    if simple := _SIMPLE.get(kind) or (origin is not None and _SIMPLE.get(origin)):
+        return simple
+    if origin is Literal:
+        return _Test(_text, f"one of {', '.join(inner)}")
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return _instance(origin, "a mapping")
+    if isinstance(origin, type) and issubclass(origin, Iterable):
+        return _sequence(inner, many=origin is not tuple or inner[-1] is ...)
+    if origin in (Union, UnionType):
+        return _any_of(inner)
+    if isinstance(kind, type) and kind is not Any and not getattr(kind, "_is_protocol", False):
+        own = kind.__module__.startswith("translucent.")
+        return _instance(kind, f"a tl.{kind.__name__}" if own else f"a {kind.__name__}")
+    return None
+
+
+def _instance(kind: type, give: str) -> _Test:
+    return _Test(lambda value: "" if isinstance(value, kind) else _type(value), give)
+
+
+def _sequence(kinds: tuple[Any, ...], many: bool) -> _Test:
+    """Test of many values of one type, or of one value of each type."""
+    tests = [_any_of([kind]) for kind in (kinds[:1] if many else kinds)]
+    gives = [test.give if test else "a value" for test in tests]
+
+    def wrong(value: Any) -> str:
+        if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
+            return _type(value)
+        if not isinstance(value, (list, tuple, np.ndarray)):
+            return "" if many else _type(value)
+        if not many and len(value) != len(tests):
+            return f"it has {len(value)} values, not {len(tests)}"
+        for test, item in zip(tests * len(value) if many else tests, value, strict=False):
+            if test is not None and (found := test.wrong(item)):
+                return f"of {shown(item)} in it, {found}"
+        return ""
+
+    return _Test(wrong, f"a sequence, each {gives[0]}" if many else f"({', '.join(gives)})")
+
+
+def _type(value: object) -> str:
+    return "it is None" if value is None else f"it is of type {type(value).__name__}"
+
+
+def _number(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return "" if value.ndim == 0 and value.dtype.kind in "biuf" else _type(value)
+    if not isinstance(value, (int, float, np.integer, np.floating, np.bool_)):
+        return _type(value)
+    try:
+        float(value)
+    except OverflowError:
+        return "it is beyond the range of numbers"
+    return ""
+
+
+def _whole(value: Any) -> str:
+    if found := _number(value):
+        # Whole numbers have no range here: of too large ones it is for the function to say.
+        return "" if isinstance(value, int) else found
+    return "" if float(value).is_integer() else "it is no whole number"
+
+
+def _numbers(value: Any) -> str:
+    """What is wrong with an array of real numbers."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind == "O" and all(isinstance(one, (int, float)) for one in array.ravel().tolist()):
+            array = array.astype(np.float64)  # whole numbers beyond 64 bits
+    except OverflowError:
+        return "a number in it is beyond the range of numbers"
+    except Exception:  # noqa: BLE001 - of NumPy, about lists of unequal lengths, and of classes of others
+        return "it is no array"
+    return "" if array.dtype.kind in "biuf" else {"c": "it holds complex numbers"}.get(array.dtype.kind, "no numbers")
+
+
+def _text(value: Any) -> str:
+    return "" if isinstance(value, str) else _type(value)
+
+
+def _path(value: Any) -> str:
+    if not isinstance(value, (str, os.PathLike)) or not isinstance(name := os.fspath(value), str):
+        return _type(value)
+    return "no file has a name with a zero in it" if "\0" in name else ""
+
+
+_SIMPLE: dict[Any, _Test] = {
+    None: _Test(lambda value: "" if value is None else _type(value), "None"),
+    bool: _Test(lambda value: "" if isinstance(value, (bool, np.bool_)) else _type(value), "True or False"),
+    float: _Test(_number, "a number"),
+    int: _Test(_whole, "a whole number"),
+    str: _Test(_text, "a text"),
+    Path: _Test(_path, "a path"),
+    os.PathLike: _Test(_path, "a path"),
+    npt.ArrayLike: _Test(_numbers, "an array of numbers"),
+    np.ndarray: _Test(_numbers, "an array of numbers"),
+    Callable: _Test(lambda value: "" if callable(value) else _type(value), "a function"),
+}
