@@ -20,15 +20,15 @@ class DriverFaultError(RenderError):
 
 
 def require_interfaces(info: Mapping[str, Any]) -> None:
-    """Raise `DriverFaultError` where the driver crashes on the shading of interfaces.
+    """Raise `DriverFaultError` where the driver crashes on the shading of interfaces, and of lit opaque surfaces.
 
     Lavapipe 22 reads before the first of its constant buffers where it inlines uniforms into that shader.
     """
     if str(info["GL_RENDERER"]).startswith("zink (llvmpipe") and "Mesa 22." in str(info["GL_VERSION"]):
         raise DriverFaultError(
-            "interfaces of bodies with zink over lavapipe",
+            "interfaces of bodies, or surfaces of opaque objects in lights, with zink over lavapipe",
             f"this driver, {info['GL_VERSION']}, ends the process on them",
-            "use another driver, a newer Mesa, or media without ior and surface",
+            "use another driver, a newer Mesa, or objects without ior and surface",
         )
 
 

@@ -6,6 +6,7 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.resources import Resources
@@ -63,6 +64,8 @@ class OpaquePass:
                     **coat_switches(()),
                 )
             else:
+                if job.features.has_shadow_maps:
+                    require_interfaces(job.gl.info)
                 looks = look_switches(job.scene.objects[i]) | coat_switches([job.scene.objects[i]])
                 program = self._finished.program(SURFACE=1, **common, **looks)
                 self._maps.bind(job)
