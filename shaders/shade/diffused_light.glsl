@@ -5,8 +5,9 @@
 
 uniform sampler3D diffused_light;    // grids of all bodies: below, the fluence at the surface; above, what enters there
 
-// Basic radiance L / n^2 inside an object, below a point of its surface and towards it; cosine: of the direction there.
-vec3 diffused_out(int object, vec3 point, float cosine) {
+// Basic radiance L / n^2 inside an object, below a point of its surface and towards it; cosine: of the direction there;
+// optical_depth: of the way back through the object, on which it has been scattered.
+vec3 diffused_out(int object, vec3 point, float cosine, vec3 optical_depth) {
     SurfaceRow row = surface_table_row(object);
     if (row.diffuses < 0.5) { return vec3(0.0); }
     vec3 texels = vec3(textureSize(diffused_light, 0));
@@ -23,7 +24,7 @@ vec3 diffused_out(int object, vec3 point, float cosine) {
     // Scaled so that the flux that leaves is that of the diffusion.
     vec3 flux = row.albedo * (fluence * steady - entering * shares.w) + entering * shares.z;
     vec3 scale = row.exit_share * fluence / max(flux, vec3(1e-30));
-    return max(emergent * scale, vec3(0.0)) / (4.0 * PI * row.ior * row.ior);
+    return max(emergent * scale, vec3(0.0)) * opacity((1.0 - row.ahead) * optical_depth) / (4.0 * PI * row.ior * row.ior);
 }
 
 // Radiance that comes along a ray, in a direction inside, by light that is scattered ahead in an object, and which diffusion

@@ -187,7 +187,8 @@ void main() {
         }
 #if DIFFUSED
         int object = int(surface.x + 0.5);
-        light += diffused_out(object, point, starts_inside ? 1.0 : refracted_cosine(cosine, finish.ior));
+        float cosine_inside = starts_inside ? 1.0 : refracted_cosine(cosine, finish.ior);
+        light += diffused_out(object, point, cosine_inside, crossing.optical_depth);
         vec3 inside = starts_inside ? ray : refracted_direction(ray, normal, finish.ior);
         light += haze(object, inside, crossing.optical_depth);
 #endif

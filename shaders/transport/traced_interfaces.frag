@@ -168,7 +168,8 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
 #endif
 #if DIFFUSED
                 if (before != AIR) {
-                    sum.light += ray.share * diffused_out(before, ray.origin, clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0));
+                    float cosine = clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0);
+                    sum.light += ray.share * diffused_out(before, ray.origin, cosine, filling.extinction * path);
                     sum.light += ray.share * haze(before, ray.direction, filling.extinction * path);
                 }
 #endif

@@ -14,7 +14,7 @@ import translucent as tl
 from translucent.assets import mesh_path
 from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.formulas.diffuse_interface import half_space_reflectance
-from translucent.geometry.solids import Box, Sphere
+from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.planning.notes import NoteKind
 from translucent.planning.scattering import diffusion
 
@@ -45,7 +45,7 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tl.Medium]:
         ("jade_ring", 16, "nrmse", 0.09),
         ("soap", 4, "nrmse", 0.08),
         ("bear_milk", 4, "nrmse", 0.06),
-        ("bear_skim", 4, "nrmse", 0.065),
+        ("bear_skim", 4, "nrmse", 0.05),
         ("sphere_milk_white", 4, "nrmse", 0.03),
         ("candle", 4, "block", 0.15),
         ("wax_bear_lamp", 4, "block", 0.26),
@@ -54,7 +54,7 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tl.Medium]:
 def test_pictures_are_near_full_light_transport(
     renderer: tl.Renderer, transport: ModuleType, name: str, samples: int, measure: str, most: float
 ) -> None:
-    """Measured with 16 samples: .075, .047, .044, .053, .023; and of blocks of pixels .118, .249, of lamps that are
+    """Measured with 16 samples: .072, .050, .044, .035, .023; and of blocks of pixels .116, .245, of lamps that are
     balls in the truth and points here. Four samples leave more aliasing, of which the ring alone has much: .092.
     """
     scene, size = transport.make(name)
@@ -68,11 +68,11 @@ def test_pictures_are_near_full_light_transport(
 @pytest.mark.parametrize(
     ("mesh", "depth", "mean", "worst"),
     [
-        ("ball", 5.0, 0.01, 0.02),
-        ("ball", 50.0, 0.002, 0.01),
-        ("bear", 10.0, 0.02, 0.15),
-        ("bear", 50.0, 0.002, 0.012),
-        ("bear", 500.0, 0.002, 0.012),
+        ("ball", 5.0, 0.003, 0.006),
+        ("ball", 50.0, 0.001, 0.003),
+        ("bear", 10.0, 0.015, 0.03),
+        ("bear", 50.0, 0.002, 0.006),
+        ("bear", 500.0, 0.001, 0.002),
     ],
 )
 def test_lossless_bodies_vanish_in_white_light(
@@ -80,10 +80,8 @@ def test_lossless_bodies_vanish_in_white_light(
 ) -> None:
     """All is as bright as the environment. `depth`: mean free paths along half the diagonal.
 
-    Not to 1e-3: the formula of the light that leaves is right in its sum over directions, and for each of them within
-    1.2 % for this index. Measured, mean and worst: .7 % and 1.6 %, 0 and .7 % for balls; -1.4 % and 13 %, 0 and .9 %,
-    .1 % and .8 % for bears. Of those as deep as a few mean free paths the ears are the worst: 17 % before the light
-    that leaves was corrected by what uniform light is.
+    Measured, mean and worst: -.2 % and .4 %, 0 and .1 % for balls; -.9 % and 1.9 %, -.1 % and .3 %, 0 and 0 for bears.
+    Of those as deep as a few mean free paths the ears are the worst.
     """
     shape = BALL if mesh == "ball" else tl.load_mesh(mesh_path("bear"))
     white = tl.Medium(scattering=2 * depth / shape.diagonal, ior=1.4)
@@ -93,6 +91,22 @@ def test_lossless_bodies_vanish_in_white_light(
     assert frame.coverage.sum() > 300
     assert abs(off.mean()) < mean
     assert np.abs(off).max() < worst
+
+
+def test_silhouettes_of_dense_bodies_vanish_in_white_light(renderer: tl.Renderer) -> None:
+    """Next to a silhouette rays are short, however dense the body: of its light they see what is scattered on them.
+
+    Light that comes through unscattered is there as well: pixels were up to 91 % too bright. Measured: 0.6 %.
+    """
+    dense = tl.Object(Torus(major=1.0, minor=0.4).tessellate(48), tl.Medium(scattering=60.0))
+    camera = tl.Camera.look_at((0, 2.2, 3.2), (0, 0, 0), fov_y=45)
+    scene = tl.Scene([dense], camera, environment=WHITE)
+    with tl.Renderer(backend="cpu") as other:
+        frames = [one.render(scene, (128, 128)) for one in (renderer, other)]
+    for frame in frames:
+        assert frame.plan.given_back.diffused == (0,)
+        assert ((frame.transmittance > 0.1) & (frame.transmittance < 0.99)).all(axis=2).sum() > 20
+        assert np.abs(frame.radiance - 1.0).max() < 0.01
 
 
 def lit_ball(medium: tl.Medium = WAX, **options: Any) -> tl.Scene:

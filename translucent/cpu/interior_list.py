@@ -146,6 +146,8 @@ class Branches:
         Square of the width of what it sees, as of the microfacets of a mirror: the sum over rough interfaces.
     footprint : (n, 2, 2, 3) float64
         Differentials of origins and of directions; (n, 0, 2, 3) where nothing is averaged over footprints.
+    diffused : (n, 3) float64
+        Basic radiance along it of light that has diffused in the body where it begins, if all was scattered on the way.
     """
 
     origins: Array
@@ -159,6 +161,7 @@ class Branches:
     reflected: Mask
     blur: Array
     footprint: Array
+    diffused: Array
 
     def __len__(self) -> int:
         return len(self.owner)

@@ -141,13 +141,16 @@ class DiffusedLight:
         return found
 
     def radiance(self, body: Integers, points: Array, directions: Array, normals: Array) -> Array:
-        """(k, 3): basic radiance against rays that start at points (k, 3) of surfaces, inside `body` (k,)."""
+        """(k, 3): basic radiance against rays that start at points (k, 3) of surfaces, inside `body` (k,).
+
+        As if all light was scattered on their ways through the body.
+        """
         found = np.zeros(points.shape)
         cosine = np.abs(dot(directions, normals))
         for number, field in self._fields.items():
             own = np.flatnonzero(body == number)
             if own.size:
-                found[own] = field.radiance(points[own], cosine[own])
+                found[own] = field.scattered_radiance(points[own], cosine[own])
         return found
 
 
@@ -275,6 +278,7 @@ class _Growth:
             np.zeros(count, dtype=bool),
             np.zeros(count),
             self._pixel_footprints(rays.directions),
+            np.zeros((count, 3)),
         )
         # The eye may be far away, where float32 is coarse.
         start = np.maximum(-dot(origins, rays.directions) - BEFORE, 0.0)
@@ -358,15 +362,17 @@ class _Growth:
         if emitted is not None:
             self._add(own, emitted)
         if self.tree.diffused:
-            self._add_haze(own, passed)
+            self._add_diffused(own, passed)
         throughput = branches.throughput.copy()
         with np.errstate(under="ignore"):
             throughput[inside] *= passed
         return replace(branches, throughput=throughput)
 
-    def _add_haze(self, branches: Branches, passed: Array) -> None:
-        """Add what is scattered ahead, where diffusion takes it for unscattered."""
+    def _add_diffused(self, branches: Branches, passed: Array) -> None:
+        """Add light that has diffused, and what is scattered ahead, where diffusion takes it for unscattered."""
         ahead, far, near = np.moveaxis(self.tree.diffused.haze(self.media.effective(branches.interior)), 1, 0)
+        with np.errstate(under="ignore"):
+            self._add(branches, branches.diffused * (1.0 - passed ** (1.0 - ahead)))
         hazy = np.flatnonzero(ahead.any(axis=1))
         if hazy.size:
             own, ahead, far, near = branches.where(hazy), ahead[hazy], far[hazy], near[hazy]
@@ -440,10 +446,7 @@ class _Growth:
             ways = parted(self.caster, branches, places, met)
             back, on = (replace(branch, footprint=way) for branch, way in zip((back, on), ways, strict=True))
         if self.tree.diffused:
-            for branch in (back, on):
-                points = self._rays(branch).origins + self.scene.camera.eye
-                body = self.media.effective(branch.interior)
-                self._add(branch, self.tree.diffused.radiance(body, points, branch.directions, met.normals))
+            back, on = (self._from_inside(branch, met.normals) for branch in (back, on))
         brightness = largest(back.throughput), largest(on.throughput)
         is_back, is_on = (bright > 0.0 for bright in brightness)
         stronger = back.throughput @ LUMINANCE > on.throughput @ LUMINANCE
@@ -459,6 +462,12 @@ class _Growth:
             self._look_up(branch.where(exists & ~follow))
             kept.append(branch.where(follow))
         return kept
+
+    def _from_inside(self, branches: Branches, normals: Array) -> Branches:
+        """Branches from surfaces with these normals, with light that has diffused in the bodies there."""
+        points = self._rays(branches).origins + self.scene.camera.eye
+        body = self.media.effective(branches.interior)
+        return replace(branches, diffused=self.tree.diffused.radiance(body, points, branches.directions, normals))
 
     def _add_coats(self, branches: Branches, met: InterfaceInteractions) -> None:
         """Add the environment as clear coats mirror it that are not as rough as what is below."""

@@ -33,13 +33,16 @@ from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.photon_fluence import EnteringPhotons
 from translucent.diffusion.solution import BodySystem, SurfaceLight
 from translucent.formulas import optics
-from translucent.formulas.diffuse_interface import diffuse_interface, emergent_fluxes
+from translucent.formulas.diffuse_interface import diffuse_interface, emergent_cosine, emergent_fluxes
 from translucent.formulas.diffusion import emergent_radiance, haze_shares
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Object, Scene
+
+#: Values (x, y, z, 3) in cells.
+Volume = npt.NDArray[np.float32]
 
 #: Cells by which values at the surface are spread beyond the cells that it crosses.
 SPREAD = 3
@@ -50,6 +53,9 @@ FRESH = 0.8
 
 #: Samples of a surface for each at which ways through other bodies are found.
 SAMPLES_FOR_PATH = 4
+
+#: Least share of the ways through a body on which light counts as scattered: thinner parts have hardly any such light.
+LEAST_SCATTERED = 0.02
 
 #: Share of a cell that is inside from which all of it is.
 _WHOLE = 1.0 - 1e-9
@@ -63,6 +69,8 @@ class DiffusionField:
     ----------
     fluence, entering : (x, y, z, 3) float32
         Of scattered light below the surface; and flux that enters there times the albedo. Spread beyond the surface.
+    scattered : (x, y, z, 3) float32
+        Share of the ways through the body, from its surface, on which light is scattered; 1 deep inside.
     low : (3,) float64
         Corner of the grid in metres.
     step : float
@@ -85,8 +93,9 @@ class DiffusionField:
         See `haze_shares`.
     """
 
-    fluence: npt.NDArray[np.float32]
-    entering: npt.NDArray[np.float32]
+    fluence: Volume
+    entering: Volume
+    scattered: Volume
     low: Array
     step: float
     albedo: Array
@@ -100,15 +109,13 @@ class DiffusionField:
     ahead: Array
     haze: tuple[Array, Array]
 
-    @property
-    def volumes(self) -> tuple[npt.NDArray[np.float32], ...]:
-        """Arrays (x, y, z, 3) that pictures look up."""
-        return self.fluence, self.entering
+    @cached_property
+    def volumes(self) -> tuple[Volume, Volume]:
+        """Arrays (x, y, z, 3) that pictures look up: along ways on which all light is scattered."""
+        return self.fluence / self.scattered, self.entering / self.scattered
 
     def radiance(self, points: Array, cosine: Array) -> Array:
-        """(k, 3): basic radiance L / n^2 inside the body, below points of its surface and towards it.
-
-        The same as ``shaders/shade/diffused_light.glsl``.
+        """(k, 3): basic radiance L / n^2 inside the body, below points of its surface and towards it: the mean of ways.
 
         Parameters
         ----------
@@ -117,10 +124,20 @@ class DiffusionField:
         cosine : (k,) float64
             Of the directions there, inside.
         """
+        return self._emergent(self.fluence, self.entering, points, cosine)
+
+    def scattered_radiance(self, points: Array, cosine: Array) -> Array:
+        """The same as `radiance`, along ways on which all light is scattered; on others the share that is.
+
+        The same as ``shaders/shade/diffused_light.glsl``.
+        """
+        return self._emergent(*self.volumes, points, cosine)
+
+    def _emergent(self, fluences: Volume, fluxes: Volume, points: Array, cosine: Array) -> Array:
         place = ((points - self.low) / self.step - 0.5).T
         fluence, entering = (
             np.stack([map_coordinates(values[..., i], place, order=1, mode="nearest") for i in range(3)], axis=1)
-            for values in (self.fluence, self.entering)
+            for values in (fluences, fluxes)
         )
         uniform, rising, fresh, shadowed = self.fluxes
         steady = uniform + self.conductance * rising
@@ -301,22 +318,25 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: SurfaceLight) 
     total = reduced + np.asarray(medium.absorption)
     albedo = np.where(total > 0.0, reduced / np.where(total > 0.0, total, 1.0), 0.0)
     interface, polished = diffuse_interface(medium.ior, roughness), diffuse_interface(medium.ior)
-    values = np.concatenate([found.fluence, albedo * found.entering], axis=1)
-    deep = np.concatenate([found.inside, np.zeros_like(found.inside)], axis=1)
+    scattered = np.maximum(found.scattered, LEAST_SCATTERED)
+    values = np.concatenate([found.fluence, albedo * found.entering, scattered], axis=1)
+    deep = np.concatenate([found.inside, np.zeros_like(found.inside), np.ones_like(found.inside)], axis=1)
     volume = _spread(grid, values, deep).astype(np.float32)
+    cosine = emergent_cosine(float(albedo.mean()), medium.ior)
     ahead = np.asarray(medium.scattering) * max(medium.anisotropy, 0.0)
     # Of diffuse light, four times the volume over the area.
     chord = 2.0 * lit.casters.body.mean_thickness * float(np.average(lit.densities.cells, weights=grid.volumes))
     return DiffusionField(
         fluence=np.ascontiguousarray(volume[..., :3]),
-        entering=np.ascontiguousarray(volume[..., 3:]),
+        entering=np.ascontiguousarray(volume[..., 3:6]),
+        scattered=np.where(volume[..., 6:] > 0.0, volume[..., 6:], np.float32(1.0)),
         low=grid.cells.low,
         step=grid.cells.step,
         albedo=albedo,
         conductance=interface.conductance,
         exit_share=interface.exit_share,
-        mean_cosine=polished.mean_cosine,
-        fluxes=emergent_fluxes(medium.ior, polished.mean_cosine),
+        mean_cosine=cosine,
+        fluxes=emergent_fluxes(medium.ior, cosine),
         steps=found.steps,
         cells=grid.count,
         ior=medium.ior,

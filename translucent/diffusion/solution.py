@@ -54,6 +54,8 @@ class SurfaceLight:
         Flux that enters, that of the body itself included.
     inside : (cells, 3) float64
         Fluence in the cells.
+    scattered : (s, 3) float64
+        Share of the ways through the body from each sample on which light is scattered, as uniform light has them.
     steps : int
         Iterations that the solver took, in all.
     """
@@ -61,6 +63,7 @@ class SurfaceLight:
     fluence: Array
     entering: Array
     inside: Array
+    scattered: Array
     steps: int
 
 
@@ -138,6 +141,7 @@ class BodySystem:
             If the solver does not get there.
         """
         fluence, flux, cells = np.zeros_like(entering), entering.copy(), np.zeros_like(inside)
+        scattered = np.ones_like(entering)
         steps, ways = 0, [ways_of(beam, self._grid, self._dense) for beam in beams]
         for channel, system in self._channels.items():
             emission = float(self._emitted[channel])
@@ -146,8 +150,9 @@ class BodySystem:
                 system.forget()
             found = system.solved(entering[:, channel], from_itself, inside[:, channel], emission, straight)
             fluence[:, channel], flux[:, channel], cells[:, channel], taken = found
+            scattered[:, channel] = system.scattered
             steps += taken
-        return SurfaceLight(fluence, flux, cells, steps)
+        return SurfaceLight(fluence, flux, cells, scattered, steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,23 +206,25 @@ class _Channel:
         absorbed = absorption * dense.cells * absorbing
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
         self._correction = np.ones(len(depth))
+        #: (s,): see `SurfaceLight`.
+        self.scattered = scattered_shares(grid, dense, ior, extinction)[grid.nearest].mean(axis=1)
         if corrected:
             lossless = _Channel(grid, ior, roughness, 0.0, extinction, dense, ways, corrected=False)
             # What half-spaces absorb has not been in the body long enough to get to other parts of it.
             share = half_space_reflectance(round(self._albedo, 6), ior)
-            found = lossless.by_uniform_light(scattered_shares(grid, dense, ior, extinction))
+            found = lossless.by_uniform_light()
             self._correction = 1.0 + share * (found - 1.0)
 
-    def by_uniform_light(self, scattered: Array) -> Array:
+    def by_uniform_light(self) -> Array:
         """(s,): factors of the fluence that make uniform light around a lossless body what it is.
 
-        Such a body is invisible, whatever its shape: of what leaves, all has been `scattered` (s,) but for what comes
-        straight through. Diffusion sends too much of it out of parts no thicker than a free path, and too little out
+        Such a body is invisible, whatever its shape: of what leaves, all has been scattered but for what comes straight
+        through. Diffusion sends too much of it out of parts no thicker than a free path, and too little out
         of folds.
         """
         even = np.ones(len(self._grid.points))
         found = (self._read @ self._cells.rough(self._into_cells @ even)) * self._attenuated + self._near * even
-        found, wanted = (values[self._grid.nearest].mean(axis=1) for values in (found, scattered))
+        found, wanted = found[self._grid.nearest].mean(axis=1), self.scattered
         # What leaves in all is right.
         least = np.finfo(np.float64).tiny
         share = wanted / max(wanted.sum(), least) * found.sum() / np.maximum(found, least)

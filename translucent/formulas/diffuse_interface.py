@@ -151,6 +151,17 @@ def emergent_fluxes(ior: float, mean_cosine: float) -> tuple[float, float, float
     return uniform, rising, fresh, shadowed
 
 
+def emergent_cosine(albedo: float, ior: float) -> float:
+    """Cosine m for `translucent.formulas.diffusion.emergent_radiance`: how deep entering light is scattered first.
+
+    That of uniform light, where a half-space absorbs a third of what enters, or more. Where it absorbs nothing,
+    1 / sqrt(3), with which the radiance is the same at all angles, as it must be (Eddington 1926).
+    """
+    absorbed = 1.0 - half_space_reflectance(round(albedo, 6), ior)
+    lossless = 1.0 / np.sqrt(3.0)
+    return float(lossless + (diffuse_interface(ior).mean_cosine - lossless) * min(1.0, 3.0 * absorbed))
+
+
 @lru_cache(maxsize=1024)
 def half_space_reflectance(albedo: float, ior: float = 1.0, phase: PhaseFunction = ISOTROPIC) -> float:
     """Share of the diffuse light entering a half-space that leaves again after it has been scattered; exact.
