@@ -49,7 +49,6 @@ MODULES = {module.removesuffix(".__init__"): path for module, path in MODULES.it
 SHARED = {
     "BentLight",
     "DiffusedLight",
-    "Fields",
     "Interfaces",
     "Layer",
     "PhotonLight",

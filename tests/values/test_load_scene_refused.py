@@ -132,7 +132,7 @@ def test_a_bad_camera_is_refused_in_words(tmp_path: Path, camera: Json, message:
         ({"type": "spot", "spot": {"innerConeAngle": -0.1}}, "innerConeAngle -0.1, outerConeAngle 0.785398: not"),
         ({"type": "spot", "spot": []}, r"spot is \[\], not an object"),
         ({"type": "point", "intensity": "bright"}, "intensity is 'bright', not a number"),
-        ({"type": "point", "color": [1, 1]}, r"color is \[1, 1\], not 3 numbers"),
+        ({"type": "point", "color": [1, 1]}, r"color is \[1, 1\], not three numbers"),
     ],
     ids=lambda v: v if isinstance(v, str) else "",
 )
@@ -151,7 +151,7 @@ def test_a_light_that_is_not_there_is_refused(tmp_path: Path, index: object) -> 
 
 
 def test_a_bad_base_color_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match=r"material 'Hot': baseColorFactor .* is not in 0..1"):
+    with pytest.raises(tl.InputError, match=r"material 'Hot': baseColorFactor.* is not in 0..1"):
         material_scene(tmp_path, {"name": "Hot", "pbrMetallicRoughness": {"baseColorFactor": [2.0, 1.0, 1.0, 1.0]}})
 
 

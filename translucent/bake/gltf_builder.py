@@ -27,8 +27,8 @@ from translucent.geometry.grouping import equal_rows
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.accessors import COMPONENTS
 from translucent.gltf.file import BINARY_CHUNK, CHUNK, GltfFile, Json, gather
-from translucent.gltf.materials import DIFFUSE_TRANSMISSION, EXCLUDED, TRANSMISSION, VOLUME
-from translucent.gltf.nodes import primitives
+from translucent.gltf.materials import DIFFUSE_TRANSMISSION, TRANSMISSION, VOLUME, volume_extensions_of
+from translucent.gltf.nodes import primitives, variant_materials
 from translucent.gltf.textures import TEXTURE_TRANSFORM
 from translucent.media.medium import Medium, color_at
 
@@ -63,7 +63,7 @@ class GlbBuilder:
         self._path, self._allow_outside = file.path, file.allow_outside
         if file.chunks:
             if "uri" in (file.items("buffers") or [{}])[0]:
-                raise InputError(f"glTF {str(file.path)!r}", "its first buffer is a link", "export it as one .glb")
+                raise file.refused("its first buffer is a link", "export it as one .glb")
             tree, data = copy.deepcopy(file.tree), file.resource({})
             self._rest = file.chunks[CHUNK.size + len(data) :]
         else:
@@ -181,10 +181,7 @@ class GlbBuilder:
             If the material has an extension that excludes a volume.
         """
         material = self.tree["materials"][index]
-        extensions = material.setdefault("extensions", {})
-        if excluded := [name for name in EXCLUDED if name in extensions]:
-            asked = f"material {index} {material.get('name', '')!r}"
-            raise InputError(asked, f"{excluded[0]} excludes a volume", "give the object another material")
+        extensions = volume_extensions_of(index, material)
         diffuse = extensions.get(DIFFUSE_TRANSMISSION, {}).get("diffuseTransmissionFactor", 0)
         if not (extensions.get(TRANSMISSION, {}).get("transmissionFactor", 0) > 0 or diffuse > 0):
             extensions.setdefault(TRANSMISSION, {})["transmissionFactor"] = 1
@@ -256,15 +253,6 @@ def wrapping(mesh: Mesh) -> Json:
     """
     wrap = _CLAMP if mesh.uv is not None and mesh.uv.min() >= 0 and mesh.uv.max() <= 1 else _REPEAT
     return {"wrapS": wrap, "wrapT": wrap}
-
-
-def variant_materials(file: GltfFile, primitive: Json) -> list[int]:
-    """Materials that variants give a primitive."""
-    try:
-        mappings = primitive.get("extensions", {}).get("KHR_materials_variants", {}).get("mappings", [])
-        return [int(mapping["material"]) for mapping in mappings]
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"glTF {str(file.path)!r}", "KHR_materials_variants is malformed", "mend the file") from error
 
 
 def mesh_file(mesh: Mesh) -> GltfFile:

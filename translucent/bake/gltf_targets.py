@@ -29,7 +29,7 @@ from translucent.bake.gltf_builder import INDICES, GlbBuilder
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.mesh import Mesh, mended
 from translucent.gltf.accessors import COMPONENTS, Accessors, primitive_mesh
-from translucent.gltf.file import GltfFile, Json
+from translucent.gltf.file import COMPRESSIONS, GltfFile, Json
 from translucent.gltf.materials import GltfMaterial, materials_of
 from translucent.gltf.nodes import node_transforms, primitives
 from translucent.gltf.textures import TextureTransform
@@ -187,9 +187,6 @@ def transformed(mesh: Mesh, matrix: Array, metres: float) -> Mesh:
     return dataclasses.replace(mesh, vertices=vertices, faces=faces)
 
 
-COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
-
-
 @dataclass(frozen=True, eq=False)
 class Target:
     """Target: a primitive that gets thickness.
@@ -260,9 +257,7 @@ def find_targets(
         If the file is compressed, has no triangles, or its data are wrong; if UVs are to be made and xatlas is missing.
     """
     file = builder.file()
-    required = file.tree.get("extensionsRequired", [])
-    if packed := [name for name in COMPRESSIONS if name in required]:
-        raise InputError(f"glTF {str(file.path)!r}", f"it requires {packed[0]}", "export it without compression")
+    require_uncompressed(file)
     materials, bodies = materials_of(file), Bodies(file, metres)
     lit = {
         key: _material(materials, builder.primitive(*key))
@@ -288,8 +283,15 @@ def find_targets(
         found.append(Target(key, mesh, tex_coord, keeps, medium, made, around))
     if not found:
         told = f"all that lets light in are thin walls without an inside: {', '.join(_names(file, list(lit)))}"
-        raise InputError(f"glTF {str(file.path)!r}", told, "give one of them a volume, or a closed mesh")
+        raise file.refused(told, "give one of them a volume, or a closed mesh")
     return found
+
+
+def require_uncompressed(file: GltfFile) -> None:
+    """Raise `InputError` if a file cannot be read without an extension that compresses its vertices."""
+    required = file.tree.get("extensionsRequired", [])
+    if packed := [name for name in COMPRESSIONS if name in required]:
+        raise file.refused(f"it requires {packed[0]}", "export it without compression")
 
 
 def _material(materials: list[GltfMaterial], primitive: Json) -> GltfMaterial | None:
@@ -321,7 +323,7 @@ def _keys(file: GltfFile, materials: list[GltfMaterial]) -> list[PrimitiveKey]:
     """Triangle primitives of meshes that nodes use: those with a translucent material, or all."""
     everything = {key: primitive.get("material") for key, primitive in triangle_primitives(file).items()}
     if not everything:
-        raise InputError(f"glTF {str(file.path)!r}", "no node has triangles", "give a file with a mesh")
+        raise file.refused("no node has triangles", "give a file with a mesh")
     lit = [key for key, index in everything.items() if index is not None and materials[index].transmits]
     return lit or list(everything)
 

@@ -19,7 +19,7 @@ from translucent.arrays import Array, Integers
 from translucent.files.reading import require_memory, require_room
 from translucent.geometry.grouping import use_mask
 from translucent.geometry.mesh import MAX_INDEX, PER_TRIANGLE, Mesh, adopted, mended
-from translucent.gltf.fields import refused, section, whole
+from translucent.gltf.fields import JsonFields
 from translucent.gltf.file import GltfFile, Json
 
 Indices = npt.NDArray[np.int64]
@@ -61,28 +61,26 @@ class Accessors:
         """(n,): an accessor of indices, of the type that is stored; raises `InputError` like `vectors`."""
         values, _ = self._elements(index, "SCALAR")
         if values.dtype.kind != "u":
-            raise refused(self.file, f"accessor {index}: indices are no unsigned integers")
+            raise self.file.refused(f"accessor {index}: indices are no unsigned integers")
         return values[:, 0]
 
     def _elements(self, index: object, kind: str) -> tuple[npt.NDArray[Any], Json]:
         """(n, width): the elements as they are stored, and their accessor."""
-        entry = self.file.item("accessors", index)
-        where = f"accessor {index}"
-        if entry.get("type") != kind:
-            raise refused(self.file, f"{where}: type {entry.get('type')!r} where {kind} belongs")
-        count, dtype = whole(self.file, where, entry, "count"), self._dtype(where, entry)
+        values = self.file.item("accessors", index)
+        entry = JsonFields(self.file, f"accessor {index}", values)
+        if values.get("type") != kind:
+            entry.refuse(f"type {values.get('type')!r} where {kind} belongs")
+        count, dtype = entry.whole("count"), self._dtype(entry)
         if count > MAX_INDEX:
-            raise refused(self.file, f"{where} has {count} elements", "split the mesh")
-        if "bufferView" in entry:
-            found = self._block(where, entry, dtype, count, _WIDTHS[kind])
-        elif "sparse" in entry:
-            self._require_room(f"{where}: {count} elements", _MADE_UP * count)
+            raise self.file.refused(f"{entry.where} has {count} elements", "split the mesh")
+        if "bufferView" in values:
+            found = self._block(entry, dtype, count, _WIDTHS[kind])
+        elif "sparse" in values:
+            self._require_room(f"{entry.where}: {count} elements", _MADE_UP * count)
             found = np.zeros((count, _WIDTHS[kind]), dtype)
         else:
-            raise refused(self.file, f"{where} has no data", "export the file without compression")
-        if "sparse" in entry:
-            found = self._replaced(where, section(self.file, where, entry, "sparse"), found)
-        return found, entry
+            raise self.file.refused(f"{entry.where} has no data", "export the file without compression")
+        return (self._replaced(entry.section("sparse"), found) if "sparse" in values else found), values
 
     def keep(self, what: str, size: int) -> None:
         """Count the bytes of a mesh that is kept, since many meshes may share one buffer of a small file."""
@@ -92,34 +90,32 @@ class Accessors:
     def _require_room(self, what: str, size: int) -> None:
         require_room(f"glTF {str(self.file.path)!r}", what, size, self.file.stored, "split the file")
 
-    def _replaced(self, where: str, sparse: Json, stored: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    def _replaced(self, sparse: JsonFields, stored: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Copy of `stored` with the elements of a sparse accessor replaced."""
-        count = whole(self.file, where, sparse, "count")
-        indices = section(self.file, where, sparse, "indices")
-        values = section(self.file, where, sparse, "values")
-        at = self._block(where, indices, self._dtype(where, indices), count, 1)[:, 0].astype(np.int64)
+        count, indices = sparse.whole("count"), sparse.section("indices")
+        at = self._block(indices, self._dtype(indices), count, 1)[:, 0].astype(np.int64)
         if ((at < 0) | (at >= len(stored))).any():
-            raise refused(self.file, f"{where}: a sparse index is not one of {len(stored)}")
+            sparse.refuse(f"a sparse index is not one of {len(stored)}")
         found = stored.copy()
-        found[at] = self._block(where, values, stored.dtype, count, stored.shape[1])
+        found[at] = self._block(sparse.section("values"), stored.dtype, count, stored.shape[1])
         return found
 
-    def _dtype(self, where: str, entry: Json) -> np.dtype[Any]:
-        code = entry.get("componentType")
+    def _dtype(self, entry: JsonFields) -> np.dtype[Any]:
+        code = entry.values.get("componentType")
         if not isinstance(code, int) or code not in COMPONENTS:
-            raise refused(self.file, f"{where}: componentType {code!r} is none of glTF 2.0")
+            raise self.file.refused(f"{entry.where}: componentType {code!r} is none of glTF 2.0")
         return np.dtype(COMPONENTS[code])
 
-    def _block(self, where: str, entry: Json, dtype: np.dtype[Any], count: int, width: int) -> npt.NDArray[Any]:
+    def _block(self, entry: JsonFields, dtype: np.dtype[Any], count: int, width: int) -> npt.NDArray[Any]:
         """(count, width): contents of a buffer view from the entry's offset on."""
-        view = self.file.item("bufferViews", entry.get("bufferView"))
-        data = self.file.buffer(view.get("buffer"))
-        start, length = (whole(self.file, where, view, key, 0) for key in ("byteOffset", "byteLength"))
-        offset, element = whole(self.file, where, entry, "byteOffset", 0), dtype.itemsize * width
-        stride = whole(self.file, where, view, "byteStride", element)
+        view = JsonFields(self.file, entry.where, self.file.item("bufferViews", entry.values.get("bufferView")))
+        data = self.file.buffer(view.values.get("buffer"))
+        start, length = view.whole("byteOffset", 0), view.whole("byteLength", 0)
+        offset, element = entry.whole("byteOffset", 0), dtype.itemsize * width
+        stride = view.whole("byteStride", element)
         end = offset + stride * (count - 1) + element
         if count < 1 or stride < element or end > length or start + length > len(data):
-            raise refused(self.file, f"{where} leaves its buffer", "copy or export the file again")
+            raise self.file.refused(f"{entry.where} leaves its buffer", "copy or export the file again")
         return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
 
 
@@ -157,7 +153,7 @@ def raw_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
     corners = accessors.indices(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
     if corners.max(initial=0) >= len(positions):
         found = f"{name!r}: index {corners.max()} points outside the {len(positions)} vertices"
-        raise refused(accessors.file, found)
+        raise accessors.file.refused(found)
     count = len(corners) // 3 if mode == _TRIANGLES else len(corners)
     asked, do = f"glTF {str(accessors.file.path)!r}", "close other programs, or decimate the mesh"
     require_memory(asked, f"the {count} triangles of {name!r}", PER_TRIANGLE * count, do)
@@ -168,7 +164,7 @@ def raw_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
     if "TEXCOORD_0" in attributes:
         uv = accessors.vectors(attributes["TEXCOORD_0"], "VEC2")
         if len(uv) != stored:
-            raise refused(accessors.file, f"{name!r}: {len(uv)} texture coordinates for {stored} vertices")
+            raise accessors.file.refused(f"{name!r}: {len(uv)} texture coordinates for {stored} vertices")
         uv = np.column_stack([uv[kept, 0], 1.0 - uv[kept, 1]])  # glTF counts v downwards
     colors = None if "COLOR_0" not in attributes else _colors(accessors, attributes["COLOR_0"], stored, name)
     colors = None if colors is None or (colors[kept] == 1).all() else colors[kept]
@@ -194,7 +190,7 @@ def _colors(accessors: Accessors, index: Any, count: int, name: str) -> npt.NDAr
     kind = "VEC3" if accessors.file.item("accessors", index).get("type") == "VEC3" else "VEC4"
     colors = accessors.vectors(index, kind).clip(0.0, 1.0)
     if len(colors) != count:
-        raise refused(accessors.file, f"{name!r}: {len(colors)} colors for {count} vertices")
+        raise accessors.file.refused(f"{name!r}: {len(colors)} colors for {count} vertices")
     return np.column_stack([colors, np.ones(count)]) if kind == "VEC3" else colors
 
 
@@ -202,12 +198,12 @@ def _faces(accessors: Accessors, mode: Any, corners: AnyIndices, name: str) -> A
     """(m, 3): the faces of a list, strip or fan of triangles."""
     if mode == _TRIANGLES:
         if len(corners) % 3:
-            raise refused(accessors.file, f"{name!r}: {len(corners)} corners make no whole number of triangles")
+            raise accessors.file.refused(f"{name!r}: {len(corners)} corners make no whole number of triangles")
         return corners.reshape(-1, 3)
     if mode not in (_STRIP, _FAN):
-        raise refused(accessors.file, f"{name!r}: primitive mode {mode!r} is none of glTF 2.0")
+        raise accessors.file.refused(f"{name!r}: primitive mode {mode!r} is none of glTF 2.0")
     if len(corners) < 3:
-        raise refused(accessors.file, f"{name!r}: {len(corners)} corners make no triangle")
+        raise accessors.file.refused(f"{name!r}: {len(corners)} corners make no triangle")
     first, second, third = corners[:-2], corners[1:-1], corners[2:]
     if mode == _FAN:
         return np.column_stack([second, third, np.full_like(first, corners[0])])

@@ -20,7 +20,7 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
 from translucent.gltf.accessors import Accessors
-from translucent.gltf.fields import LeftOut, label, refused
+from translucent.gltf.fields import LeftOut, label
 from translucent.gltf.file import GltfFile, Json
 
 _KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
@@ -63,7 +63,7 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
                 continue
             file.item("nodes", node)
             if "matrix" in moved[node]:
-                raise refused(file, f"animation {name} moves node {label(moved, node)}, which has a matrix")
+                raise file.refused(f"animation {name} moves node {label(moved, node)}, which has a matrix")
             if (node, path) in taken:
                 left_out.add(f"animations that move what another does ({path})", name)
                 continue
@@ -81,11 +81,11 @@ def _channels(file: GltfFile, animation: Json, name: str) -> Iterator[tuple[Json
     """Channels of an animation, with their targets."""
     channels = animation.get("channels", [])
     if not (isinstance(channels, list) and all(isinstance(one, dict) for one in channels)):
-        raise refused(file, f"animation {name}: channels is not a list of objects")
+        raise file.refused(f"animation {name}: channels is not a list of objects")
     for channel in channels:
         target = channel.get("target")
         if not isinstance(target, dict):
-            raise refused(file, f"animation {name}: a channel has no target")
+            raise file.refused(f"animation {name}: a channel has no target")
         yield channel, target
 
 
@@ -95,24 +95,24 @@ def _value(
     """Value of a channel, and the time of its last key."""
     samplers, index = animation.get("samplers", []), channel.get("sampler")
     if not isinstance(samplers, list) or not isinstance(index, int) or not 0 <= index < len(samplers):
-        raise refused(file, f"animation {name}: sampler {index!r} is not one of its samplers")
+        raise file.refused(f"animation {name}: sampler {index!r} is not one of its samplers")
     sampler = samplers[index]
     if not isinstance(sampler, dict) or (mode := sampler.get("interpolation", "LINEAR")) not in _MODES:
-        raise refused(file, f"animation {name}: sampler {index} is no object with an interpolation of glTF 2.0")
+        raise file.refused(f"animation {name}: sampler {index} is no object with an interpolation of glTF 2.0")
     times = accessors.vectors(sampler.get("input"), "SCALAR")[:, 0]
     values = accessors.vectors(sampler.get("output"), _KINDS[path])
     per_key = 3 if mode == "CUBICSPLINE" else 1
     if len(values) != per_key * len(times) or not (np.isfinite(times).all() and np.isfinite(values).all()):
-        raise refused(file, f"animation {name}: {len(values)} values for {len(times)} keys, or one that is not finite")
+        raise file.refused(f"animation {name}: {len(values)} values for {len(times)} keys, or one that is not finite")
     if (np.diff(times) <= 0).any():
-        raise refused(file, f"animation {name}: its keys are not in the order of time")
+        raise file.refused(f"animation {name}: its keys are not in the order of time")
     found = sample(times, values.reshape(len(times), per_key, -1), seconds, mode, arc=path == "rotation")
     end = float(times[-1])
     if path != "rotation":
         return found, end
     length = float(np.linalg.norm(found))
     if not length > 0:
-        raise refused(file, f"animation {name}: a rotation of length 0")
+        raise file.refused(f"animation {name}: a rotation of length 0")
     return found / length, end
 
 

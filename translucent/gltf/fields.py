@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import TypeVar, cast
 
-import numpy as np
-
-from translucent.arrays import Array
-from translucent.errors import InputError
 from translucent.gltf.file import GltfFile, Json
 
+Triple = tuple[float, float, float]
+Numbers = TypeVar("Numbers", bound=tuple[float, ...])
 
-def refused(file: GltfFile, found: str, do: str = "export the file again") -> InputError:
-    """Error for a file that cannot be read as a scene."""
-    return InputError(f"glTF {str(file.path)!r}", found, do)
+_COUNTS = {2: "two", 3: "three", 4: "four"}
+
+#: Largest number of names in a line.
+FIRST = 3
 
 
 def label(items: list[Json], index: int) -> str:
@@ -22,119 +22,77 @@ def label(items: list[Json], index: int) -> str:
     return repr(name) if isinstance(name, str) and name else f"number {index}"
 
 
-def section(file: GltfFile, where: str, holder: Json, key: str) -> Json:
-    """Object of `holder` under `key`; empty if it has none.
+class JsonFields:
+    """Checked values of one JSON object of a file, each with the default that it has where it is absent.
 
-    Raises
-    ------
-    InputError
-        If it is something else.
+    Parameters
+    ----------
+    file : GltfFile
+    where : str
+        The object, as errors call it.
+    values : dict
+    problems : list of str, optional
+        Gets what is wrong, and a wrong value has its default. Without it, an `InputError` is raised.
     """
-    found = holder.get(key, {})
-    if not isinstance(found, dict):
-        raise refused(file, f"{where}: {key} is {found!r}, not an object")
-    return found
 
+    def __init__(self, file: GltfFile, where: str, values: Json, problems: list[str] | None = None) -> None:
+        self.file, self.where, self.values, self.problems = file, where, values, problems
 
-def extension(file: GltfFile, where: str, holder: Json, name: str) -> Json:
-    """Object of an extension of `holder`; empty if it is absent."""
-    return section(file, where, section(file, where, holder, "extensions"), name)
+    def refuse(self, found: str, do: str = "export the file again") -> None:
+        """Raise `InputError` for a value, or add it to the problems."""
+        if self.problems is None:
+            raise self.file.refused(f"{self.where}: {found}", do)
+        self.problems.append(found)
 
+    def section(self, key: str) -> JsonFields:
+        """Object in the object; empty if it is absent."""
+        found = self.values.get(key, {})
+        if not isinstance(found, dict):
+            self.refuse(f"{key} is {found!r}, not an object")
+            found = {}
+        return JsonFields(self.file, self.where, found, self.problems)
 
-def number(file: GltfFile, where: str, holder: Json, key: str, default: float | None = None) -> float:
-    """Number of `holder`; raises `InputError` if it is not a number, or missing without a default."""
-    value = holder.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise refused(file, f"{where}: {key} is {value!r}, not a number")
-    return float(value)
+    def extension(self, name: str) -> JsonFields:
+        """Object of an extension; empty if it is absent."""
+        return self.section("extensions").section(name)
 
-
-def share(file: GltfFile, where: str, holder: Json, key: str, default: float) -> float:
-    """Number of `holder` in 0..1; raises `InputError` if it is not one."""
-    value = number(file, where, holder, key, default)
-    if not 0 <= value <= 1:
-        raise refused(file, f"{where}: {key} {value:g} is not in 0..1", "mend the file")
-    return value
-
-
-def shares(file: GltfFile, where: str, holder: Json, key: str, default: tuple[float, ...]) -> Array:
-    """Numbers in 0..1, as many as the default has; raises `InputError` otherwise."""
-    values = numbers(file, where, holder, key, default)
-    if not ((values >= 0) & (values <= 1)).all():
-        raise refused(file, f"{where}: {key} {values.tolist()} is not in 0..1", "mend the file")
-    return values
-
-
-def whole(file: GltfFile, where: str, holder: Json, key: str, default: int | None = None) -> int:
-    """Nonnegative integer of `holder`; raises `InputError` if it is not one."""
-    value = holder.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise refused(file, f"{where}: {key} is {value!r}, not a whole number of 0 or more")
-    return value
-
-
-def numbers(file: GltfFile, where: str, holder: Json, key: str, default: tuple[float, ...]) -> Array:
-    """Numbers, as many as the default has; raises `InputError` otherwise."""
-    values = holder.get(key, list(default))
-    if not isinstance(values, list) or len(values) != len(default):
-        raise refused(file, f"{where}: {key} is {values!r}, not {len(default)} numbers")
-    return np.array([number(file, where, {key: value}, key) for value in values])
-
-
-Triple = tuple[float, float, float]
-
-
-class Fields:
-    """Reader of the checked values of one JSON object; errors go into `problems`."""
-
-    def __init__(self, owner: object, where: str, problems: list[str]) -> None:
-        self.problems = problems
-        if not isinstance(owner, dict):
-            problems.append(f"{where} is {owner!r}, not an object")
-        self.values: Json = owner if isinstance(owner, dict) else {}
-
-    def number(self, key: str, default: float, low: float, high: float = math.inf, *, above: bool = False) -> float:
-        """A number in `low`..`high`; excluding `low` itself with `above`."""
-        value = self.values.get(key, default)
+    def number(
+        self,
+        key: str,
+        default: float | None = None,
+        low: float = -math.inf,
+        high: float = math.inf,
+        *,
+        above: bool = False,
+    ) -> float:
+        """A number in `low`..`high`, excluding `low` itself with `above`; without a default, it must be there."""
+        value, default = self.values.get(key, default), default or 0.0
         if isinstance(value, bool) or not isinstance(value, int | float):
-            self.problems.append(f"{key} is {value!r}, not a number")
+            self.refuse(f"{key} is {value!r}, not a number")
             return default
         if not low <= value <= high or (above and value == low):
             allowed = f"above {low:g}" if above else f"{low:g} or more" if math.isinf(high) else f"in {low:g}..{high:g}"
-            self.problems.append(f"{key} {value:g} is not {allowed}")
+            self.refuse(f"{key} {value:g} is not {allowed}", "mend the file")
             return default
         return float(value)
 
-    def triple(self, key: str, default: Triple) -> Triple:
-        """Three numbers in 0..1."""
-        value = self.values.get(key, list(default))
-        if not isinstance(value, list) or len(value) != 3:
-            self.problems.append(f"{key} is {value!r}, not three numbers")
+    def numbers(self, key: str, default: Numbers, low: float = -math.inf, high: float = math.inf) -> Numbers:
+        """As many numbers as the default has, each in `low`..`high`."""
+        found = self.values.get(key, list(default))
+        if not isinstance(found, list) or len(found) != len(default):
+            self.refuse(f"{key} is {found!r}, not {_COUNTS[len(default)]} numbers")
             return default
-        channels = Fields({f"{key}[{i}]": channel for i, channel in enumerate(value)}, key, self.problems)
-        red, green, blue = (channels.number(f"{key}[{i}]", default[i], 0.0, 1.0) for i in range(3))
-        return red, green, blue
+        parts = JsonFields(self.file, self.where, {f"{key}[{i}]": one for i, one in enumerate(found)}, self.problems)
+        checked = (parts.number(f"{key}[{i}]", one, low, high) for i, one in enumerate(default))
+        return cast(Numbers, tuple(checked))
 
-    def pair(self, key: str, default: tuple[float, float]) -> tuple[float, float]:
-        """Two numbers."""
-        value = self.values.get(key, list(default))
-        if not isinstance(value, list) or len(value) != 2:
-            self.problems.append(f"{key} is {value!r}, not two numbers")
-            return default
-        parts = Fields({f"{key}[{i}]": part for i, part in enumerate(value)}, key, self.problems)
-        return parts.number(f"{key}[0]", default[0], -math.inf), parts.number(f"{key}[1]", default[1], -math.inf)
-
-    def whole(self, key: str, default: int) -> int:
-        """A nonnegative integer."""
+    def whole(self, key: str, default: int | None = None) -> int:
+        """A whole number of 0 or more; without a default, it must be there."""
         value = self.values.get(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            self.problems.append(f"{key} is {value!r}, not a whole number of 0 or more")
-            return default
+            self.refuse(f"{key} is {value!r}, not a whole number of 0 or more")
+            return default or 0
         return value
-
-
-#: Largest number of names in a line.
-FIRST = 3
 
 
 class LeftOut:
@@ -149,9 +107,8 @@ class LeftOut:
 
     def lines(self) -> tuple[str, ...]:
         """Lines of text such as ``base color textures ('Label', 'Table', 'Wall' and 2 more)``."""
-        return tuple(f"{what} ({_listed(list(names))})" for what, names in self._names.items())
-
-
-def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - FIRST} more" if len(names) > FIRST else ""
-    return ", ".join(names[:FIRST]) + more
+        lines = []
+        for what, names in self._names.items():
+            more = f" and {len(names) - FIRST} more" if len(names) > FIRST else ""
+            lines.append(f"{what} ({', '.join(list(names)[:FIRST])}{more})")
+        return tuple(lines)

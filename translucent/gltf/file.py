@@ -36,6 +36,9 @@ MAGIC, GLB_VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
 
+#: Extensions that compress vertices, which are not read.
+COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+
 #: Bytes of the longest JSON, with all data in its links, which takes three times as much memory until it is decoded.
 MAX_JSON = 1 << 28
 
@@ -55,13 +58,17 @@ class GltfFile:
     _checked: dict[str, tuple[list[Json], int]] = field(default_factory=dict, init=False, repr=False, compare=False)
     _buffers: dict[int, bytes | memoryview] = field(default_factory=dict, init=False, compare=False, repr=False)
 
+    def refused(self, found: str, do: str = "export the file again") -> InputError:
+        """Error for a file that cannot be read as what it should be."""
+        return InputError(f"glTF {str(self.path)!r}", found, do)
+
     def items(self, key: str) -> list[Json]:
         """The objects of a top-level list such as ``"materials"``; raises `InputError` if it is not one."""
         found: list[Json] = self.tree.get(key, [])
         if (known := self._checked.get(key)) is not None and known[0] is found and known[1] == len(found):
             return known[0]
         if not (isinstance(found, list) and all(isinstance(item, dict) for item in found)):
-            raise InputError(f"glTF {str(self.path)!r}", f"{key} is not a list of objects", "export the file again")
+            raise self.refused(f"{key} is not a list of objects")
         self._checked[key] = found, len(found)
         return found
 
@@ -69,9 +76,7 @@ class GltfFile:
         """Object of such a list by index; raises `InputError` if there is none."""
         found = self.items(key)
         if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(found):
-            raise InputError(
-                f"glTF {str(self.path)!r}", f"{key} {index!r} is not one of {len(found)}", "export the file again"
-            )
+            raise self.refused(f"{key} {index!r} is not one of {len(found)}", "export the file again")
         return found[index]
 
     def resource(self, holder: Json) -> bytes:
@@ -81,9 +86,7 @@ class GltfFile:
             whole = self.buffer(view.get("buffer"))
             start, length = view.get("byteOffset", 0), view.get("byteLength", 0)
             if not (isinstance(start, int) and isinstance(length, int) and 0 <= start <= start + length <= len(whole)):
-                raise InputError(
-                    f"glTF {str(self.path)!r}", "a buffer view leaves its buffer", "copy or export the file again"
-                )
+                raise self.refused("a buffer view leaves its buffer", "copy or export the file again")
             return bytes(whole[start : start + length])
         return bytes(self._content(holder))
 
@@ -103,7 +106,7 @@ class GltfFile:
         if isinstance(uri := holder.get("uri"), str):
             return self._linked(uri)
         if len(self.chunks) < CHUNK.size or CHUNK.unpack_from(self.chunks)[1] != BINARY_CHUNK:
-            raise InputError(f"glTF {str(self.path)!r}", "it has no binary chunk", "copy or export the file again")
+            raise self.refused("it has no binary chunk", "copy or export the file again")
         return memoryview(self.chunks)[CHUNK.size : CHUNK.size + CHUNK.unpack_from(self.chunks)[0]]
 
     def _linked(self, uri: str) -> bytes:
@@ -245,8 +248,7 @@ def _append(binary: bytearray, data: bytes) -> int:
 def _content(file: GltfFile, index: int, buffer: Json) -> bytes:
     data, length = file.resource(buffer), buffer.get("byteLength")
     if not (isinstance(length, int) and 0 < length <= len(data)):
-        raise InputError(
-            f"glTF {str(file.path)!r}",
+        raise file.refused(
             f"buffer {index} should have {length!r} bytes and has {len(data)}",
             "copy or export the file again",
         )
@@ -320,7 +322,7 @@ def _move(file: GltfFile, old: Json, new: Json, places: dict[int, tuple[int, int
     """Move a buffer view to the new offset of its buffer."""
     index, offset = old.get("buffer"), old.get("byteOffset", 0)
     if not (isinstance(index, int) and index in places and isinstance(offset, int)):
-        raise InputError(f"glTF {str(file.path)!r}", f"a buffer view of buffer {index!r}", "export the file again")
+        raise file.refused(f"a buffer view of buffer {index!r}")
     new["buffer"], start = places[index]
     if start:
         new["byteOffset"] = start + offset

@@ -14,11 +14,16 @@ import numpy as np
 
 from translucent.arrays import Array
 from translucent.errors import InputError
-from translucent.gltf.fields import LeftOut, extension, label, number, numbers, refused, section
-from translucent.gltf.file import GltfFile, Json
+from translucent.gltf.fields import JsonFields, LeftOut, label
+from translucent.gltf.file import GltfFile
 from translucent.scene.camera import Camera
 from translucent.scene.lights import NARROWEST_CONE, DirectionalLight, PointLight, SpotLight
 from translucent.scene.scene import Light
+
+LIGHTS = "KHR_lights_punctual"
+
+#: A right angle in radians, and some roundings of float32.
+_RIGHT_ANGLE = 0.5 * math.pi * (1.0 + 1e-6)
 
 
 def scene_camera(
@@ -67,7 +72,7 @@ def scene_camera(
     pose[:3, 3] = matrix[:3, 3] * metres
     if np.linalg.det(matrix[:3, :3] / np.abs(matrix[:3, :3]).max()) < 0:
         left_out.add("mirroring cameras", label(nodes, node))
-    return _camera(file, where, cameras[camera], pose, metres)
+    return _camera(JsonFields(file, where, cameras[camera]), pose, metres)
 
 
 def _axes(file: GltfFile, where: str, linear: Array) -> Array:
@@ -83,32 +88,22 @@ def _axes(file: GltfFile, where: str, linear: Array) -> Array:
 def require_regular(file: GltfFile, where: str, linear: Array) -> None:
     """Raise `InputError` if a transform (3, 3) is singular."""
     if np.linalg.matrix_rank(linear) < 3:
-        raise refused(
-            file,
+        raise file.refused(
             f"{where}: its transform is singular (a scale of 0, in it or above it)",
             "give every axis a scale other than 0",
         )
 
 
-def _camera(file: GltfFile, where: str, entry: Json, pose: Array, metres: float) -> Camera:
-    kind = entry.get("type")
+def _camera(fields: JsonFields, pose: Array, metres: float) -> Camera:
+    kind = fields.values.get("type")
     if kind == "perspective":
-        angle = np.degrees(number(file, where, section(file, where, entry, kind), "yfov"))
+        angle = math.degrees(fields.section(kind).number("yfov"))
         if not 0 < angle < 180:
-            raise refused(file, f"{where}: yfov of {angle:g} degrees is not between 0 and 180", "mend the file")
-        return Camera(pose, fov_y=float(angle))
+            fields.refuse(f"yfov of {angle:g} degrees is not between 0 and 180", "mend the file")
+        return Camera(pose, fov_y=angle)
     if kind == "orthographic":
-        half = number(file, where, section(file, where, entry, kind), "ymag")
-        if not half > 0:
-            raise refused(file, f"{where}: ymag {half:g} is not above 0", "mend the file")
-        return Camera(pose, fov_y=None, height=2.0 * half * metres)
-    raise refused(file, f"{where}: type {kind!r} is neither perspective nor orthographic")
-
-
-LIGHTS = "KHR_lights_punctual"
-
-#: A right angle in radians, and some roundings of float32.
-_RIGHT_ANGLE = 0.5 * math.pi * (1.0 + 1e-6)
+        return Camera(pose, fov_y=None, height=2.0 * metres * fields.section(kind).number("ymag", low=0.0, above=True))
+    raise fields.file.refused(f"{fields.where}: type {kind!r} is neither perspective nor orthographic")
 
 
 def scene_lights(file: GltfFile, transforms: dict[int, Array], metres: float, left_out: LeftOut) -> list[Light]:
@@ -130,50 +125,48 @@ def scene_lights(file: GltfFile, transforms: dict[int, Array], metres: float, le
         If a light is wrong, or its node's transform is singular.
     """
     nodes = file.items("nodes")
-    listed = extension(file, "the file", file.tree, LIGHTS).get("lights", [])
+    listed = JsonFields(file, "the file", file.tree).extension(LIGHTS).values.get("lights", [])
     found: list[Light] = []
     for node, matrix in transforms.items():
         name = label(nodes, node)
         where = f"light of node {name}"
-        if not (placed := extension(file, where, nodes[node], LIGHTS)):
+        if not (placed := JsonFields(file, where, nodes[node]).extension(LIGHTS).values):
             continue
         index = placed.get("light")
         if not isinstance(listed, list) or isinstance(index, bool) or not isinstance(index, int):
-            raise refused(file, f"{where}: light {index!r} is not one of its lights")
+            raise file.refused(f"{where}: light {index!r} is not one of its lights")
         if not 0 <= index < len(listed) or not isinstance(listed[index], dict):
-            raise refused(file, f"{where}: light {index} is not one of {len(listed)}")
+            raise file.refused(f"{where}: light {index} is not one of {len(listed)}")
         require_regular(file, where, matrix[:3, :3])
-        found.append(_light(file, where, name, listed[index], matrix, metres, left_out))
+        light = listed[index]
+        if "range" in light and light.get("type") != "directional":
+            left_out.add("ranges of lights", name)
+        found.append(_light(JsonFields(file, where, light), matrix, metres))
     return found
 
 
-def _light(
-    file: GltfFile, where: str, name: str, entry: Json, matrix: Array, metres: float, left_out: LeftOut
-) -> Light:
-    color = numbers(file, where, entry, "color", (1.0, 1.0, 1.0))
-    strength = number(file, where, entry, "intensity", 1.0)
+def _light(fields: JsonFields, matrix: Array, metres: float) -> Light:
+    color = np.array(fields.numbers("color", (1.0, 1.0, 1.0)))
+    strength = fields.number("intensity", 1.0)
     if strength < 0 or (color < 0).any():
-        raise refused(file, f"{where}: intensity {strength:g}, color {color.tolist()}: below 0", "mend the file")
-    kind = entry.get("type")
+        fields.refuse(f"intensity {strength:g}, color {color.tolist()}: below 0", "mend the file")
+    kind = fields.values.get("type")
+    if kind not in ("point", "directional", "spot"):
+        fields.refuse(f"type {kind!r} is neither point, directional nor spot")
     if kind == "directional":
         return DirectionalLight(-matrix[:3, 2], strength * color)
-    if kind not in ("point", "spot"):
-        raise refused(file, f"{where}: type {kind!r} is neither point, directional nor spot")
-    if "range" in entry:
-        left_out.add("ranges of lights", name)
     position, intensity = matrix[:3, 3] * metres, strength * color * metres**2
     if kind == "point":
         return PointLight(position, intensity)
-    return SpotLight(position, -matrix[:3, 2], intensity, *_cones(file, where, section(file, where, entry, "spot")))
+    return SpotLight(position, -matrix[:3, 2], intensity, *_cones(fields.section("spot")))
 
 
-def _cones(file: GltfFile, where: str, spot: Json) -> tuple[float, float]:
+def _cones(spot: JsonFields) -> tuple[float, float]:
     """Half angles of the inner and the outer cone in degrees."""
-    inner = number(file, where, spot, "innerConeAngle", 0.0)
-    outer = number(file, where, spot, "outerConeAngle", math.pi / 4.0)
+    inner, outer = spot.number("innerConeAngle", 0.0), spot.number("outerConeAngle", math.pi / 4.0)
     # A right angle of float32 is a little more.
     degrees = math.degrees(inner), min(math.degrees(outer), 90.0) if outer < _RIGHT_ANGLE else math.degrees(outer)
     if not (0.0 <= degrees[0] < degrees[1] <= 90.0 and degrees[1] >= NARROWEST_CONE):
         found = f"innerConeAngle {inner:g}, outerConeAngle {outer:g}: not 0 <= inner < outer <= pi / 2"
-        raise refused(file, f"{where}: {found}", "mend the file")
+        spot.refuse(found, "mend the file")
     return degrees

@@ -15,8 +15,8 @@ from translucent.files.reading import require_room
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh, Triangles, joined
 from translucent.gltf.accessors import Accessors, raw_mesh
 from translucent.gltf.animations import posed
-from translucent.gltf.fields import LeftOut, label, refused
-from translucent.gltf.file import GltfFile, read_gltf
+from translucent.gltf.fields import LeftOut, label
+from translucent.gltf.file import COMPRESSIONS, GltfFile, read_gltf
 from translucent.gltf.lights import LIGHTS, scene_camera, scene_lights
 from translucent.gltf.materials import (
     CLEARCOAT,
@@ -57,7 +57,6 @@ _READ = (
 )
 #: Extensions that a file may require and that can be ignored: they only change the look of surfaces and textures.
 _LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_")
-_COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,13 +167,13 @@ def check_extensions(file: GltfFile, left_out: LeftOut, known: Collection[str] =
     for key in ("extensionsRequired", "extensionsUsed"):
         names = file.tree.get(key, [])
         if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
-            raise refused(file, f"{key} is {names!r}, not a list of names")
+            raise file.refused(f"{key} is {names!r}, not a list of names")
         for name in names:
             if name in _READ or name in known:
                 continue
             if key == "extensionsRequired" and not name.startswith(_LOOKS):
-                do = "export it without compression" if name in _COMPRESSIONS else "export it without this extension"
-                raise refused(file, f"it requires {name}, which is not supported", do)
+                do = "export it without compression" if name in COMPRESSIONS else "export it without this extension"
+                raise file.refused(f"it requires {name}, which is not supported", do)
             left_out.add("extensions", name)
 
 
@@ -186,7 +185,7 @@ def scene_transforms(file: GltfFile, left_out: LeftOut) -> dict[int, Array]:
     for node, matrix in transforms.items():
         if not (np.abs(matrix) <= MAX_COORDINATE).all():
             where = f"node {label(file.items('nodes'), node)}"
-            raise refused(file, f"{where}: its transform exceeds {MAX_COORDINATE:g}", "export the file again")
+            raise file.refused(f"{where}: its transform exceeds {MAX_COORDINATE:g}", "export the file again")
     return transforms
 
 
@@ -199,7 +198,7 @@ def _scene_nodes(file: GltfFile, left_out: LeftOut) -> Iterator[int]:
     chosen = file.tree.get("scene", 0)
     roots = file.item("scenes", chosen).get("nodes", [])
     if not isinstance(roots, list):
-        raise refused(file, f"scene {chosen}: nodes is {roots!r}, not a list")
+        raise file.refused(f"scene {chosen}: nodes is {roots!r}, not a list")
     for i in range(len(scenes)):
         if i != chosen:
             left_out.add("other scenes", label(scenes, i))
@@ -242,7 +241,7 @@ def read_whole(path: Path, allow_outside: bool = False) -> Triangles:
                 require_room(f"glTF {str(path)!r}", "its parts in all places", size, file.stored, "split the file")
                 parts.append(_placed(mesh, matrix))
     if not parts:
-        raise refused(file, "it has no faces", "give a triangle mesh, not points or lines")
+        raise file.refused("it has no faces", "give a triangle mesh, not points or lines")
     return joined(parts, f"glTF {str(path)!r}")
 
 

@@ -71,9 +71,9 @@ import numpy as np
 from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
-from translucent.gltf.fields import Fields, Triple
+from translucent.gltf.fields import JsonFields, Triple
 from translucent.gltf.file import GltfFile, Json, read_gltf
-from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform, stated_texture
+from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform, texture_transform
 from translucent.media.albedo import hulst_albedo, hulst_color
 from translucent.media.conversion import html_strip
 from translucent.media.medium import BLACKEST, Medium, extinction_at
@@ -123,27 +123,26 @@ class DraftScattering:
         return Medium((1.0 - share) * extinction, share * extinction, anisotropy=self.anisotropy, ior=ior)
 
 
-def read_draft(extensions: Json, problems: list[str], told: list[str]) -> DraftScattering | None:
+def read_draft(extensions: JsonFields, told: list[str]) -> DraftScattering | None:
     """Scattering that a material's extensions state; the newer draft wins. None if there is none.
 
     Parameters
     ----------
-    extensions : dict
-    problems : list of str
-        Gets values of a wrong type or beyond their range.
+    extensions : JsonFields
     told : list of str
         Gets what is not read.
     """
-    name = next((one for one in (SCATTER, VOLUME_SCATTER) if one in extensions), None)
+    name = next((one for one in (SCATTER, VOLUME_SCATTER) if one in extensions.values), None)
     if name is None:
         return None
-    fields = Fields(extensions[name], name, problems)
+    fields = extensions.section(name)
     told += [f"{name} has {key}, which is not read" for key in fields.values if key.endswith("Texture")]
     anisotropy = fields.number("scatterAnisotropy", 0.0, -1.0, 1.0)
     if abs(anisotropy) == 1.0:
-        problems.append(f"scatterAnisotropy {anisotropy:g} is not between -1 and 1")
+        fields.refuse(f"scatterAnisotropy {anisotropy:g} is not between -1 and 1")
         anisotropy = 0.0
-    color = fields.triple(_spelling(fields, _COLORS), (1.0, 1.0, 1.0) if name == SCATTER else (0.0, 0.0, 0.0))
+    default: Triple = (1.0, 1.0, 1.0) if name == SCATTER else (0.0, 0.0, 0.0)
+    color = fields.numbers(_spelling(fields, _COLORS), default, 0.0, 1.0)
     strength = 1.0 if name == VOLUME_SCATTER else fields.number(_spelling(fields, _STRENGTHS), 0.0, 0.0, 1.0)
     if name == SCATTER and not any(key in fields.values for key in _STRENGTHS):
         told.append(f"{name} has no scatterStrengthFactor, which is 0 by default: nothing scatters")
@@ -167,7 +166,7 @@ def check_draft(draft: Draft | None) -> None:
         raise InputError(f"draft_extensions {draft!r}", "not known", f"use {' or '.join(map(repr, DRAFTS))}, or None")
 
 
-def _spelling(fields: Fields, names: Sequence[str]) -> str:
+def _spelling(fields: JsonFields, names: Sequence[str]) -> str:
     """The first of several names that is stated, or the first of all."""
     return next((name for name in names if name in fields.values), names[0])
 
@@ -320,7 +319,16 @@ def materials_of(file: GltfFile, *, draft_extensions: bool = False) -> list[Gltf
     return [_material(file, index, entry, draft_extensions) for index, entry in enumerate(file.items("materials"))]
 
 
-def _film_thickness(film: Fields) -> float:
+def volume_extensions_of(index: int, material: Json) -> Json:
+    """Extensions of a material in a file's JSON; raises `InputError` if one of them excludes a volume."""
+    found: Json = material.setdefault("extensions", {})
+    if excluded := [name for name in EXCLUDED if name in found]:
+        asked = f"material {index} {material.get('name', '')!r}"
+        raise InputError(asked, f"{excluded[0]} excludes a volume", "give the object another material")
+    return found
+
+
+def _film_thickness(film: JsonFields) -> float:
     """Thickness of a film in nanometres: the mean of both ends where a texture chooses between them."""
     least, greatest = (
         film.number(f"iridescenceThickness{end}", nm, 0.0) for end, nm in (("Minimum", 100.0), ("Maximum", 400.0))
@@ -332,21 +340,22 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
     name = str(entry.get("name", ""))
     problems: list[str] = []
     told: list[str] = []
-    extensions = Fields(entry.get("extensions", {}), "extensions", problems).values
+    fields = JsonFields(file, f"material {index} {name!r}", entry, problems)
+    stated = fields.section("extensions")
+    extensions = stated.values
     transmission, volume, ior, strength, dispersion, film, coat = (
-        Fields(extensions.get(key, {}), key, problems)
+        stated.section(key)
         for key in (TRANSMISSION, VOLUME, IOR, EMISSIVE_STRENGTH, DISPERSION, IRIDESCENCE, CLEARCOAT)
     )
-    surface = Fields(entry.get("pbrMetallicRoughness", {}), "pbrMetallicRoughness", problems).values
     problems += [
         f"{key} is below pbrMetallicRoughness, where it has no meaning"
-        for key in Fields(surface.get("extensions", {}), "extensions", problems).values
+        for key in fields.section("pbrMetallicRoughness").section("extensions").values
         if key.startswith("KHR_materials_")
     ]
     scale = strength.number("emissiveStrength", 1.0, 0.0)
-    red, green, blue = Fields(entry, "material", problems).triple("emissiveFactor", (0.0, 0.0, 0.0))
+    red, green, blue = fields.numbers("emissiveFactor", (0.0, 0.0, 0.0), 0.0, 1.0)
     index_of_refraction = ior.number("ior", DEFAULT_IOR, 0.0)
-    texture, transform = stated_texture(volume, "thicknessTexture", len(file.items("textures")))
+    texture, transform = _thickness_texture(volume, len(file.items("textures")))
     if 0 < index_of_refraction < 1:
         problems.append(f"ior {index_of_refraction:g} is not 0, and not 1 or more")
     found = GltfMaterial(
@@ -355,7 +364,7 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
         transmission=(share := transmission.number("transmissionFactor", 0.0, 0.0, 1.0)),
         ior=index_of_refraction,
         thickness=volume.number("thicknessFactor", 0.0, 0.0),
-        attenuation_color=volume.triple("attenuationColor", (1.0, 1.0, 1.0)),
+        attenuation_color=volume.numbers("attenuationColor", (1.0, 1.0, 1.0), 0.0, 1.0),
         attenuation_distance=volume.number("attenuationDistance", math.inf, 0.0, above=True),
         dispersion=dispersion.number("dispersion", 0.0, 0.0),
         iridescence=film.number("iridescenceFactor", 0.0, 0.0, 1.0),
@@ -366,15 +375,26 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
         emissive=(scale * red, scale * green, scale * blue),
         thickness_texture=texture,
         thickness_transform=transform,
-        scatter=read_draft(extensions, problems, told) if draft_extensions else None,
+        scatter=read_draft(stated, told) if draft_extensions else None,
         has_volume=VOLUME in extensions,
         transmits=share > 0 or _lets_light_in(extensions),
     )
     if problems:
-        raise InputError(
-            f"glTF {str(file.path)!r}", f"material {index} {name!r}: {', '.join(problems)}", "mend the file"
-        )
+        raise file.refused(f"{fields.where}: {', '.join(problems)}", "mend the file")
     return GltfMaterial(**{**vars(found), "warnings": (*_warnings(found, entry, extensions, volume.values), *told)})
+
+
+def _thickness_texture(volume: JsonFields, count: int) -> tuple[int | None, TextureTransform]:
+    """Index of the thickness texture among so many, and its transform; None if there is none."""
+    key = "thicknessTexture"
+    info = volume.section(key)
+    if key not in volume.values or info.values is not volume.values[key]:
+        return None, TextureTransform()
+    index = info.values.get("index")
+    if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < count:
+        volume.refuse(f"{key} index {index!r} is not one of {count} textures")
+        return None, TextureTransform()
+    return index, texture_transform(info)
 
 
 def _lets_light_in(extensions: Json) -> bool:

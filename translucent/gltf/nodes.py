@@ -20,7 +20,7 @@ from translucent.arrays import Array
 from translucent.errors import InputError, close_names, did_you_mean
 from translucent.files.reading import shown
 from translucent.files.unpacking import open_picture
-from translucent.gltf.fields import extension, refused
+from translucent.gltf.fields import JsonFields
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.materials import GltfMaterial
 from translucent.gltf.textures import sample
@@ -43,11 +43,11 @@ def node_transforms(file: GltfFile) -> dict[int, Array]:
     while pending:
         index, above = pending.pop()
         if index in transforms:
-            raise InputError(f"glTF {str(file.path)!r}", f"node {index} has two parents", "export the file again")
+            raise file.refused(f"node {index} has two parents")
         transforms[index] = above @ _local(file, index, nodes[index])
         pending += [(child, transforms[index]) for child in _indices(file, nodes[index])]
     if len(transforms) < len(nodes):
-        raise InputError(f"glTF {str(file.path)!r}", "nodes are their own parents", "export the file again")
+        raise file.refused("nodes are their own parents")
     return transforms
 
 
@@ -55,10 +55,10 @@ def primitives(file: GltfFile, mesh: Json) -> list[Json]:
     """The primitives of a mesh; raises `InputError` if they are not a list of objects."""
     found = mesh.get("primitives")
     if not (isinstance(found, list) and all(isinstance(item, dict) for item in found)):
-        raise InputError(f"glTF {str(file.path)!r}", "a mesh has no list of primitives", "export the file again")
+        raise file.refused("a mesh has no list of primitives")
     for primitive in found:
         if not isinstance(primitive.get("attributes"), dict):
-            raise InputError(f"glTF {str(file.path)!r}", "a primitive has no attributes", "export the file again")
+            raise file.refused("a primitive has no attributes")
         if "material" in primitive:
             file.item("materials", primitive["material"])
     return found
@@ -66,9 +66,9 @@ def primitives(file: GltfFile, mesh: Json) -> list[Json]:
 
 def variant_names(file: GltfFile) -> tuple[str, ...]:
     """Names of the variants of a file, in its order; raises `InputError` if they are not a list of named objects."""
-    listed = extension(file, "the file", file.tree, VARIANTS).get("variants", [])
+    listed = JsonFields(file, "the file", file.tree).extension(VARIANTS).values.get("variants", [])
     if not (isinstance(listed, list) and all(isinstance(one, dict) for one in listed)):
-        raise refused(file, f"{VARIANTS}: variants is not a list of objects")
+        raise file.refused(f"{VARIANTS}: variants is not a list of objects")
     return tuple(str(one.get("name", f"variant {i}")) for i, one in enumerate(listed))
 
 
@@ -104,23 +104,32 @@ def material_index(file: GltfFile, primitive: Json, variant: int | None) -> int 
     own: int | None = primitive.get("material")
     if variant is None:
         return own
-    mappings = extension(file, "a primitive", primitive, VARIANTS).get("mappings", [])
+    mappings = JsonFields(file, "a primitive", primitive).extension(VARIANTS).values.get("mappings", [])
     if not (isinstance(mappings, list) and all(isinstance(one, dict) for one in mappings)):
-        raise refused(file, f"{VARIANTS}: mappings is not a list of objects")
+        raise file.refused(f"{VARIANTS}: mappings is not a list of objects")
     for mapping in mappings:
         users = mapping.get("variants")
         if not isinstance(users, list):
-            raise refused(file, f"{VARIANTS}: a mapping has no list of variants")
+            raise file.refused(f"{VARIANTS}: a mapping has no list of variants")
         if variant in users:
             file.item("materials", mapping.get("material"))
             return int(mapping["material"])
     return own
 
 
+def variant_materials(file: GltfFile, primitive: Json) -> list[int]:
+    """Materials that variants give a primitive."""
+    try:
+        mappings = primitive.get("extensions", {}).get(VARIANTS, {}).get("mappings", [])
+        return [int(mapping["material"]) for mapping in mappings]
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise file.refused(f"{VARIANTS} is malformed") from error
+
+
 def _indices(file: GltfFile, node: Json) -> list[int]:
     found = node.get("children", [])
     if not isinstance(found, list):
-        raise InputError(f"glTF {str(file.path)!r}", f"children {found!r}", "export the file again")
+        raise file.refused(f"children {found!r}")
     for index in found:
         file.item("nodes", index)
     return found
@@ -144,9 +153,7 @@ def _local(file: GltfFile, index: int, node: Json) -> Array:
         matrix[:3, :3] = turn * scale
         matrix[:3, 3] = np.array(node.get("translation", [0, 0, 0]), dtype=np.float64).reshape(3)
     except (TypeError, ValueError) as error:
-        raise InputError(
-            f"glTF {str(file.path)!r}", f"node {index} has no valid transform", "export it again"
-        ) from error
+        raise file.refused(f"node {index} has no valid transform") from error
     return matrix
 
 

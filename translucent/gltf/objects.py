@@ -51,7 +51,7 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.geometry.mesh import MIN_DIAGONAL, Mesh
 from translucent.gltf.accessors import Accessors, primitive_mesh
-from translucent.gltf.fields import LeftOut, extension, label, number, refused, section, share, shares
+from translucent.gltf.fields import JsonFields, LeftOut, label
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.materials import (
     CLEARCOAT,
@@ -83,8 +83,8 @@ UNREAD_TEXTURES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Finish:
-    """Finish of an object: its surface, its medium, and whether it is a thin wall.
+class SceneMaterial:
+    """Material of objects in a scene: surface, medium, and whether it makes a thin wall.
 
     Attributes
     ----------
@@ -130,14 +130,14 @@ class Finish:
         return Medium(absorption=extinction_at(color, thickness), ior=self.wall_ior or DEFAULT_IOR)
 
 
-#: Finish of a mesh with vertex colors and no material: matte.
-VERTEX_COLORED = Finish((1.0, 1.0, 1.0), surface=Surface(roughness=1.0, ior=1.0))
+#: Material of a mesh with vertex colors and no material: matte.
+VERTEX_COLORED = SceneMaterial((1.0, 1.0, 1.0), surface=Surface(roughness=1.0, ior=1.0))
 
 
-def finish_reader(
+def material_reader(
     file: GltfFile, metres: float, left_out: LeftOut, draft_extensions: bool = False
-) -> Callable[[int | None], Finish]:
-    """Function from the index of a material to its finish, each read once; None is the index of no material.
+) -> Callable[[int | None], SceneMaterial]:
+    """Function from the index of a material to what it is in a scene, each read once; None is the index of none.
 
     Parameters
     ----------
@@ -153,11 +153,11 @@ def finish_reader(
     textures = Textures(file, left_out)
 
     @cache
-    def read(index: int | None) -> Finish:
+    def read(index: int | None) -> SceneMaterial:
         if index is None:
-            return Finish()
+            return SceneMaterial()
         name = label(entries, index)
-        return _Reader(file, name, materials[index], entries[index], textures, left_out).finish(metres)
+        return _Reader(file, name, materials[index], entries[index], textures, left_out).read(metres)
 
     return read
 
@@ -170,57 +170,52 @@ class _Reader:
     ) -> None:
         self.file, self.name, self.material, self.entry = file, name, material, entry
         self.textures, self.left_out = textures, left_out
-        self.where = f"material {name}"
-        self.base = section(file, self.where, entry, "pbrMetallicRoughness")
-        self.base_color = shares(file, self.where, self.base, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
+        self.fields = JsonFields(file, f"material {name}", entry)
+        self.base = self.fields.section("pbrMetallicRoughness")
+        *color, self.opacity = self.base.numbers("baseColorFactor", (1.0, 1.0, 1.0, 1.0), 0.0, 1.0)
+        self.color = np.array(color)
+        self.diffuse = self.fields.extension(DIFFUSE_TRANSMISSION)
+        self.alpha_mode = entry.get("alphaMode", "OPAQUE")
+        if self.alpha_mode not in ("OPAQUE", "MASK", "BLEND"):
+            self.fields.refuse(f"alphaMode {self.alpha_mode!r} is none of glTF 2.0")
+        self.alpha_cutoff = self.fields.number("alphaCutoff", 0.5, 0.0) if self.alpha_mode == "MASK" else 0.0
 
-    def finish(self, metres: float) -> Finish:
-        """Finish of its objects; `metres` are per unit of the file."""
-        found = self._finish(metres)
-        opacity, mode = float(self.base_color[3]), self._alpha_mode()
+    def read(self, metres: float) -> SceneMaterial:
+        """Material of its objects; `metres` are per unit of the file."""
+        found = self._without_alpha(metres)
         if found.surface is not None and not found.unlit:
             for name, (keys, what) in UNREAD_TEXTURES.items():
-                if any(key in self._extension(name) for key in keys):
+                if any(key in self.fields.extension(name).values for key in keys):
                     self.left_out.add(what, self.name)
         return dataclasses.replace(
-            found, hidden=self._hidden(), blends=mode == "BLEND", opacity=opacity, name=self.name
+            found,
+            hidden=self.opacity < self.alpha_cutoff,
+            blends=self.alpha_mode == "BLEND",
+            opacity=self.opacity,
+            name=self.name,
         )
 
-    def _finish(self, metres: float) -> Finish:
-        """Finish of its objects, without the effect of alpha."""
-        color, diffuse = self.base_color[:3], self._extension(DIFFUSE_TRANSMISSION)
-        passes = share(self.file, self.where, diffuse, "diffuseTransmissionFactor", 0.0) > 0
+    def _without_alpha(self, metres: float) -> SceneMaterial:
+        passes = self.diffuse.number("diffuseTransmissionFactor", 0.0, 0.0, 1.0) > 0
         medium, transmission = self.material.medium(), self.material.transmission
-        if UNLIT in section(self.file, self.where, self.entry, "extensions"):
-            return Finish(color, surface=self._unlit(), unlit=True)
+        if UNLIT in self.fields.section("extensions").values:
+            return SceneMaterial(self.color, surface=self._unlit(), unlit=True)
         if medium is not None and (transmission > 0 or passes):
             absorption, scattering = np.asarray(medium.absorption), np.asarray(medium.scattering)
             medium = dataclasses.replace(medium, absorption=absorption / metres, scattering=scattering / metres)
-            return Finish(color, medium, surface=self._translucent(color))
+            return SceneMaterial(self.color, medium, surface=self._translucent(self.color))
+        ior = self.material.ior or DEFAULT_IOR
         if transmission > 0:
-            whole = transmission == 1 and "transmissionTexture" not in self._extension(TRANSMISSION)
-            surface = self._translucent(np.ones(3) if whole else color)
-            return Finish(color, wall_ior=self.material.ior or DEFAULT_IOR, surface=surface)
-        return Finish(color, surface=self._opaque())
-
-    def _opaque(self) -> Surface:
-        return dataclasses.replace(
-            self._with_sides(self._common()),
-            color=self.base_color[:3],
-            ior=self.material.ior or DEFAULT_IOR,
-        )
+            whole = transmission == 1 and "transmissionTexture" not in self.fields.extension(TRANSMISSION).values
+            surface = self._translucent(np.ones(3) if whole else self.color)
+            return SceneMaterial(self.color, wall_ior=ior, surface=surface)
+        opaque = dataclasses.replace(self._with_sides(self._common()), color=self.color, ior=ior)
+        return SceneMaterial(self.color, surface=opaque)
 
     def _unlit(self) -> Surface:
-        texture, color = self._color_texture(), self.base_color[:3]
-        black = Surface(
-            color=(0, 0, 0),
-            ior=1.0,
-            emissive=color,
-            emissive_texture=texture,
-            color_texture=texture,
-            alpha_cutoff=self._cutoff(),
-        )
-        return self._with_sides(black)
+        texture, cutoff = self._color_texture(), self._texture_cutoff()
+        black = Surface(color=(0, 0, 0), ior=1.0, emissive=self.color, color_texture=texture, alpha_cutoff=cutoff)
+        return self._with_sides(dataclasses.replace(black, emissive_texture=texture))
 
     def _translucent(self, color: Array) -> Surface:
         if (dispersion := self.material.dispersion) > MAX_DISPERSION:
@@ -229,72 +224,50 @@ class _Reader:
             self._common(),
             color=color,
             transmission=self.material.transmission,
-            transmission_texture=self.textures.read(self.name, self._extension(TRANSMISSION), "transmissionTexture"),
+            transmission_texture=self.textures.read(
+                self.name, self.fields.extension(TRANSMISSION).values, "transmissionTexture"
+            ),
             dispersion=min(dispersion, MAX_DISPERSION),
         )
 
     def _common(self) -> Surface:
         """Surface parameters common to all kinds of objects."""
-        file, where, diffuse = self.file, self.where, self._extension(DIFFUSE_TRANSMISSION)
-        steep = number(file, where, section(file, where, self.entry, "normalTexture"), "scale", 1.0)
+        steep = self.fields.section("normalTexture").number("scale", 1.0)
+        strength = self.fields.section("occlusionTexture").number("strength", 1.0, 0.0, 1.0)
         return Surface(
-            roughness=share(file, where, self.base, "roughnessFactor", 1.0),
+            roughness=self.base.number("roughnessFactor", 1.0, 0.0, 1.0),
             iridescence=self.material.iridescence,
             iridescence_ior=min(self.material.iridescence_ior, MAX_IOR),
             iridescence_thickness=min(self.material.iridescence_thickness, MAX_FILM),
             clearcoat=self.material.clearcoat,
             clearcoat_roughness=self.material.clearcoat_roughness,
-            metallic=share(file, where, self.base, "metallicFactor", 1.0),
-            diffuse_transmission=share(file, where, diffuse, "diffuseTransmissionFactor", 0.0),
-            diffuse_transmission_color=shares(file, where, diffuse, "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0)),
-            alpha_cutoff=self._cutoff(),
+            metallic=self.base.number("metallicFactor", 1.0, 0.0, 1.0),
+            diffuse_transmission=self.diffuse.number("diffuseTransmissionFactor", 0.0, 0.0, 1.0),
+            diffuse_transmission_color=self.diffuse.numbers(
+                "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0), 0.0, 1.0
+            ),
+            alpha_cutoff=self._texture_cutoff(),
             emissive=self.material.emissive,
             emissive_texture=self.textures.read(self.name, self.entry, "emissiveTexture", srgb=True),
-            occlusion_texture=self._occlusion(),
+            occlusion_texture=self.textures.read(self.name, self.entry, "occlusionTexture", strength=strength),
             color_texture=self._color_texture(),
-            roughness_texture=self.textures.read(self.name, self.base, "metallicRoughnessTexture"),
+            roughness_texture=self.textures.read(self.name, self.base.values, "metallicRoughnessTexture"),
             normal_texture=self.textures.read(self.name, self.entry, "normalTexture", normal_scale=steep),
         )
 
     def _color_texture(self) -> Texture | None:
-        return self.textures.read(self.name, self.base, "baseColorTexture", srgb=True)
+        return self.textures.read(self.name, self.base.values, "baseColorTexture", srgb=True)
 
     def _with_sides(self, surface: Surface) -> Surface:
         """Surface of an opaque object with its visible sides."""
         double_sided = self.entry.get("doubleSided", False)
         if not isinstance(double_sided, bool):
-            raise refused(self.file, f"{self.where}: doubleSided is {double_sided!r}, not true or false")
+            self.fields.refuse(f"doubleSided is {double_sided!r}, not true or false")
         return dataclasses.replace(surface, double_sided=double_sided)
 
-    def _occlusion(self) -> Texture | None:
-        info = section(self.file, self.where, self.entry, "occlusionTexture")
-        strength = share(self.file, self.where, info, "strength", 1.0)
-        return self.textures.read(self.name, self.entry, "occlusionTexture", strength=strength)
-
-    def _alpha_mode(self) -> str:
-        mode = self.entry.get("alphaMode", "OPAQUE")
-        if mode not in ("OPAQUE", "MASK", "BLEND"):
-            raise refused(self.file, f"{self.where}: alphaMode {mode!r} is none of glTF 2.0")
-        return str(mode)
-
-    def _cutoff(self) -> float:
+    def _texture_cutoff(self) -> float:
         """Alpha of texture and vertices below which there is a hole: the rest of alpha is a factor."""
-        if self._alpha_mode() != "MASK":
-            return 0.0
-        return min(self._alpha_cutoff() / max(float(self.base_color[3]), 1e-9), 1.0)
-
-    def _alpha_cutoff(self) -> float:
-        cutoff = number(self.file, self.where, self.entry, "alphaCutoff", 0.5)
-        if cutoff < 0:
-            raise refused(self.file, f"{self.where}: alphaCutoff {cutoff:g} is below 0", "mend the file")
-        return cutoff
-
-    def _hidden(self) -> bool:
-        """True if alpha is below the cutoff everywhere."""
-        return self.entry.get("alphaMode") == "MASK" and bool(self.base_color[3] < self._alpha_cutoff())
-
-    def _extension(self, name: str) -> Json:
-        return extension(self.file, self.where, self.entry, name)
+        return min(self.alpha_cutoff / max(self.opacity, 1e-9), 1.0)
 
 
 #: Thickness of a thin wall as a share of the scene's diagonal: too little to see, enough to count as covered.
@@ -342,65 +315,64 @@ def scene_objects(
     InputError
         If there is no object or no such variant, or something about one is wrong.
     """
-    finish_of = finish_reader(file, metres, left_out, draft_extensions)
+    material_of = material_reader(file, metres, left_out, draft_extensions)
     scale = np.diag([metres, metres, metres, 1.0])
     objects: list[Object] = []
-    finishes: list[Finish] = []
-    for mesh, material, node in _placed_meshes(file, transforms, left_out, variant_index(file, variant)):
-        finish, surface = _fitted(finish_of(material), mesh, left_out)
-        if finish.hidden:
+    materials: list[SceneMaterial] = []
+    for mesh, index, node in _placed_meshes(file, transforms, left_out, variant_index(file, variant)):
+        material, surface = _fitted(material_of(index), mesh, left_out)
+        if material.hidden:
             left_out.add("objects hidden by their alpha", repr(mesh.name))
             continue
-        objects.append(Object(mesh, None, scale @ transforms[node], color=finish.color, surface=surface))
-        finishes.append(finish)
+        objects.append(Object(mesh, None, scale @ transforms[node], color=material.color, surface=surface))
+        materials.append(material)
     if not objects:
-        raise refused(file, "its scene has no triangles", "give a file with a mesh")
+        raise file.refused("its scene has no triangles", "give a file with a mesh")
     boxes = np.stack([item.bounds for item in objects])
     diagonal = float(np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)))
     wall = max(WALL_SHARE * diagonal, MIN_DIAGONAL)
-    return [_with_medium(item, finish, wall) for item, finish in zip(objects, finishes, strict=True)]
+    return [_with_medium(item, material, wall) for item, material in zip(objects, materials, strict=True)]
 
 
-def _fitted(finish: Finish, mesh: Mesh, left_out: LeftOut) -> tuple[Finish, Surface | None]:
-    """Finish of a material on a mesh, and the part of its surface that the mesh supports."""
-    if finish.surface is None and mesh.colors is not None:
-        finish = VERTEX_COLORED
-    if finish.unlit and mesh.colors is not None and (mesh.colors[:, :3] < 1).any():
+def _fitted(material: SceneMaterial, mesh: Mesh, left_out: LeftOut) -> tuple[SceneMaterial, Surface | None]:
+    """Material as a mesh has it, and the part of its surface that the mesh supports."""
+    if material.surface is None and mesh.colors is not None:
+        material = VERTEX_COLORED
+    if material.unlit and mesh.colors is not None and (mesh.colors[:, :3] < 1).any():
         left_out.add("vertex colors of unlit objects", repr(mesh.name))
-    if (surface := _fitting(finish.surface, mesh, left_out)) is None:
-        return finish, None
-    if finish.blends:
-        finish = _blended(finish, surface, mesh, left_out)
-    if finish.medium is not None and not finish.hidden:
-        surface = _without_holes(surface, finish, mesh, left_out)
-    if finish.translucent and _has_metal(surface, mesh):
+    if (surface := material.surface) is None:
+        return material, None
+    if mesh.uv is None and any(surface.textures):
+        left_out.add("textures of meshes without TEXCOORD_0", repr(mesh.name))
+        without: dict[str, Any] = dict.fromkeys(TEXTURE_FIELDS)
+        surface = dataclasses.replace(surface, **without)
+    if material.blends:
+        material = _blended(material, surface, mesh, left_out)
+    if material.medium is not None and not material.hidden:
+        if surface.alpha_cutoff > _alpha(surface, mesh):
+            what = "holes of solids by alphaMode MASK, drawn closed (a solid with a hole has no inside)"
+            left_out.add(what, material.name)
+        surface = dataclasses.replace(surface, alpha_cutoff=0.0)
+    # A metallicFactor alone does not tell, since its default is 1 for glass, too.
+    metals = surface.roughness_texture if material.translucent and surface.metallic > 0 else None
+    if metals is not None and mesh.uv is not None and (metals.sample(mesh.uv)[:, 2] > _METAL).any():
         left_out.add("metal parts of translucent objects", repr(mesh.name))
-    return finish, surface
+    return material, surface
 
 
-def _blended(finish: Finish, surface: Surface, mesh: Mesh, left_out: LeftOut) -> Finish:
-    """Finish of a material with alphaMode BLEND on a mesh: opaque where its alpha is 1 all over, and hidden where it is
-    0.
-    """
-    least = finish.opacity * _alpha(surface, mesh)
-    if finish.translucent:
+def _blended(material: SceneMaterial, surface: Surface, mesh: Mesh, left_out: LeftOut) -> SceneMaterial:
+    """Material with alphaMode BLEND on a mesh: opaque where its alpha is 1 all over, and hidden where it is 0."""
+    least = material.opacity * _alpha(surface, mesh)
+    if material.translucent:
         if least < 1:
-            left_out.add("alphaMode BLEND of translucent objects", finish.name)
-        return finish
-    if finish.opacity == 0:
-        return dataclasses.replace(finish, hidden=True)
+            left_out.add("alphaMode BLEND of translucent objects", material.name)
+        return material
+    if material.opacity == 0:
+        return dataclasses.replace(material, hidden=True)
     if least == 1:
-        return dataclasses.replace(finish, blends=False)
-    left_out.add(BLENDED, finish.name)
-    return finish
-
-
-def _without_holes(surface: Surface, finish: Finish, mesh: Mesh, left_out: LeftOut) -> Surface:
-    """Surface of a solid without holes, since a solid cannot have any."""
-    if surface.alpha_cutoff > _alpha(surface, mesh):
-        what = "holes of solids by alphaMode MASK, drawn closed (a solid with a hole has no inside)"
-        left_out.add(what, finish.name)
-    return dataclasses.replace(surface, alpha_cutoff=0.0)
+        return dataclasses.replace(material, blends=False)
+    left_out.add(BLENDED, material.name)
+    return material
 
 
 def _alpha(surface: Surface, mesh: Mesh) -> float:
@@ -410,29 +382,13 @@ def _alpha(surface: Surface, mesh: Mesh) -> float:
     return least * (1.0 if mesh.colors is None else float(mesh.colors[:, 3].min()))
 
 
-def _with_medium(item: Object, finish: Finish, wall: float) -> Object:
-    if item.surface is not None and finish.blends and not finish.translucent:
-        surface = dataclasses.replace(item.surface, opacity=finish.opacity)
+def _with_medium(item: Object, material: SceneMaterial, wall: float) -> Object:
+    if item.surface is not None and material.blends and not material.translucent:
+        surface = dataclasses.replace(item.surface, opacity=material.opacity)
         return dataclasses.replace(item, medium=_CLEAR, sheet_thickness=wall, surface=surface)
-    if finish.wall_ior is not None:
-        return dataclasses.replace(item, medium=finish.wall_medium(wall), sheet_thickness=wall)
-    return dataclasses.replace(item, medium=finish.medium)
-
-
-def _fitting(surface: Surface | None, mesh: Mesh, left_out: LeftOut) -> Surface | None:
-    """Surface without its textures if the mesh has no coordinates for them."""
-    if surface is None or mesh.uv is not None or not any(surface.textures):
-        return surface
-    left_out.add("textures of meshes without TEXCOORD_0", repr(mesh.name))
-    without: dict[str, Any] = dict.fromkeys(TEXTURE_FIELDS)
-    return dataclasses.replace(surface, **without)
-
-
-def _has_metal(surface: Surface, mesh: Mesh) -> bool:
-    """True if a vertex is on metal; a metallicFactor alone does not tell, since its default is 1 for glass, too."""
-    if surface.metallic == 0 or surface.roughness_texture is None or mesh.uv is None:
-        return False
-    return bool((surface.roughness_texture.sample(mesh.uv)[:, 2] > _METAL).any())
+    if material.wall_ior is not None:
+        return dataclasses.replace(item, medium=material.wall_medium(wall), sheet_thickness=wall)
+    return dataclasses.replace(item, medium=material.medium)
 
 
 def _placed_meshes(
@@ -455,8 +411,11 @@ def _placed_meshes(
                 name = _mesh_name(nodes[node], entry, index, shared=users[index] > 1) + (
                     f"[{i}]" if len(listed) > 1 else ""
                 )
-                known[index, i] = primitive_mesh(accessors, primitive, name)
-                _note_losses(primitive, name, known[index, i], left_out)
+                known[index, i] = made = primitive_mesh(accessors, primitive, name)
+                if made is None:
+                    left_out.add("points and lines", repr(name))
+                elif primitive.get("targets"):
+                    left_out.add("morph targets", repr(name))
             if (mesh := known[index, i]) is not None:
                 yield mesh, material_index(file, primitive, variant), node
 
@@ -468,11 +427,3 @@ def _mesh_name(node: Json, entry: Json, index: int, *, shared: bool) -> str:
         if isinstance(name, str) and name:
             return name
     return f"mesh {index}"
-
-
-def _note_losses(primitive: Json, name: str, mesh: Mesh | None, left_out: LeftOut) -> None:
-    if mesh is None:
-        left_out.add("points and lines", repr(name))
-        return
-    if primitive.get("targets"):
-        left_out.add("morph targets", repr(name))

@@ -24,7 +24,7 @@ from translucent.arrays import Array
 from translucent.errors import InputError, UnreadableError
 from translucent.files.unpacking import open_picture
 from translucent.formulas.color import srgb_to_linear
-from translucent.gltf.fields import Fields, LeftOut, extension, label, number, numbers, refused, section, whole
+from translucent.gltf.fields import JsonFields, LeftOut, label
 from translucent.gltf.file import GltfFile, Json
 from translucent.scene.texture import Texture, Wrap
 
@@ -59,21 +59,13 @@ class TextureTransform:
         return np.stack([c * u + s * v + self.offset[0], c * v - s * u + self.offset[1]], axis=-1)
 
 
-def stated_texture(fields: Fields, key: str, count: int) -> tuple[int | None, TextureTransform]:
-    """Index of a texture among so many, and its transform, as a material states them; None if it states none."""
-    if key not in fields.values:
-        return None, TextureTransform()
-    info = Fields(fields.values[key], key, fields.problems)
-    index = info.values.get("index")
-    if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < count:
-        fields.problems.append(f"{key} index {index!r} is not one of {count} textures")
-        return None, TextureTransform()
-    extensions = Fields(info.values.get("extensions", {}), f"{key} extensions", fields.problems).values
-    stated = Fields(extensions.get(TEXTURE_TRANSFORM, {}), TEXTURE_TRANSFORM, fields.problems)
-    return index, TextureTransform(
-        stated.pair("offset", (0.0, 0.0)),
-        stated.number("rotation", 0.0, -math.inf),
-        stated.pair("scale", (1.0, 1.0)),
+def texture_transform(info: JsonFields) -> TextureTransform:
+    """Transform that a texture info states, or none."""
+    stated = info.extension(TEXTURE_TRANSFORM)
+    return TextureTransform(
+        stated.numbers("offset", (0.0, 0.0)),
+        stated.number("rotation", 0.0),
+        stated.numbers("scale", (1.0, 1.0)),
         stated.whole("texCoord", info.whole("texCoord", 0)),
     )
 
@@ -155,9 +147,8 @@ class Textures:
         if key not in holder:
             return None
         where = f"{key} of material {name}"
-        info = section(self._file, where, holder, key)
-        entry = self._file.item("textures", info.get("index"))
-        transform = self._transform(where, info)
+        info = JsonFields(self._file, where, holder).section(key)
+        entry, transform = self._file.item("textures", info.values.get("index")), texture_transform(info)
         if transform.tex_coord != 0:
             self._left_out.add(f"textures over TEXCOORD_{transform.tex_coord}", name)
             return None
@@ -176,20 +167,10 @@ class Textures:
             self._made[made] = _texture(pixels, wraps, transform)
         return self._made[made]
 
-    def _transform(self, where: str, info: Json) -> TextureTransform:
-        stated = extension(self._file, where, info, TEXTURE_TRANSFORM)
-        offset, scale = (
-            numbers(self._file, where, stated, key, (default, default))
-            for key, default in (("offset", 0), ("scale", 1))
-        )
-        rotation = number(self._file, where, stated, "rotation", 0.0)
-        tex_coord = whole(self._file, where, stated, "texCoord", whole(self._file, where, info, "texCoord", 0))
-        return TextureTransform((offset[0], offset[1]), rotation, (scale[0], scale[1]), tex_coord)
-
     def _wrap(self, where: str, sampler: Json, axis: str) -> str:
         code = sampler.get(axis, 10497)
         if not isinstance(code, int) or code not in _WRAPS:
-            raise refused(self._file, f"{where}: {axis} {code!r} is none of glTF 2.0")
+            raise self._file.refused(f"{where}: {axis} {code!r} is none of glTF 2.0")
         return _WRAPS[code]
 
     def _picture(self, index: int, name: str) -> Bytes | None:

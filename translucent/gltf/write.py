@@ -24,7 +24,6 @@ from translucent.gltf.materials import (
     DEFAULT_IOR,
     DIFFUSE_TRANSMISSION,
     DRAFTS,
-    EXCLUDED,
     IOR,
     SCATTER,
     TRANSMISSION,
@@ -33,8 +32,9 @@ from translucent.gltf.materials import (
     check_draft,
     draft_extension,
     materials_of,
+    volume_extensions_of,
 )
-from translucent.gltf.nodes import primitives
+from translucent.gltf.nodes import primitives, variant_materials
 from translucent.media.medium import Medium, color_at
 
 
@@ -144,14 +144,15 @@ def write_media(
     for filling in fillings:
         targets = _own_materials(edited, filling.object_name, entered)
         for index, sizes in targets.items():
-            _give(edited, index, filling.medium, filling.distance, filling.thickness, sizes, filling.keep_ior)
+            _fill(edited, index, filling, sizes)
             if draft_extensions is not None:
-                _give_draft(edited, index, filling.medium, draft_extensions)
+                _state_scattering(edited, index, filling.medium, draft_extensions)
         held |= targets.keys()
     used = tree.setdefault("extensionsUsed", [])
     if not isinstance(used, list):
-        raise InputError(f"glTF {str(file.path)!r}", f"extensionsUsed is {used!r}, not a list", "export the file again")
-    used += [name for name in (TRANSMISSION, VOLUME, IOR, *DRAFTS.values()) if name not in used and _uses(tree, name)]
+        raise file.refused(f"extensionsUsed is {used!r}, not a list")
+    stated = {name for material in tree["materials"] for name in material.get("extensions", {})}
+    used += [name for name in (TRANSMISSION, VOLUME, IOR, *DRAFTS.values()) if name in stated and name not in used]
     media = [filling.medium for filling in fillings]
     if any(medium.emits or (medium.scatters and draft_extensions is None) for medium in media):
         lost = "glTF holds absorption only: scattering is written as extinction, emission is lost"
@@ -162,10 +163,6 @@ def write_media(
     return sorted(held)
 
 
-def _uses(tree: Json, extension: str) -> bool:
-    return any(extension in material.get("extensions", {}) for material in tree["materials"])
-
-
 def _own_materials(file: GltfFile, object_name: str | None, entered: set[int]) -> dict[int, list[float]]:
     """Indices of the materials of the named objects and of them alone, each with the sizes of its objects.
 
@@ -174,15 +171,12 @@ def _own_materials(file: GltfFile, object_name: str | None, entered: set[int]) -
     meshes = file.items("meshes")
     mine = set(range(len(meshes))) if object_name is None else _meshes_named(file, object_name)
     if not mine:
-        raise InputError(f"glTF {str(file.path)!r}", "it has no mesh", "give a model with a mesh")
+        raise file.refused("it has no mesh", "give a model with a mesh")
     used = {primitive.get("material") for index in mine for primitive in primitives(file, meshes[index])}
     chosen = used & entered if object_name is None else set()
-    taken = {
-        primitive.get("material")
-        for index, mesh in enumerate(meshes)
-        for primitive in primitives(file, mesh)
-        if index not in mine
-    } | _in_variants(file)
+    every = [(index, primitive) for index, mesh in enumerate(meshes) for primitive in primitives(file, mesh)]
+    taken = {primitive.get("material") for index, primitive in every if index not in mine}
+    taken |= {material for _, primitive in every for material in variant_materials(file, primitive)}
     copies: dict[Any, int] = {}
     sizes: dict[int, list[float]] = {}
     materials = file.tree.setdefault("materials", [])
@@ -237,57 +231,30 @@ def _meshes_named(file: GltfFile, name: str) -> set[int]:
     return set(copies.values())
 
 
-def _in_variants(file: GltfFile) -> set[Any]:
-    """Materials used by variants."""
-    try:
-        return {
-            mapping.get("material")
-            for mesh in file.items("meshes")
-            for primitive in primitives(file, mesh)
-            for mapping in primitive.get("extensions", {}).get("KHR_materials_variants", {}).get("mappings", [])
-        }
-    except (AttributeError, TypeError) as error:
-        raise InputError(
-            f"glTF {str(file.path)!r}", "KHR_materials_variants is malformed", "export it again"
-        ) from error
-
-
 def _smallest_side(file: GltfFile, primitive: Json) -> float:
     """Smallest side of a primitive's box, which glTF states with its positions."""
     accessor = file.item("accessors", primitive["attributes"].get("POSITION"))
     try:
         return min(float(high) - float(low) for low, high in zip(accessor["min"], accessor["max"], strict=True))
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"glTF {str(file.path)!r}", "positions without min and max", "export the file again"
-        ) from error
+        raise file.refused("positions without min and max") from error
 
 
-def _give(
-    file: GltfFile,
-    index: int,
-    medium: Medium,
-    distance: float | None,
-    thickness: float | None,
-    sizes: list[float],
-    keep_ior: bool,
-) -> None:
-    """Write the medium into one material."""
+def _fill(file: GltfFile, index: int, filling: Filling, sizes: list[float]) -> None:
+    """Write the medium into one material, whose objects have these smallest sides."""
     material = file.item("materials", index)
-    asked = f"material {index} {material.get('name', '')!r}"
-    extensions = material.setdefault("extensions", {})
-    if excluded := [name for name in EXCLUDED if name in extensions]:
-        raise InputError(asked, f"{excluded[0]} excludes a volume", "give the object another material")
+    extensions = volume_extensions_of(index, material)
     before = extensions.get(VOLUME, {})
-    factor = before.get("thicknessFactor", 0) or max(sizes) if thickness is None else thickness
+    factor = before.get("thicknessFactor", 0) or max(sizes) if filling.thickness is None else filling.thickness
     if not factor > 0:
+        asked = f"material {index} {material.get('name', '')!r}"
         raise InputError(asked, "its objects are flat and have no thickness", "give one, or choose another object")
-    ior = extensions.get(IOR, {}).get("ior", DEFAULT_IOR) if keep_ior else medium.ior
-    made = volume_extensions(medium, distance, factor, ior)
+    ior = extensions.get(IOR, {}).get("ior", DEFAULT_IOR) if filling.keep_ior else filling.medium.ior
+    made = volume_extensions(filling.medium, filling.distance, factor, ior)
     kept = {key: value for key, value in before.items() if key not in ("attenuationColor", "attenuationDistance")}
     made[VOLUME] = kept | made[VOLUME]
     made[IOR] = extensions.get(IOR, {}) | made[IOR]
-    if keep_ior and IOR not in extensions:
+    if filling.keep_ior and IOR not in extensions:
         del made[IOR]
     passing = extensions.get(TRANSMISSION, {})
     if passing.get("transmissionFactor", 0) > 0:
@@ -299,7 +266,7 @@ def _give(
     material.pop("doubleSided", None)
 
 
-def _give_draft(file: GltfFile, index: int, medium: Medium, draft: Draft) -> None:
+def _state_scattering(file: GltfFile, index: int, medium: Medium, draft: Draft) -> None:
     """State in one material how the medium scatters, by a draft of an extension alone."""
     material = file.item("materials", index)
     extensions, made = material["extensions"], draft_extension(medium, draft)

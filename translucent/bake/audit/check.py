@@ -32,7 +32,7 @@ from translucent.bake.audit.rules import (
 )
 from translucent.bake.bake import bake_thickness
 from translucent.bake.gltf_builder import GlbBuilder
-from translucent.bake.gltf_targets import Bodies, Target, find_targets, triangle_primitives
+from translucent.bake.gltf_targets import Bodies, Target, find_targets, require_uncompressed, triangle_primitives
 from translucent.bake.jobs import ON_SURFACE
 from translucent.bake.settings import BakeSettings
 from translucent.bake.thickness_map import ThicknessMap, check_map_output, write_maps
@@ -41,8 +41,6 @@ from translucent.gltf.fields import label
 from translucent.gltf.file import GltfFile, read_gltf, write_gltf
 from translucent.gltf.materials import materials_of
 from translucent.gltf.nodes import node_transforms
-
-_COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 @checked
@@ -76,9 +74,7 @@ def check_materials(path: str | Path, *, allow_outside: bool = False) -> Materia
 
 def check_file(file: GltfFile) -> MaterialCheck:
     """Check an open file; see `check_materials`."""
-    required = file.tree.get("extensionsRequired", [])
-    if packed := [name for name in _COMPRESSIONS if name in required]:
-        raise InputError(f"glTF {str(file.path)!r}", f"it requires {packed[0]}", "export it without compression")
+    require_uncompressed(file)
     materials, entries = materials_of(file), file.items("materials")
     found: list[MaterialFinding] = []
     for material in materials:
