@@ -245,7 +245,7 @@ def test_a_split_shows_another_method_and_then_the_reference(
     work.draw_reference(scene, None, SIZE, (1,))
     wait(work, lambda: work.truth is not None and work.lanes["truth"].task is None)
     finish(view, work)
-    assert view.has_truth
+    assert view.presenter.truth is not None
     truth = view.probe(80, 48, 1)
     assert truth is not None
     assert truth.thickness == pytest.approx(solid.thickness, rel=1e-4, abs=1e-9)

@@ -20,7 +20,6 @@ from translucent.preview.document import (
     Material,
     Model,
     Orbit,
-    Triple,
     checked,
     medium_fields,
     panned,
@@ -198,21 +197,16 @@ def changed_material(material: Material, name: str, value: Any) -> Material:
         values["phase"] = ""
     material = dataclasses.replace(material, **values)
     if name in ("color", "distance"):
-        return dataclasses.replace(material, source="color", preset="", absorption=_absorption_of_color(material))
+        absorption = extinction_from_colors(material.color, material.distance)
+        if not (absorption <= MAX_COEFFICIENT).all():
+            found = "so short that the extinction overflows"
+            raise InputError(f"distance {material.distance:g} m", found, "check the unit")
+        return dataclasses.replace(material, source="color", preset="", absorption=triple_of(absorption))
     if name == "absorption" or (name in _OF_PRESET and material.source == "preset"):
         return _with_color(dataclasses.replace(material, source="coefficients", preset=""))
     if material.source == "file" and name != "source":
         return dataclasses.replace(material, source="coefficients")
     return material
-
-
-def _absorption_of_color(material: Material) -> Triple:
-    """Absorption in 1/m of a color at a distance."""
-    absorption = extinction_from_colors(material.color, material.distance)
-    if not (absorption <= MAX_COEFFICIENT).all():
-        found = "so short that the extinction overflows"
-        raise InputError(f"distance {material.distance:g} m", found, "check the unit")
-    return triple_of(absorption)
 
 
 def preset_material(material: Material, name: str) -> Material:

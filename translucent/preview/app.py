@@ -18,6 +18,7 @@ from translucent.errors import RenderError
 from translucent.files.images import write_png
 from translucent.files.paths import write_atomically
 from translucent.gpu.context import open_context
+from translucent.gpu.drivers import avoid_full_cache
 from translucent.preview.dialogs import accept_drops
 from translucent.preview.document import Document
 from translucent.preview.panels.files import file_browser, files_panel
@@ -98,6 +99,7 @@ def run(
     window = _Window(document, script, allow_outside)
     params = window.params(size, scale)
     with _warnings_as_messages(window.work):
+        avoid_full_cache()
         try:
             hello_imgui.run(params)
         except RuntimeError as error:

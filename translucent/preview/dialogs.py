@@ -124,24 +124,15 @@ class Browser:
                 for entry in entries:
                     if entry.name.startswith("."):
                         continue
-                    is_folder = _is_folder(entry)
-                    if is_folder or self.every or self._fits(entry.name):
+                    is_folder, lower = os.path.isdir(entry.path), entry.name.lower()
+                    fits = any(fnmatch.fnmatchcase(lower, pattern) for pattern in self.patterns)
+                    if is_folder or self.every or fits:
                         found.append(Entry(entry.name, is_folder))
                     if len(found) >= MOST_ENTRIES:
                         break
         except OSError as error:
             self.problem = f"{self.folder}: {error.strerror}"
         return sorted(found, key=lambda one: (not one.is_folder, one.name.lower(), one.name))
-
-    def _fits(self, name: str) -> bool:
-        return any(fnmatch.fnmatchcase(name.lower(), pattern) for pattern in self.patterns)
-
-
-def _is_folder(entry: os.DirEntry[str]) -> bool:
-    try:
-        return entry.is_dir()
-    except OSError:
-        return False
 
 
 def with_recent(folders: list[str], path: str | Path, most: int = 8) -> list[str]:

@@ -26,7 +26,7 @@ from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.scene import Object
 from translucent.scene.showcase import DEFAULT_COLOR, framing
 from translucent.scene.stages import NO_STAGE, STAGES, world_vertices
-from translucent.scene.surface import MAX_DISPERSION, MAX_FILM
+from translucent.scene.surface import MAX_DISPERSION, MAX_FILM, Surface
 from translucent.units import METRES_PER_UNIT, metres_per_unit
 
 Triple = tuple[float, float, float]
@@ -42,18 +42,6 @@ STAGE_WORDS = (AUTO, NO_STAGE, *STAGES)
 
 #: Units of length that panels offer.
 SHOWN_UNITS = ("mm", "cm", "m", "in")
-
-#: Fields of a material that its surface has, too.
-FINISH = (
-    "roughness",
-    "transmission",
-    "dispersion",
-    "iridescence",
-    "iridescence_ior",
-    "iridescence_thickness",
-    "clearcoat",
-    "clearcoat_roughness",
-)
 
 #: Largest elevation of a camera: closer to the poles, "up" would lose its meaning.
 MAX_PITCH = 89.9
@@ -127,6 +115,12 @@ class Material:
         """Parts of the finish that neither presets nor options of the command line hold."""
         parts = ("transmission", "dispersion", "iridescence", "clearcoat")
         return [name for name in parts if getattr(self, name) != getattr(Material, name)]
+
+
+#: Fields of a material that its surface has, too; color and ior are those of its medium.
+FINISH = tuple(
+    name for name in Material.__dataclass_fields__ if name in Surface.__dataclass_fields__.keys() - {"color", "ior"}
+)
 
 
 @dataclass(frozen=True)

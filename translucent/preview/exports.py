@@ -87,15 +87,8 @@ def write_picture(
     """Write a .png, or an .exr with all quantities; a transparent one has the bodies alone."""
     report(None, "drawing")
     with Renderer() as renderer:
-        frame = renderer.render(
-            scene,
-            size,
-            method,
-            samples=SAMPLES,
-            transparent=transparent,
-            scattering=scattering,
-            caustics=caustics,
-        )
+        options: dict[str, Any] = {"transparent": transparent, "scattering": scattering, "caustics": caustics}
+        frame = renderer.render(scene, size, method, samples=SAMPLES, **options)
     report(None, "writing")
     frame.save(path, *look)
 
@@ -129,13 +122,11 @@ class Bake:
     Attributes
     ----------
     map : ThicknessMap
-    mode : str
     scene : Scene
         The model painted with it.
     """
 
     map: ThicknessMap
-    mode: str
     scene: Scene
     _seen: tuple[Orbit, Scene] | None = None
 
@@ -148,7 +139,7 @@ class Bake:
         """Text of the largest value."""
         values = self.map.values[self.map.coverage]
         most = float(values.max(initial=0.0))
-        return f"{most:.3g}" if self.mode == "local" else length_text(most, unit)
+        return f"{most:.3g}" if self.map.settings.mode == "local" else length_text(most, unit)
 
     def seen_from(self, orbit: Orbit) -> Scene:
         """Scene of the painted model; the same object while the camera stays."""
@@ -165,7 +156,7 @@ def bake_map(task: Task, pool: Pool, body: Object, medium: Medium, mode: str, si
     # xatlas holds the interpreter's lock while it makes texture coordinates.
     baked, normals = pool.call(task, _bake, body.mesh, options, urgency=Urgency.LATER)
     keep_drawn_normals(baked.mesh, normals)
-    return Bake(baked, mode, painted(dataclasses.replace(body, mesh=baked.mesh), baked))
+    return Bake(baked, painted(dataclasses.replace(body, mesh=baked.mesh), baked))
 
 
 def _bake(mesh: Mesh, options: dict[str, Any]) -> tuple[ThicknessMap, npt.NDArray[np.float32]]:

@@ -52,6 +52,35 @@ WATCH = 1.0
 #: Source of presets that are saved here.
 SAVED = "saved in the previewer"
 
+#: Names of built-in environments, colors among them; empty: the stage's, or the model's own.
+BUILT_IN = ("", "light-table", "studio", "checkerboard", "#ffffff", "#404040")
+
+#: Suffixes of files that are listed: those of pictures that hold light. Others can be opened.
+ENVIRONMENT_SUFFIXES = (".hdr", ".exr", ".pic")
+
+#: Largest number of files that are listed.
+MOST_FILES = 5000
+
+Picture = npt.NDArray[np.uint8]
+
+#: Sides in pixels of pictures of media, environments and models.
+BALL, PANORAMA, MODEL = (96, 96), (128, 64), (120, 80)
+
+#: Radius of the ball in metres: a body of some centimetres, for which most media are known.
+RADIUS = 0.01
+
+#: Samples of a pixel, and directions of the environment with shadows.
+SAMPLES, SHADOWS = 4, ShadowMaps(directions=8)
+
+#: Version of how the pictures are made, raised when they change: kept ones are then made again.
+LOOK = 1
+
+#: Pictures that are read from the disk in one frame.
+READ_AT_ONCE = 4
+
+#: Largest number of pictures in memory.
+MOST_KEPT = 1024
+
 
 class Library:
     """Library of materials.
@@ -116,30 +145,17 @@ class Library:
         if time.monotonic() - self._checked < WATCH:
             return
         self._checked = time.monotonic()
-        if (files := _files(self.folder)) == self._files:
+        try:
+            with os.scandir(self.folder) as entries:
+                files = {(e.name, e.stat().st_mtime_ns, e.stat().st_size) for e in entries if e.is_file()}
+        except OSError:
+            files = set()
+        if files == self._files:
             return
         self._files, self._searched = files, None
         self._own, wrong = read_own_presets(self.folder)
         for error in wrong:
             self._refuse(error)
-
-
-def _files(folder: Path) -> list[tuple[str, int, int]]:
-    try:
-        with os.scandir(folder) as entries:
-            return sorted((e.name, e.stat().st_mtime_ns, e.stat().st_size) for e in entries if e.is_file())
-    except OSError:
-        return []
-
-
-#: Names of built-in environments, colors among them; empty: the stage's, or the model's own.
-BUILT_IN = ("", "light-table", "studio", "checkerboard", "#ffffff", "#404040")
-
-#: Suffixes of files that are listed: those of pictures that hold light. Others can be opened.
-ENVIRONMENT_SUFFIXES = (".hdr", ".exr", ".pic")
-
-#: Largest number of files that are listed.
-MOST_FILES = 5000
 
 
 class EnvironmentFolder:
@@ -182,27 +198,6 @@ class EnvironmentFolder:
 def title(name: str) -> str:
     """Name that a user reads."""
     return Path(name).stem if Path(name).suffix.lower() in READERS else name or "own"
-
-
-Picture = npt.NDArray[np.uint8]
-
-#: Sides in pixels of pictures of media, environments and models.
-BALL, PANORAMA, MODEL = (96, 96), (128, 64), (120, 80)
-
-#: Radius of the ball in metres: a body of some centimetres, for which most media are known.
-RADIUS = 0.01
-
-#: Samples of a pixel, and directions of the environment with shadows.
-SAMPLES, SHADOWS = 4, ShadowMaps(directions=8)
-
-#: Version of how the pictures are made, raised when they change: kept ones are then made again.
-LOOK = 1
-
-#: Pictures that are read from the disk in one frame.
-READ_AT_ONCE = 4
-
-#: Largest number of pictures in memory.
-MOST_KEPT = 1024
 
 
 def ball_key(one: Preset) -> str:

@@ -176,15 +176,6 @@ class Compiler:
 
         return self.lane.start(name, work, then)
 
-    def take(self, found: Compiled, missing: ProgramName | None = None) -> None:
-        """Let the context build the programs found, and the one that was `missing`, even if it was not."""
-        if found.programs is None:
-            self.budget.postpones = False
-        else:
-            self.budget.elsewhere |= found.programs
-        if missing is not None:
-            self.budget.elsewhere.add(missing)
-
 
 def compile_frames(scene: Scene, plans: Sequence[RenderPlan], device: str, presents: bool = False) -> Compiled:
     """Draw a scene by plans, as it is drawn while it moves and at rest, and return the programs that this needed.

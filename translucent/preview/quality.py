@@ -107,11 +107,6 @@ class StepTiming:
     passes: dict[str, float] | None = None
     share: float = 1.0
 
-    @property
-    def gpu(self) -> float:
-        """Sum over the passes."""
-        return sum((self.passes or {}).values())
-
 
 class StepTimes:
     """Seconds that whole pictures took, by the method and passes of their plans, and how coarse quick ones must be."""

@@ -113,7 +113,11 @@ class Script:
         """Do the next action, if it is time; returns whether all are done."""
         state.hold_pointer()
         if self._waiting is not None:
-            if not self._rested(state):
+            passed = time.monotonic() - self._waiting
+            if state.waits:
+                time.sleep(PAUSE)
+            busy = (state.more or state.work.thumbnails.busy) and passed <= PATIENCE
+            if passed < self._until if self._until >= 0 else passed <= 0.5 or busy:
                 return False
             self._waiting = None
         self._frames += 1
@@ -128,15 +132,6 @@ class Script:
             self._waiting, self._until = time.monotonic(), step.values["seconds"]
         VERBS[step.do](state, **step.values)
         return False
-
-    def _rested(self, state: WindowState) -> bool:
-        assert self._waiting is not None
-        passed = time.monotonic() - self._waiting
-        if state.waits:
-            time.sleep(PAUSE)
-        if self._until >= 0:
-            return passed >= self._until
-        return passed > 0.5 and (not (state.more or state.work.thumbnails.busy) or passed > PATIENCE)
 
 
 def read_script(path: str | Path) -> Script:

@@ -31,17 +31,12 @@ def to_table(document: Document) -> dict[str, Any]:
     for section in _SECTIONS:
         value = getattr(document, section)
         if value is not None:
-            table[section] = _listed(value)
+            table[section] = dataclasses.asdict(value)
     if document.assigned:
-        table["assigned"] = [{"object": one.object, "material": _listed(one.material)} for one in document.assigned]
+        table["assigned"] = [dataclasses.asdict(one) for one in document.assigned]
     if document.hidden:
         table["hidden"] = list(document.hidden)
     return table
-
-
-def _listed(value: Any) -> dict[str, Any]:
-    fields = dataclasses.asdict(value)
-    return {key: list(v) if isinstance(v, tuple) else v for key, v in fields.items()}
 
 
 def from_table(table: dict[str, Any], where: str) -> Document:

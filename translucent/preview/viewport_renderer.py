@@ -72,6 +72,7 @@ class ViewportRenderer:
         Paths of the still picture.
     photons : PhotonRefinement
         Photons of the still picture, unless it is made of paths.
+    presenter : Presenter
     state : str
         Which picture is on show: one that moves, one that becomes sharp, or the full one.
     simpler : str
@@ -103,7 +104,7 @@ class ViewportRenderer:
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
         self._requested: Task | None = None
-        self._presenter, self._times = _Presenter(), StepTimes()
+        self.presenter, self._times = Presenter(), StepTimes()
         self._frame_budget, self._budget = FrameBudget(), BUDGET
         self._strides = Strides(self._times)
         self.quality = InteractiveQuality(traced_at_once=compiler is None)
@@ -189,7 +190,7 @@ class ViewportRenderer:
             self.plans = [plan(method), plan(second) if both else None]
             self._shown = wanted
             self.viewport.restart()
-            self._presenter.truth = None
+            self.presenter.truth = None
             self._strides.begin(self.plans, self._budget)
             self._moving, self.simpler = None, ""
             if self._compiler is not None and self._compiler.budget.postpones and unsmoothed(scene, self._drawn_plans):
@@ -202,7 +203,7 @@ class ViewportRenderer:
         still = (display.converges or display.follows_photons) and self.quality.traceable(workspace, scene)
         lit = still and display.follows_photons and self.viewport.steps(0) >= self._strides.of[0] ** 2
         # A large picture takes as long to be shown as a step: it has a frame for that alone.
-        alone = self._presenter.begin(workspace, scene, self.viewport, self._shown)
+        alone = self.presenter.begin(workspace, scene, self.viewport, self._shown)
         antialias = display.antialias and not workspace.relights
         drawn = not lit and not alone and any(self._step(side, scene, antialias) for side in sides)
         more = drawn or alone or workspace.relights
@@ -213,7 +214,7 @@ class ViewportRenderer:
             more, drawn = self._light_by_photons(scene, method, workspace)
             if self.photons.light is None and not more:  # there are no photons to follow
                 more = drawn = self._step(0, scene, display.antialias)
-        return self._presenter.present(self.viewport, changed=drawn, last=not more) or more
+        return self.presenter.present(self.viewport, changed=drawn, last=not more) or more
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
@@ -243,7 +244,7 @@ class ViewportRenderer:
             self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
         elif shadows is not None:
             self.simpler = f"shadows from {shadows.directions} directions of the environment while the picture moves"
-        self._presenter.shown = ()
+        self.presenter.shown = ()
         return True
 
     def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
@@ -289,11 +290,6 @@ class ViewportRenderer:
         self._times.note(plan, wall * stride * stride)
         self.timings[side] = StepTiming(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
 
-    @property
-    def has_truth(self) -> bool:
-        """True if the split shows the reference."""
-        return self._presenter.truth is not None
-
     def probe(self, x: int, y: int, side: int = 0) -> PixelProbe | None:
         """Values of a pixel of a side, once it is final."""
         done = self._strides.of[side] ** 2 if side == 0 or self.plans[1] is not None else 1
@@ -334,7 +330,7 @@ class ViewportRenderer:
         if self._requested is not None and self._requested.cancelled:
             # The user does not wait, so that the window does the work.
             self._requested = None
-            compiler.take(Compiled(frozenset()), program)
+            self._take_compiled(workspace, Compiled(frozenset()), program)
             for mesh in unsmoothed(scene, self._drawn_plans):
                 drawn_normals(mesh)
         elif compiler.lane.task is None or not compiler.lane.task.name:  # work that nobody waits for is replaced
@@ -342,9 +338,12 @@ class ViewportRenderer:
             self._requested = compiler.request("preparing the picture", scene, self._drawn_plans, then)
 
     def _take_compiled(self, workspace: Workspace, found: Compiled, missing: ProgramName | None = None) -> None:
+        """Let the context build the programs found, and the one that was `missing`, even if it was not."""
         assert self._compiler is not None
-        self._compiler.take(found, missing)
+        budget = self._compiler.budget
+        budget.elsewhere |= (found.programs or set()) | ({missing} if missing is not None else set())
         if found.programs is None:
+            budget.postpones = False
             text = f"shaders are compiled in the window, which stands still meanwhile: {found.problem}"
             workspace.tell("warning", text)
 
@@ -380,7 +379,6 @@ class ViewportRenderer:
                     for plan in self._drawn_plans:
                         choices: dict[str, Any] = {"interfaces": plan.interfaces, "scattering": self.quality.scattering}
                         viewport.step(0, scene, fresh.plan(scene, plan.method, **choices), 1)
-                viewport.restart()
                 viewport.resize(size)
             except TranslucentError as error:
                 self.shader_problem = str(error)
@@ -390,7 +388,7 @@ class ViewportRenderer:
                 return
             self._release()
             self.renderer, self.viewport, self.shader_problem = fresh, viewport, ""
-            self._shown = self._presenter.shown = ()
+            self._shown = self.presenter.shown = ()
         workspace.tell("info", "shaders reloaded")
 
     def _release(self) -> None:
@@ -407,7 +405,7 @@ class ViewportRenderer:
             self._own.gl.release()
 
 
-class _Presenter:
+class Presenter:
     """Presentation of the samples of a viewport as the document asks for it, with the reference beside them.
 
     Attributes

@@ -42,6 +42,12 @@ from translucent.scene.showcase import fillable
 PICKED_AT_ONCE = 200_000
 
 
+def pixel_at(position: tuple[float, float], size: tuple[int, int]) -> tuple[int, int]:
+    """Pixel at a position in fractions of a picture."""
+    x, y = (min(max(int(share * side), 0), side - 1) for share, side in zip(position, size, strict=True))
+    return x, y
+
+
 @dataclass
 class ProbedPixel:
     """Pixel under the mouse, with the reference's values for it, once they are requested and known."""
@@ -67,7 +73,7 @@ class WindowState:
     waits : bool
         Nothing can be drawn before other work is done.
     pressed_at : (x, y)
-        Where a button of the mouse was pressed, in pixels.
+        Where a button of the mouse was pressed, in fractions of the viewport.
     dragging_split : bool
     texts : dict
         Texts in fields that are not entered yet.
@@ -248,11 +254,11 @@ class WindowState:
         def take(found: int | None) -> None:
             then(shown[found] if found is not None and found < len(shown) else None)
 
-        x, y = (min(max(int(share * side), 0), side - 1) for share, side in zip(position, size, strict=True))
+        pixel = pixel_at(position, size)
         if self.work.loaded is not None and self.work.loaded.triangles <= PICKED_AT_ONCE:
-            self.work.lanes["ray"].start("", lambda _: first_object(scene, size, (x, y)), take)
+            self.work.lanes["ray"].start("", lambda _: first_object(scene, size, pixel), take)
         else:
-            self.work.cross(scene, size, (x, y), lambda found: take(found.body))
+            self.work.cross(scene, size, pixel, lambda found: take(found.body))
 
     def hide(self, number: int) -> None:
         """Hide an object, or show it again; the last one on show stays."""

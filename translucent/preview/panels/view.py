@@ -22,7 +22,6 @@ from translucent.preview.panels.widgets import (
     begin_rows,
     check,
     choice,
-    combo,
     draw_cards,
     fact,
     row,
@@ -82,15 +81,13 @@ def _environment(state: WindowState, label: str, name: str, empty: str) -> None:
     field = f"look.{name}"
     row(label, TIPS[field])
     now = state.get(field)
-    options: list[tuple[str, str | None]] = [(word or empty, word) for word in BUILT_IN]
-
-    def choose(word: str | None) -> None:
-        if word is None:
+    if imgui.begin_combo(f"##{field}", now or empty):
+        for word in BUILT_IN:
+            if imgui.selectable(word or empty, word == now)[0]:
+                state.work.do(SetField(field, word))
+        if imgui.selectable("a file ...", False)[0]:
             state.ask_file(name)
-        else:
-            state.work.do(SetField(field, word))
-
-    combo(field, now or empty, [*options, ("a file ...", None)], now, choose)
+        imgui.end_combo()
 
 
 def environments_panel(state: WindowState) -> None:
@@ -159,9 +156,10 @@ def _plan(plan: RenderPlan, timing: StepTiming) -> None:
         exact = "exact" if plan.exact else "not exact everywhere"
         fact("runs", f"{type(plan.method).__name__}: {exact}", None if plan.exact else WARNING)
         part = "" if timing.share == 1.0 else f", for 1/{1 / timing.share:.3g} of the pixels"
-        fact("time", f"{1e3 * timing.wall:.1f} ms, GPU {1e3 * timing.gpu:.1f} ms{part}")
+        passes = timing.passes or {}
+        fact("time", f"{1e3 * timing.wall:.1f} ms, GPU {1e3 * sum(passes.values()):.1f} ms{part}")
         for step in plan.passes:
-            spent = (timing.passes or {}).get(step.name)
+            spent = passes.get(step.name)
             fact(step.name, f"{step.reason}" + (f" ({1e3 * spent:.1f} ms)" if spent is not None else ""))
         imgui.end_table()
     for kind, texts in (("limit", plan.limits), ("not modelled", plan.unmodelled), ("remark", plan.remarks)):

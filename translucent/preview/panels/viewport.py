@@ -15,7 +15,7 @@ from translucent.preview.actions import Pan, Turn, Zoom
 from translucent.preview.document import camera_of, length_text, triple_text
 from translucent.preview.panels.widgets import accepts_preset, begin_drag, em, packed
 from translucent.preview.viewport_renderer import thickest, worst
-from translucent.preview.window_state import ProbedPixel, WindowState
+from translucent.preview.window_state import ProbedPixel, WindowState, pixel_at
 from translucent.scene.camera import Camera
 from translucent.units import metres_per_unit
 
@@ -49,10 +49,11 @@ def viewport_panel(state: WindowState) -> None:
         imgui.set_cursor_screen_pos(corner)
     buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
     imgui.invisible_button("##viewport", room, buttons | imgui.ButtonFlags_.mouse_button_middle)
+    mouse = imgui.get_io().mouse_pos
+    position = (mouse.x - corner.x) / room.x, (mouse.y - corner.y) / room.y
     if accepts_preset():
-        place = imgui.get_io().mouse_pos
-        state.drop_preset(state.dragged, ((place.x - corner.x) / room.x, (place.y - corner.y) / room.y))
-    _mouse(state, corner, room)
+        state.drop_preset(state.dragged, position)
+    _mouse(state, position, room)
     over = imgui.get_window_draw_list()
     over.push_clip_rect(corner, ImVec2(corner.x + room.x, corner.y + room.y), True)
     _selected(state, over, corner, room)
@@ -64,20 +65,20 @@ def viewport_panel(state: WindowState) -> None:
     over.pop_clip_rect()
 
 
-def _mouse(state: WindowState, corner: ImVec2, room: ImVec2) -> None:
+def _mouse(state: WindowState, position: tuple[float, float], room: ImVec2) -> None:
+    """Act on the mouse, at a position in fractions of the viewport."""
     io = imgui.get_io()
     begin_drag(state)
     if imgui.is_item_activated():
-        state.pressed_at = io.mouse_pos.x, io.mouse_pos.y
+        state.pressed_at = position
     if imgui.is_item_active() and (io.mouse_delta.x or io.mouse_delta.y):
         right, down = io.mouse_delta.x, io.mouse_delta.y
         turning = imgui.is_mouse_dragging(0, 0.0)
         split = state.get("display.split") if state.get("display.compare") != "off" else None
-        started = state.pressed_at[0] - corner.x
-        if split is not None and turning and (state.dragging_split or abs(started - split * room.x) < em(0.7)):
+        near = split is not None and abs(state.pressed_at[0] - split) * room.x < em(0.7)
+        if split is not None and turning and (state.dragging_split or near):
             state.dragging_split = True
-            share = (io.mouse_pos.x - corner.x) / room.x
-            state.change("display.split", min(max(share, 0.0), 1.0))
+            state.change("display.split", min(max(position[0], 0.0), 1.0))
         elif turning and imgui.is_key_down(imgui.Key.l):
             state.turn_light(180.0 * right / room.x, -180.0 * down / room.y)
         elif turning and imgui.is_key_down(imgui.Key.e):
@@ -89,14 +90,13 @@ def _mouse(state: WindowState, corner: ImVec2, room: ImVec2) -> None:
     if not imgui.is_mouse_down(0):
         state.dragging_split = False
     if imgui.is_item_hovered() and io.mouse_wheel:
-        at = io.mouse_pos.x - corner.x - 0.5 * room.x, io.mouse_pos.y - corner.y - 0.5 * room.y
-        state.work.do(Zoom(WHEEL**io.mouse_wheel, at[0] / room.y, at[1] / room.y))
-    moved = math.hypot(io.mouse_pos.x - state.pressed_at[0], io.mouse_pos.y - state.pressed_at[1])
-    if imgui.is_item_deactivated() and moved < em(0.3):
-        state.pick(((io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y), state.select)
+        state.work.do(Zoom(WHEEL**io.mouse_wheel, (position[0] - 0.5) * room.x / room.y, position[1] - 0.5))
+    moved = (position[0] - state.pressed_at[0]) * room.x, (position[1] - state.pressed_at[1]) * room.y
+    if imgui.is_item_deactivated() and math.hypot(*moved) < em(0.3):
+        state.pick(position, state.select)
     state.hovered = None
     if imgui.is_item_hovered() and not imgui.is_any_mouse_down():
-        state.hovered = (io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y
+        state.hovered = position
 
 
 def _selected(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
@@ -147,7 +147,7 @@ def _split(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
         name = type(plans[1].method).__name__
     if display.compare in ("reference", "error"):
         truth = state.work.truth
-        if not state.view.has_truth:
+        if state.view.presenter.truth is None:
             name += ": being drawn ..."
         elif truth is not None and truth.level > 1:
             name += f", 1/{truth.level} so far"
@@ -157,7 +157,7 @@ def _split(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
         _label(over, ImVec2(x - width - em(0.8), top), left)
     if corner.x + room.x - x > imgui.calc_text_size(name).x + em(1.2):
         _label(over, ImVec2(x + em(0.8), top), name)
-    if display.compare == "error" and state.view.has_truth:
+    if display.compare == "error" and state.view.presenter.truth is not None:
         _error_scale(state, over, ImVec2(corner.x + room.x, corner.y + room.y))
 
 
@@ -260,10 +260,7 @@ def probe_lines(state: WindowState, position: tuple[float, float]) -> list[str]:
     scene, viewport = state.work.scene(), state.view.viewport
     if scene is None:
         return []
-    pixel = (
-        min(max(int(position[0] * viewport.size[0]), 0), viewport.size[0] - 1),
-        min(max(int(position[1] * viewport.size[1]), 0), viewport.size[1] - 1),
-    )
+    pixel = pixel_at(position, viewport.size)
     display = state.work.document.display
     right = display.compare == "method" and position[0] > display.split
     probe = state.view.probe(*pixel, 1 if right else 0)
@@ -300,29 +297,13 @@ def _status(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: Im
     y = corner.y + em(0.4) + (em(1.8) if state.get("display.compare") != "off" else 0.0)
     slow = [task.progress for task in state.work.busy if task.name and task.seconds > 1.0]
     for text in (*state.view.notes, *slow):
-        for line in folded(text, room.x - em(2.0)):
-            _label(over, ImVec2(corner.x + em(0.6), y), line)
-            y += em(1.5)
+        y += _label(over, ImVec2(corner.x + em(0.6), y), text, room.x - em(2.0)) + em(0.5)
 
 
-def folded(text: str, width: float) -> list[str]:
-    """Fold a text into lines that are no wider than this."""
-    found: list[str] = []
-    for paragraph in text.splitlines():
-        line = ""
-        for word in paragraph.split():
-            longer = f"{line} {word}".strip()
-            if line and imgui.calc_text_size(longer).x > width:
-                found.append(line)
-                line = word
-            else:
-                line = longer
-        found.append(line)
-    return found[:8]
-
-
-def _label(over: imgui.ImDrawList, at: ImVec2, text: str) -> None:
-    size = imgui.calc_text_size(text)
+def _label(over: imgui.ImDrawList, at: ImVec2, text: str, width: float = 0.0) -> float:
+    """Draw a text on a dark ground, wrapped at a width unless that is 0, and return its height."""
+    size = imgui.calc_text_size(text, False, width)
     low, high = ImVec2(at.x - em(0.25), at.y - em(0.1)), ImVec2(at.x + size.x + em(0.25), at.y + size.y + em(0.1))
     over.add_rect_filled(low, high, SHADE, em(0.15))
-    over.add_text(at, WHITE, text)
+    over.add_text(imgui.get_font(), imgui.get_font_size(), at, WHITE, text, width)
+    return size.y
