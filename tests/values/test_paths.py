@@ -30,6 +30,11 @@ def directory(tmp_path: Path) -> Path:
     (tmp_path / "file").write_text("")
     (tmp_path / "folder").mkdir()
     (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
+    (tmp_path / "loop").symlink_to(tmp_path / "back")
+    (tmp_path / "back").symlink_to(tmp_path / "loop")
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe")
+        (tmp_path / "to a pipe").symlink_to(tmp_path / "pipe")
     return tmp_path
 
 
@@ -42,6 +47,7 @@ def directory(tmp_path: Path) -> Path:
         (require_file, "a\0b", "no such file; check the path"),
         (require_file, "long" * 100, "no such file; check the path"),
         (require_output, "folder", "a folder of that name is there; choose another name"),
+        (require_output, "loop", "links of that name lead to each other; choose another name"),
         (require_output, "absent/x", "absent'; make the folder first"),
         (require_output, "file/x", "file' is no folder; choose another one"),
         (require_output, "a\0b/x", "make the folder first"),
@@ -89,6 +95,17 @@ def test_a_name_that_can_be_used_is_let_through(directory: Path, check: Callable
 
 
 # Writing
+
+
+@pytest.mark.parametrize("name", ["pipe", "to a pipe", "loop", "folder"])
+def test_only_files_are_replaced(directory: Path, name: str) -> None:
+    if name.endswith("pipe") and not hasattr(os, "mkfifo"):
+        pytest.skip("no pipes with a name here")
+    before = sorted((path.name, path.lstat().st_mode) for path in directory.iterdir())
+    for write in (require_output, write_text_atomically):
+        with pytest.raises(tl.InputError, match=r"of that name (is there|lead to each other); choose another name$"):
+            write(directory / name, "")
+    assert before == sorted((path.name, path.lstat().st_mode) for path in directory.iterdir())
 
 
 def test_a_file_is_written_as_any_new_file_is_without_touching_the_umask(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
+import stat
 import sys
 import zlib
 from collections.abc import Callable
@@ -55,7 +57,7 @@ def require_output(path: Path, asked: str) -> None:
     Raises
     ------
     InputError
-        If there is no folder for it, or a folder has the name.
+        If there is no folder for it, or a folder, a pipe, a device or a loop of links has the name.
     RenderError
         If no file can be made in that folder.
     """
@@ -64,9 +66,21 @@ def require_output(path: Path, asked: str) -> None:
         raise InputError(asked, f"{str(folder)!r} is no folder", "choose another one")
     if not os.path.isdir(folder):
         raise InputError(asked, f"no folder {str(folder)!r}", "make the folder first")
-    if os.path.isdir(path):
-        raise InputError(asked, "a folder of that name is there", "choose another name")
+    _require_replaceable(path, asked)
     _require_writable(path, asked)
+
+
+def _require_replaceable(path: Path, asked: str) -> None:
+    """Raise `InputError` where a written file would take the place of anything but a file."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError) as error:  # nothing is there, or what makes a file says why it cannot be there
+        if isinstance(error, OSError) and error.errno == errno.ELOOP:
+            raise InputError(asked, "links of that name lead to each other", "choose another name") from error
+        return
+    if not stat.S_ISREG(mode):
+        what = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
+        raise InputError(asked, f"{what} of that name is there", "choose another name")
 
 
 def require_folder(path: Path, asked: str) -> None:
@@ -118,6 +132,8 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
 
     Raises
     ------
+    InputError
+        If the file would take the place of a folder, a pipe, a device or a loop of links.
     RenderError
         If the file cannot be written.
     """
@@ -140,6 +156,7 @@ class OutputFiles:
 
     def write(self, path: Path, write: Callable[[Path], None]) -> Path:
         """Let `write` fill a temporary file beside `path`, as `write_atomically`; returns its path."""
+        _require_replaceable(path, f"output {str(path)!r}")
         path = Path(os.path.realpath(path))  # a link stays a link, and what it points to is replaced
         try:
             remove_partial(path)
