@@ -55,8 +55,17 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception as error:  # a defect of ours, or a full memory: still one line
         if "--debug" in given:
             raise
+        if _out_of_memory(error):
+            found = f"the process may take no more ({error or 'no details'})"
+            return _failed(message_of("memory", found, "ask for less at a time, or raise its limit (ulimit -v)"), 1)
         return _failed(f"unexpected {type(error).__name__}; {error or 'no details'}; --debug shows where", 1)
     return 0
+
+
+def _out_of_memory(error: Exception) -> bool:
+    """True of an error that says that the process gets no more memory, in the words of whoever raised it."""
+    words = "can't start new thread", "failed to map segment", "cannot allocate memory"
+    return isinstance(error, MemoryError) or any(said in str(error).lower() for said in words)
 
 
 def _below_zero(error: click.ClickException, given: list[str]) -> str | None:

@@ -44,8 +44,9 @@ def examine_backends(names: Sequence[str] = get_args(Backend)) -> list[BackendRe
     for name in sorted(names, key=lambda name: name != "window"):
         try:
             context = open_context(name)
-        except NoContextError as error:
-            reports.append(BackendReport(name, False, error.attempts[-1].error or ""))
+        except RenderError as error:
+            detail = error.attempts[-1].error if isinstance(error, NoContextError) else str(error)
+            reports.append(BackendReport(name, False, detail or ""))
             continue
         info = context.info
         detail = f"{context.renderer}; {info['GL_VERSION']}; textures up to {info['GL_MAX_TEXTURE_SIZE']}"

@@ -163,3 +163,23 @@ def test_a_standard_output_that_is_full(run: Run, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("translucent.commands.console.click.echo", full)
     line = one_error_line(run("presets"), 1)
     assert "standard output; it cannot be written (No space left on device)" in line
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError("Unable to allocate 9 GiB"),
+        RuntimeError("can't start new thread"),
+        ImportError("a.so: failed to map segment from shared object"),
+        OSError(errno.ENOMEM, "Cannot allocate memory"),
+    ],
+    ids=repr,
+)
+def test_a_full_memory_is_called_so(run: Run, monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
+    def fail() -> None:
+        raise error
+
+    monkeypatch.setattr("translucent.media.presets.presets", fail)
+    line = one_error_line(run("presets"), code=1)
+    assert line.startswith("error: memory; the process may take no more (")
+    assert line.endswith("; ask for less at a time, or raise its limit (ulimit -v)")

@@ -10,11 +10,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import moderngl
 import pytest
 
 import translucent as tl
 from translucent.errors import RenderError, TranslucentWarning
 from translucent.geometry.solids import Sphere
+from translucent.gpu import renderer as renderers
 from translucent.gpu.drivers import avoid_full_cache, quick_compiles, require_interfaces
 
 LAVAPIPE = {
@@ -139,3 +141,18 @@ def test_a_frame_is_drawn_although_the_disk_of_the_cache_is_full(cache: Path) ->
         pytest.skip(f"no mounts for a single process, or no OpenGL by EGL: {done.stderr}")
     assert done.returncode == 0, done.stderr
     assert "Mesa's cache of shaders; no room" in done.stderr
+
+
+@pytest.mark.parametrize("words", ["the framebuffer is not complete (UNSUPPORTED)", "cannot create texture"])
+def test_what_opengl_has_no_memory_for_is_called_so(monkeypatch: pytest.MonkeyPatch, words: str) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise moderngl.Error(words)
+
+    scene = tl.Scene(
+        [tl.Object(Sphere().tessellate(4), tl.Medium(absorption=1.0))], tl.Camera.look_at((3, 0, 0), (0, 0, 0))
+    )
+    with tl.Renderer() as renderer:
+        monkeypatch.setattr(renderers, "FrameJob", fail)
+        with pytest.raises(RenderError) as error:
+            renderer.render(scene, (4, 4))
+        assert str(error.value) == f"rendering; OpenGL has no memory for it ({words}); render smaller"

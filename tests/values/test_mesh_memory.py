@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -84,3 +85,17 @@ def test_the_limit_of_a_container_counts(tmp_path: Path, monkeypatch: pytest.Mon
     assert reading.free_memory() == 3000
     (tmp_path / "memory.max").write_text("max\n")
     assert reading.free_memory() == 8000 * 1024
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no ulimit -v")
+def test_what_takes_more_than_the_process_may_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    import resource
+
+    held = resource.getpagesize() * int(Path("/proc/self/statm").read_text().split()[0])
+    limit = held + (3 << 30)
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (limit, resource.RLIM_INFINITY))
+    reading.require_allowed("a lot", 1 << 30)
+    with pytest.raises(tl.RenderError, match=r"^a lot; it takes 4 GiB of memory, and the limit of this process leaves"):
+        reading.require_allowed("a lot", 4 << 30)
+    limit = resource.RLIM_INFINITY
+    reading.require_allowed("a lot", 1 << 60)

@@ -22,6 +22,7 @@ from translucent.cpu.shading import Arrays, Shader, on_rays
 from translucent.cpu.threads import in_threads, processors
 from translucent.diffusion.cache import FieldCache
 from translucent.errors import RenderError
+from translucent.files.reading import require_allowed
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
 from translucent.geometry.embree import EmbreeMesh, embree_versions
@@ -90,6 +91,9 @@ _Shapes = tuple[tuple[Mesh, bytes], ...]
 _COLORS = ("radiance", "transmittance", "optical_depth")
 _FLAGS = ("coverage", "valid")
 
+#: Bytes that a small frame takes, as measured: half of it are the stacks and heaps of threads.
+_TAKEN = 512 << 20
+
 #: Largest number of a frame.
 _LARGEST = float(np.finfo(np.float32).max)
 
@@ -107,10 +111,11 @@ class CpuRenderer:
     Raises
     ------
     RenderError
-        If embreex cannot be imported.
+        If embreex cannot be imported, or the process may take too little memory.
     """
 
     def __init__(self, threads: int | None = None) -> None:
+        require_allowed("rendering", _TAKEN)
         self._threads = threads or processors()
         self._embree = embree_versions()
         self._meshes: WeakKeyDictionary[Mesh, TracedMesh] = WeakKeyDictionary()

@@ -13,13 +13,14 @@ import math
 import os
 import re
 import stat
+import sys
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import unquote
 
-from translucent.errors import InputError
+from translucent.errors import InputError, RenderError
 from translucent.files.paths import require_file
 
 #: Bytes of the largest file: what the header of a .glb can state.
@@ -272,3 +273,21 @@ def require_memory(asked: str, found: str, size: int, do: str) -> None:
     if size <= SMALL or (free := free_memory()) is None or size <= free:
         return
     raise InputError(asked, f"{found} take about {size_text(size)} of memory, and {size_text(free)} are free", do)
+
+
+def require_allowed(asked: str, size: int) -> None:
+    """Raise `RenderError` where the limit of the process (``ulimit -v``) leaves less memory than `asked` takes.
+
+    Libraries that are written in C end the process where they get no more.
+    """
+    if sys.platform != "linux":
+        return
+    import resource
+
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit == resource.RLIM_INFINITY:
+        return
+    free = max(limit - resource.getpagesize() * int(Path("/proc/self/statm").read_text().split()[0]), 0)
+    if free < size:
+        found = f"it takes {size_text(size)} of memory, and the limit of this process leaves {size_text(free)}"
+        raise RenderError(asked, found, "raise the limit (ulimit -v)")

@@ -18,6 +18,7 @@ from typing import Any, Literal, get_args
 import moderngl
 
 from translucent.errors import InputError, RenderError
+from translucent.files.reading import require_allowed
 from translucent.gpu.drivers import avoid_full_cache
 from translucent.gpu.osmesa import OSMesaContext
 from translucent.gpu.signals import DeferredSignals
@@ -29,6 +30,10 @@ MODERNGL = version("moderngl")
 
 #: OpenGL version code that every raster path needs: 3.3 core.
 REQUIRED = 330
+
+#: Bytes that Mesa's software rasterizer takes with small frames, as measured: LLVM alone is half of it. Where it gets
+#: no more it ends the process, or waits forever for threads that did not start.
+_TAKEN = 1200 << 20
 
 
 class _Entered(threading.local):
@@ -191,10 +196,12 @@ def open_context(backend: str | None = None) -> GpuContext:
     NoContextError
         If none of the backends works.
     RenderError
-        In a process that is forked from one that has opened OpenGL.
+        In a process that is forked from one that has opened OpenGL, or that may take too little memory.
     """
     if backend is not None and backend not in get_args(Backend):
         raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(get_args(Backend))}")
+    if _opened_in is None:  # what takes most is loaded once
+        require_allowed("OpenGL", _TAKEN)
     _note_process()
     avoid_full_cache()
     attempts: list[Attempt] = []

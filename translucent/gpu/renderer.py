@@ -263,6 +263,10 @@ class GpuRenderer:
             raise RenderError("rendering", "another thread uses this renderer", "give each thread one of its own")
         try:
             yield
+        except moderngl.Error as error:
+            if not any(words in str(error) for words in ("not complete", "cannot create")):
+                raise
+            raise RenderError("rendering", f"OpenGL has no memory for it ({error})", "render smaller") from error
         finally:
             self._turn.release()
 
