@@ -17,7 +17,6 @@ from tests.bench.conftest import HASTE
 from tests.bench.measuring import case_of, measured
 from tests.bench.provenance import PROVENANCE
 from translucent.bench import run as running
-from translucent.bench import scaling
 from translucent.bench.cases import CASES, Case
 from translucent.bench.contenders import CONTENDERS, Contender, Effect, check_names, contenders
 from translucent.bench.drawing import BenchContext, FloorDrawing
@@ -168,17 +167,14 @@ def test_a_refusal_is_an_answer_and_not_a_failure(bench: BenchContext) -> None:
     assert Report(running.provenance(bench.renderer, "test", quick=True), (made,)).failures == ()
 
 
-def test_what_fails_in_the_middle_is_a_row(bench: BenchContext, monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(contender: Contender, *more: Any) -> Any:
-        if contender.name == "BackFaceDepth":
-            raise MemoryError("no room for\nthe frame")
-        return original(contender, *more)
+def test_what_fails_in_the_middle_is_a_row(bench: BenchContext) -> None:
+    def failing(*_: object) -> NoReturn:
+        raise MemoryError("no room for\nthe frame")
 
-    original = Contender.drawing
-    monkeypatch.setattr(Contender, "drawing", failing)
-    made = measured(bench, case_of(Sphere().tessellate(32)), "BackFaceDepth", "SignedDepth")
-    rows = {row.method: row for row in made.rows}
-    assert rows["BackFaceDepth"].failure == "MemoryError: no room for the frame"
+    chosen = Contender(name="broken", family="", shortcut=failing), Contender(name="SignedDepth", family="")
+    case = case_of(Sphere().tessellate(32))
+    rows = {row.method: row for row in MethodComparison((case,), chosen=chosen).measure(bench, case).rows}
+    assert rows["broken"].failure == "MemoryError: no room for the frame"
     assert rows["SignedDepth"].ratio is not None
 
 
@@ -336,9 +332,9 @@ def test_cost_is_measured_along_an_axis_and_limits_are_told(
     def gone() -> NoReturn:
         raise OSError("gone")
 
-    monkeypatch.setattr(scaling, "METHODS", {"SignedDepth": tl.SignedDepth(), "KBuffer": tl.KBuffer(k=256)})
     monkeypatch.setattr(Storage, "largest", 1000)
-    report, experiment = Report(PROVENANCE), CostScaling()
+    report = Report(PROVENANCE)
+    experiment = CostScaling(methods={"SignedDepth": tl.SignedDepth(), "KBuffer": tl.KBuffer(k=256)})
     for x, make in {2: partial(layers, 2), 20: partial(layers, 20), 30: gone}.items():
         step = ScalingStep("layers", "16 x 16", x, make)
         report = experiment.added(report, experiment.measure(bench, step))

@@ -102,7 +102,7 @@ def _thin_slab() -> Mesh:
 
 
 def _far(make: Callable[[], Mesh], size: Size) -> Scene:
-    """The picture of a body from `FAR` diameters away, through a lens that shows it as large as ever."""
+    """A body from `FAR` diameters away, with a field of view that keeps its size in the picture."""
     near = _body(make, size)
     center, eye = near.objects[0].mesh.center, near.camera.pose[:3, 3]
     away = (eye - center) / np.linalg.norm(eye - center)
@@ -415,7 +415,7 @@ def effect_of(scene: Scene) -> Effect:
 
 
 def _solid(title: str, scene: Scene, _size: Size) -> Scene:
-    """The scene, which has been made for the size already, if its bodies have an inside at all."""
+    """Return the scene if the reference finds that its bodies are closed."""
     look = reference.render(scene, LOOK)
     covered = look.coverage | ~look.valid
     if covered.any() and look.valid[covered].mean() < LEAST_VALID:

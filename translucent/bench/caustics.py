@@ -1,4 +1,4 @@
-"""Light from everywhere and light that bends, on grounds and in media: environments by some directions, and photons.
+"""Shadows of environments by some directions, and caustics by photons on grounds and in media.
 
 Errors are freed of the noise of their truths, of which there are two each: photons or random paths of the reference.
 """
@@ -70,7 +70,7 @@ NIGHT = Environment.constant((0.0, 0.0, 0.0))
 
 @dataclass(frozen=True)
 class SkyShadows(Experiment[Whole]):
-    """Shadows of environments by some directions, against random directions in cells of all of them.
+    """Shadows of environments approximated by some directions, against stratified random directions.
 
     Parameters
     ----------
@@ -127,9 +127,7 @@ class SkyShadows(Experiment[Whole]):
         return tuple(found)
 
     def _truth(self, base: Scene, floor: Mask, seed: int) -> dict[str, Array]:
-        """Fraction (k, 3) of the light of each environment that reaches the points of the floor, by rays to random
-        points of cells that get equal parts of the light of a uniform one.
-        """
+        """Fraction (k, 3) of the light of each environment that reaches points of the floor, by stratified rays."""
         origins, directions = (np.broadcast_to(part, (*floor.shape, 3))[floor] for part in base.camera.rays(self.size))
         height = base.objects[-1].bounds[0, 1]
         points = origins + ((height - origins[:, 1]) / directions[:, 1])[:, None] * directions
@@ -240,7 +238,7 @@ class CausticTruth:
         return 0.5 * (self.halves[0] + self.halves[1])
 
     def errors(self, found: Array, worth: float = 1.0) -> tuple[float, float]:
-        """RMS error over the mean, and its upper bound by two standard errors, if so many pixels are independent."""
+        """RMS error over the mean, and its upper bound by two standard errors; a fraction `worth` is independent."""
         one, other = (half[self.where] for half in self.halves)
         square, uncertainty = noise_free_square(found[self.where], one, other)
         bounds = square, square + 2.0 * uncertainty * worth**-0.5
@@ -319,7 +317,7 @@ class GroundCaustics(Experiment[LightScene]):
         )
 
     def _irradiance(self, renderer: Renderer, scene: Scene, caustics: Caustics) -> tuple[Array, Frame]:
-        """(h, w, 3) of photons on the ground, as the picture shows it, and the picture."""
+        """Irradiance (h, w, 3) by photons, from pictures with and without them, and the picture."""
         gpu, plan, (width, height) = renderer.gpu, renderer.plan(scene, caustics=caustics), self.size
         radiance = []
         with gpu.context.current():
@@ -346,7 +344,7 @@ class GroundCaustics(Experiment[LightScene]):
 
 
 def _blurred(picture: Array) -> Array:
-    """Blur over a pixel by a tent of two."""
+    """Blur with a tent filter two pixels wide."""
     for axis in (0, 1):
         low, high = (np.roll(picture, by, axis) for by in (-1, 1))
         picture = 0.5 * picture + 0.25 * (low + high)
@@ -354,7 +352,7 @@ def _blurred(picture: Array) -> Array:
 
 
 def _screen(light: Array) -> npt.NDArray[np.uint8]:
-    """Light (h, w, 3) from 0 to 1, as a screen shows it."""
+    """Linear light (h, w, 3) from 0 to 1 as 8-bit sRGB."""
     return np.rint(255.0 * linear_to_srgb(np.clip(light, 0.0, 1.0))).astype(np.uint8)
 
 
@@ -381,7 +379,7 @@ def milk() -> Scene:
 
 @dataclass(frozen=True)
 class MediumScene(LightScene):
-    """Scene without lights: `paths` of each pixel of each half of its truth; rows and columns that errors are of."""
+    """Scene of a caustic in a medium: paths of each pixel in each half of its truth; rows and columns that count."""
 
     paths: int = 192
     counted: tuple[slice, slice] = (slice(9, 20), slice(4, 20))
@@ -445,7 +443,7 @@ class MediumCaustics(Experiment[MediumScene]):
         return 0, self.photons
 
     def row(self, bench: BenchContext, truth: CausticTruth, photons: int) -> CausticRow:
-        """Errors with a number of photons, of lamps over the sun, some at a time."""
+        """Errors with a number of photons; lights over the disc of the sun are drawn a few at a time."""
         caustics = Caustics(photons) if photons else None
         number = np.arange(LAMPS)
         fall = (number + 0.5) / LAMPS * (1.0 - np.cos(RADIUS))

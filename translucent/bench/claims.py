@@ -443,7 +443,7 @@ SHADOW_CLAIMS = (*SHADOW_MAP_CLAIMS, *SKY_CLAIMS, *CAUSTIC_CLAIMS, *MEDIUM_CLAIM
 
 
 def hard_claim(known: Sequence[str]) -> Judge:
-    """Claim that all hard cases hold; `known` are the identifiers of those that there are."""
+    """Claim that all hard cases hold, of which these are the identifiers."""
 
     def judge(report: Report) -> Claim:
         text, found = f"All hard cases {known[0]} to {known[-1]} hold", report.hard_cases

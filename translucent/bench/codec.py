@@ -126,7 +126,7 @@ def decode(kind: type[T], text: str, name: str, file_format: str, version: int) 
 
 
 class _TooManyError(BaseException):
-    """End of structuring. No `Exception`: those are collected."""
+    """Raised past the limit of wrong values. No `Exception`: cattrs collects those."""
 
 
 class _Strict(Converter):

@@ -97,7 +97,7 @@ _PATHS = (2, 4, 16)
 
 @dataclass(frozen=True, kw_only=True)
 class Contender:
-    """Method of the public API, or what is compared with it: one row of every case that it fits.
+    """Method of the public API, or a technique beside it: one row of every case that it fits.
 
     Attributes
     ----------
@@ -209,13 +209,13 @@ class Contender:
         return bench.cpu.render(scene, size, samples=samples, scattering=SingleScattering())
 
     def passes_of(self, plan: RenderPlan) -> int | None:
-        """Draws of the geometry, one where the nearest face is all; None without OpenGL."""
+        """Number of draws of the geometry; None without OpenGL."""
         if self.kind == "cpu":
             return None
         return 1 if self.fits or self.engine is not None else plan.geometry_passes
 
     def parameters(self, plan: RenderPlan | None) -> str:
-        """The configuration as Python writes it, with that of interfaces behind it."""
+        """Configuration as Python writes it, followed by that of interfaces."""
         if scattering := self.engine or self.choices.get("scattering"):
             return str(scattering)
         interfaces = self.choices.get("interfaces") if plan is None else plan.interfaces
@@ -248,7 +248,7 @@ class Contender:
         return dataclasses.replace(self, method=method, thickness=thickness)
 
     def promise(self, plan: RenderPlan, scene: Scene, quantity: Quantity) -> tuple[str, bool]:
-        """Promise of its row in a quantity, in words, and whether it is exact: the planner's notes."""
+        """Accuracy that is promised in a quantity, in words, and whether it is exact."""
         if self.said:
             return self.said, False
         points = self.method.light_points

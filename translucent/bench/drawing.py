@@ -2,7 +2,7 @@
 
 All is measured in turns, A B C A B C, and the floor before and after each: what slows the machine down for longer than
 a drawing slows both, and their quotient stays. Medians and quartiles are over rounds, so that single hiccups do not
-count either. Slow drawings leave the rounds early, once they have had their share of the time; those whose rounds
+count either. Slow drawings leave the rounds early, once they have had their part of the time; those whose rounds
 differ much stay longer. What takes less than clocks can tell apart is drawn several times for one sample.
 """
 
@@ -58,10 +58,10 @@ FEWEST_UNSURE, CHEAP = 9, 0.1
 #: Seconds of a sample, below which a drawing is repeated in it, and the largest number of repetitions.
 SHORTEST, MOST_REPEATED = 4e-3, 16
 
-#: Standard error of the median ratio, as a share of it, from which on more rounds are asked for.
+#: Standard error of the median ratio, as a fraction of it, from which on more rounds are asked for.
 UNSURE = 0.03
 
-#: Draws of the floor on each side of a sample take this share of the time of the sample, up to `MOST_FLOORS` draws.
+#: Draws of the floor on each side of a sample take this fraction of the time of the sample, up to `MOST_FLOORS` draws.
 FLOOR_SHARE, MOST_FLOORS = 0.3, 10
 
 
@@ -147,19 +147,19 @@ class BenchContext:
         return self.renderer.gpu.step(PASSES[name])
 
     def own(self, kind: Callable[[Any], Made]) -> Made:
-        """Object in no plan, made of the context alone, and once: its programs are compiled once, too."""
+        """Object that no plan has, such as a shortcut's pass: made of the context once, and kept."""
         if kind not in self._own:
             self._own[kind] = kind(self.gl)
         return cast("Made", self._own[kind])
 
     def light(self, diffusion: Diffusion) -> DiffusionCache:
-        """Light that diffuses on grids of one size, for all drawings of a scene: it is solved for once."""
+        """Diffusion of one resolution, solved once for all drawings of a scene."""
         if diffusion not in self._light:
             self._light[diffusion] = DiffusionCache(self.gl)
         return self._light[diffusion]
 
     def forget_light(self) -> None:
-        """Free the light that diffuses, which is another in each scene."""
+        """Free the diffusion of a scene."""
         for light in self._light.values():
             light.release()
         self._light.clear()
@@ -229,7 +229,7 @@ class PlanDrawing:
     _compact = True
 
     def draw(self) -> Sample:
-        """Draw the plan; paths that have been followed before are no part of it."""
+        """Draw the plan, with new random paths."""
         self._job.paths_traced = 0
 
         def geometry() -> None:
@@ -290,7 +290,7 @@ class ShortcutDrawing(PlanDrawing):
 
 
 class FrameDrawing:
-    """Drawing by a function that returns a frame, without OpenGL or with what an engine would show: one time in all."""
+    """Drawing by a function that returns a frame, timed as a whole: without OpenGL, or of an engine."""
 
     bytes_per_pixel = None
     solve_seconds: float | None = None
@@ -445,7 +445,7 @@ def interleaved(
     patience: float = 1.0,
     long: float = 0.3,
 ) -> dict[str, Samples]:
-    """Measure all drawings, in turns, for about as many seconds; each gets an equal share, and at least a few rounds.
+    """Measure all drawings, in turns, for about as many seconds; each gets an equal part, and at least a few rounds.
 
     Parameters
     ----------
@@ -457,7 +457,7 @@ def interleaved(
     failed : callable
         Called with the name and the error of a drawing that raises, which is left out of the other rounds.
     patience : float
-        How many times its share a drawing is timed at most while its ratio to the floor is `UNSURE`.
+        How many times its part a drawing is timed at most while its ratio to the floor is `UNSURE`.
     long : float
         Seconds of a drawing from which on `FEWEST_LONG` rounds do.
     """
@@ -467,9 +467,9 @@ def interleaved(
         floor()
     base, repeated = _Repeated(floor), {name: _Repeated(draw) for name, draw in warmed.items()}
     found = {name: Samples() for name in warmed}
-    share = 0.85 * seconds / max(len(warmed), 1)
+    budget = 0.85 * seconds / max(len(warmed), 1)
     typical = float(np.median([base.sample().wall for _ in range(5)]))
-    while running := [name for name in warmed if not _enough(found[name], share, patience, long)]:
+    while running := [name for name in warmed if not _enough(found[name], budget, patience, long)]:
         before = _floor(base, typical, 0.0)
         for name in running:
             try:
@@ -500,13 +500,13 @@ def _warm_up(name: str, draw: Callable[[], Sample], seconds: float, failed: Call
 
 
 def _floor(floor: _Repeated, typical: float, beside: float) -> Sample:
-    """Medians of a few draws of the floor, the longer the sample beside it takes the more."""
+    """Medians of a few draws of the floor; the longer the sample beside it, the more draws."""
     count = int(np.clip(round(FLOOR_SHARE * beside / typical), 1, MOST_FLOORS))
     return _middle([floor.sample() for _ in range(count)], np.median)
 
 
 class _Repeated:
-    """Drawing that is drawn as often for a sample as it takes to tell it from the noise of clocks.
+    """Drawing that is repeated within a sample until clocks can resolve it.
 
     Attributes
     ----------
@@ -531,16 +531,16 @@ def _middle(samples: list[Sample], of: Callable[..., Any]) -> Sample:
     return Sample(*(float(of(values)) if values else None for values in known))  # type: ignore[arg-type]
 
 
-def _enough(samples: Samples, share: float, patience: float, long: float) -> bool:
+def _enough(samples: Samples, budget: float, patience: float, long: float) -> bool:
     rounds = len(samples.drawn)
     first = samples.drawn[0].frame if rounds else 0.0
     fewest = FEWEST_LONGEST if first > LONGEST else FEWEST_LONG if first > long else FEWEST
     most = MOST * patience
-    if rounds >= most or rounds < fewest or samples.spent < share:
+    if rounds >= most or rounds < fewest or samples.spent < budget:
         return rounds >= most
     if rounds < FEWEST_UNSURE and samples.spent < CHEAP and _unsure(samples):
         return False
-    return samples.spent >= patience * share or not _unsure(samples)
+    return samples.spent >= patience * budget or not _unsure(samples)
 
 
 def _unsure(samples: Samples) -> bool:

@@ -1,6 +1,6 @@
 """Engines' treatments of light that is scattered many times, as counter-examples: NumPy stands for their shaders.
 
-Each takes the mirror of its interface, and unscattered light, from our own frames: only the scattering differs.
+Each takes reflections at the interface, and unscattered light, from our own frames: only the scattering differs.
 Shadows of the body on itself are exact.
 
 References
@@ -198,7 +198,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class PaintLayer(Engine):
-    """Layer of paint as thick as the body along the ray (Kubelka & Munk 1931), without mirrors at its interfaces."""
+    """Layer of paint as thick as the body along the ray (Kubelka & Munk 1931), without internal reflections."""
 
     name: ClassVar[str] = "layer without inner mirrors"
     promise: ClassVar[str] = "none: what its interfaces mirror back inside is left out; computed here in NumPy"
@@ -262,7 +262,7 @@ class NormalizedDiffusion(Engine):
         return np.asarray(color * found / np.pi)
 
     def _samples(self, mesh: Mesh) -> tuple[Array, Array, float]:
-        """Even points on a surface, each for as large an area, with face normals, and the whole area."""
+        """Evenly spread points on a surface, their face normals, and its area."""
         corners = mesh.vertices[mesh.faces]
         double = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         ends, number = np.cumsum(double), np.arange(self.samples)

@@ -14,7 +14,7 @@ from translucent.errors import TranslucentError, TranslucentWarning
 
 
 class Named(Protocol):
-    """Scene, or step of a scale, with a name for progress."""
+    """Anything with a name that progress can show."""
 
     @property
     def name(self) -> str:
@@ -22,7 +22,7 @@ class Named(Protocol):
 
 
 class Whole(NamedTuple):
-    """The only step of an experiment that is not measured scene by scene."""
+    """Single step of an experiment that measures all of its scenes together."""
 
     name: str = ""
 
@@ -31,7 +31,7 @@ SceneT = TypeVar("SceneT", bound=Named)
 
 
 class Experiment(Generic[SceneT]):
-    """One question that a report answers: how contenders do on scenes, beside a truth.
+    """One question that a report answers: how contenders do on scenes, compared with a truth.
 
     Each scene becomes one record: its truth, then a row for each contender. What fails is a row, or a record, with its
     reason, and the rest goes on.

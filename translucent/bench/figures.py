@@ -143,7 +143,7 @@ def ms_text(value: float | None) -> str:
 
 
 def share_text(value: float | None) -> str:
-    """A share in percent; ``0`` is exactly that."""
+    """A fraction in percent; ``0`` is exactly that."""
     if value is None:
         return "–"
     if value == 0:
@@ -152,12 +152,12 @@ def share_text(value: float | None) -> str:
 
 
 def signed_share_text(value: float) -> str:
-    """A share in percent with its sign: ``+3.2 %``."""
+    """A fraction in percent with its sign: ``+3.2 %``."""
     return f"{100 * value:+.1f} %".replace("-", "−")
 
 
 def change_text(value: float) -> str:
-    """A difference of shares with its sign: ``+0.012``."""
+    """A difference of fractions with its sign: ``+0.012``."""
     return f"{value:+.3f}".replace("-", "−")
 
 

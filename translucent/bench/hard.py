@@ -26,6 +26,7 @@ from translucent.bench.shapes import (
     nested_shells,
     placed,
     plates,
+    surface_of_cells,
 )
 from translucent.errors import InputError, TranslucentWarning
 from translucent.formulas import optics
@@ -68,14 +69,14 @@ class Checks:
         Of all errors.
     worst : float or None
         Largest of all errors so far.
-    told, failed : list of str
+    held, failed : list of str
         Findings in words.
     """
 
     renderer: Renderer
     limit: float
     worst: float | None = None
-    told: list[str] = field(default_factory=list)
+    held: list[str] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)
 
     def error(self, what: str, value: float) -> None:
@@ -86,7 +87,7 @@ class Checks:
 
     def holds(self, what: str, held: bool | np.bool_) -> None:
         """Record a condition that must be true."""
-        (self.told if held else self.failed).append(what)
+        (self.held if held else self.failed).append(what)
 
     def refused(self, what: str, make: Callable[[], object], word: str) -> None:
         """Record that a call must raise an `InputError` whose message has this word."""
@@ -141,7 +142,7 @@ class HardCheck:
         except Exception as error:  # noqa: BLE001 - a hard case that breaks something is a finding, and the others go on
             checks.failed.append(one_line(error))
         passed = not checks.failed
-        result = "; ".join(checks.told) if passed else f"wrong: {'; '.join(checks.failed)}"
+        result = "; ".join(checks.held) if passed else f"wrong: {'; '.join(checks.failed)}"
         # JSON has no word for infinity: an error that is not finite is told in words.
         worst = checks.worst if checks.worst is not None and np.isfinite(checks.worst) else None
         limit, unit = (self.limit, self.unit) if checks.worst is not None else (None, "")
@@ -236,16 +237,14 @@ def _depths(checks: Checks) -> None:
     checks.holds("T at 1e4 is 0", optics.transmittance(1e4) == 0)
     ball = Sphere().tessellate(32)
     for extinction, what in ((5e3, "1e4"), (1e30, "1e30")):
-        frame = checks.render(showcase(ball, Medium(absorption=(extinction,) * 3), SIZE, stage="none"))
+        frame = checks.render(_shown(ball, Medium(absorption=(extinction,) * 3)))
         middle = frame.transmittance[SIZE[1] // 2, SIZE[0] // 2]
         checks.holds(f"a body of depth {what} is black, nothing is NaN", (middle == 0).all())
         checks.holds("and finite", np.isfinite(frame.radiance).all() and np.isfinite(frame.optical_depth).all())
-    thin = checks.render(showcase(ball, Medium(absorption=(1e-30,) * 3, emission=(1e-3,) * 3), SIZE, stage="none"))
-    glow = thin.thickness.astype(np.float64) * 1e-3 + 0.0
-    emitted = (
-        thin.radiance[..., 0]
-        - checks.render(showcase(ball, Medium(absorption=(1e-30,) * 3), SIZE, stage="none")).radiance[..., 0]
-    )
+    clear = Medium(absorption=(1e-30,) * 3)
+    thin = checks.render(_shown(ball, dataclasses.replace(clear, emission=(1e-3,) * 3)))
+    glow = thin.thickness.astype(np.float64) * 1e-3
+    emitted = thin.radiance[..., 0] - checks.render(_shown(ball, clear)).radiance[..., 0]
     # The two pictures differ by the emission, each rounded to float32 near 1.
     checks.holds("emission without extinction is q d", np.abs(emitted - glow).max() <= 4 * np.finfo(np.float32).eps)
 
@@ -408,25 +407,11 @@ def _sizes(checks: Checks) -> None:
 
 @hard("H21", "vertices on pixel centers, edges along pixel rows", f"{EXACTLY}; every face counts once")
 def _on_pixels(checks: Checks) -> None:
-    """A grid of vertices on pixel centers, and edges along their rows and columns, in front of and behind a box."""
+    """A box with a grid of vertices on pixel centers, and edges along their rows and columns, in front and behind."""
     count = 16
     camera = Camera.orthographic((0, 0, 5), (0, 0, 0), height=float(count))
-    x, y = np.meshgrid(np.arange(-6, 7) + 0.5, np.arange(-6, 7) + 0.5, indexing="ij")
-    n = len(x)
-    top = np.stack([x.ravel(), y.ravel(), np.ones(n * n)], axis=1)
-    bottom = top * (1, 1, -1)
-    i, j = np.meshgrid(np.arange(n - 1), np.arange(n - 1), indexing="ij")
-    a = (i * n + j).ravel()
-    quads = np.stack([a, a + n, a + n + 1, a + 1], axis=1)
-    edge = np.concatenate(
-        [np.arange(n) * n, (n - 1) * n + np.arange(n), (np.arange(n) * n + n - 1)[::-1], np.arange(n)[::-1]]
-    )
-    rim = edge[np.concatenate([[True], np.diff(edge) != 0])][:-1]
-    following = np.roll(rim, -1)
-    sides = np.stack([rim, rim + n * n, following + n * n, following], axis=1)
-    squares = np.concatenate([quads, quads[:, ::-1] + n * n, sides])
-    faces = np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]])
-    mesh = Mesh(np.concatenate([top, bottom]), faces, name="grid")
+    cells = surface_of_cells(np.ones((12, 12, 1), bool))
+    mesh = Mesh(cells.vertices * (1, 1, 2) - (5.5, 5.5, 1), cells.faces, name="grid")
     checks.holds("the mesh is closed", mesh.diagnosis.solid)
     scene = Scene([Object(mesh, GLASS)], camera)
     frame = checks.render(scene, (count, count))

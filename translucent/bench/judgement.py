@@ -325,9 +325,9 @@ def _changes(old: Report, new: Report) -> Iterator[Change]:
         where = f"shadow, {shadow.name}"
         if found.failure and not shadow.failure:
             yield Change("fails", where, found.failure)
-        ways = {row.method: row for row in found.rows}
+        techniques = {row.method: row for row in found.rows}
         for one in shadow.rows:
-            if (other := ways.get(one.method)) is None:
+            if (other := techniques.get(one.method)) is None:
                 continue
             yield from _time_change(f"{where} / {one.method}", one, other)
             # Points differ with the size of the picture.

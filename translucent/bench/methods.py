@@ -209,7 +209,7 @@ def _compared(
 
 
 def _layers(frame: Frame) -> int | None:
-    """The most surfaces that a method found on a ray, of those that put them in order."""
+    """Largest number of surfaces on a ray, of methods that put them in order."""
     return None if frame.layers is None or frame.truncated is None else int((frame.layers - frame.truncated).max())
 
 

@@ -88,7 +88,7 @@ def build_page(report: Report) -> str:
 
 @cache
 def _environment() -> Environment:
-    """Templates, compiled once, that escape whatever they are given, and fail on a name that they were not given."""
+    """Templates, compiled once, that escape all values and fail on unknown names."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     environment = Environment(

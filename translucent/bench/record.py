@@ -307,7 +307,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Slab:
-    """Wide flat slab in diffuse light: reflectance and transmittance, unscattered light with them.
+    """Wide flat slab in diffuse light: its reflectance and transmittance, unscattered light included.
 
     Attributes
     ----------
@@ -694,7 +694,7 @@ class Report:
         return dataclasses.replace(self, **changes) if outer else grown
 
     def without(self, parts: tuple[Part, ...]) -> Report:
-        """The report without these parts, and without renewals of which nothing is left."""
+        """The report without these parts, and without renewals that are empty then."""
         empty: dict[Part, dict[str, Any]] = {
             "scenes": {"cases": ()},
             "scaling": {"scaling": ()},

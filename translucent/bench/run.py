@@ -103,7 +103,7 @@ def measure_all(
     only : sequence of {"scenes", "scaling", "slabs", "shadows", "hard-cases"}
         Parts to measure; default: all.
     base : Report, optional
-        What else there is, measured before: these parts are renewed in it, and the report tells so.
+        What else there is, measured before: these parts are renewed in it, as the report notes.
     command : str
         What the record says has made it.
     progress : callable
@@ -180,7 +180,7 @@ def measured(
     report: Report,
     progress: Progress = lambda *_: None,
 ) -> Iterator[Report]:
-    """Measure the experiments of some parts: the report after each scene, with the claims of all that it has."""
+    """Measure the experiments of some parts, and yield the report after each scene."""
     steps = [(one, scene) for one in every if one.part in parts for scene in one.scenes(bench)]
     for done, (experiment, scene) in enumerate(steps):
         progress(f"{experiment.label}{scene.name}", done, len(steps))
@@ -224,7 +224,7 @@ def _versions() -> dict[str, str]:
 
 
 def _processor() -> str:
-    """Name of the CPU, from Linux, or as well as other systems tell it."""
+    """Name of the CPU, from Linux, or from Python elsewhere."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -234,7 +234,7 @@ def _processor() -> str:
 
 
 def _commit(root: Path) -> tuple[str | None, bool | None]:
-    """Commit of a checkout, and whether files that are part of it have changed since; None without one."""
+    """Commit of a checkout, and whether tracked files have changed since; None without one."""
     if not (root / ".git").exists():
         return None, None
 

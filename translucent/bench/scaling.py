@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -68,13 +68,14 @@ class ScalingStep:
 
 @dataclass(frozen=True)
 class CostScaling(Experiment[ScalingStep]):
-    """Times of four methods along four axes; `quick`: two steps of each, none of the longest."""
+    """Times of methods, by their families, along four axes; `quick`: two steps of each, none of the longest."""
 
     part: ClassVar[Part] = "scaling"
     label: ClassVar[str] = "scaling, "
     into: ClassVar[str] = "scaling"
 
     quick: bool = False
+    methods: Mapping[str, Method] = field(default_factory=METHODS.copy)
 
     def scenes(self, bench: BenchContext) -> Sequence[ScalingStep]:
         """Steps on this machine."""
@@ -102,12 +103,12 @@ class CostScaling(Experiment[ScalingStep]):
             def maker(method: Method) -> Callable[[Targets], Drawing]:
                 return lambda targets: PlanDrawing(bench, scene, targets, bench.renderer.plan(scene, method))
 
-            makers = {name: maker(method) for name, method in METHODS.items()}
+            makers = {name: maker(method) for name, method in self.methods.items()}
             found, failures = timed_beside_floor(bench, scene, size, makers, bench.effort.step_seconds)
         except Exception as error:  # noqa: BLE001 - a step that cannot be measured leaves the others alone
-            failures = dict.fromkeys(METHODS, error)
+            failures = dict.fromkeys(self.methods, error)
         points = {"depth only": _point(step.x, floor_times(found))}
-        for name in METHODS:
+        for name in self.methods:
             if (samples := found.get(name)) is not None:
                 points[name] = _point(step.x, samples)
             elif isinstance(failures[name], TranslucentError):  # said on purpose: no room for so many surfaces
@@ -115,10 +116,8 @@ class CostScaling(Experiment[ScalingStep]):
             else:
                 points[name] = ScalePoint(step.x, failure=one_line(failures[name]))
         # As in the rows of cases.
-        rows = [one for one in CONTENDERS if one.kind == "method"]
-        labels = {
-            name: next((one.name for one in rows if one.method == method), name) for name, method in METHODS.items()
-        }
+        rows = [one for one in reversed(CONTENDERS) if one.kind == "method"]
+        labels = {family: row.name for family, method in self.methods.items() for row in rows if row.method == method}
         return [Series(step.axis, labels.get(name, name), name, step.fixed, (at,)) for name, at in points.items()]
 
 

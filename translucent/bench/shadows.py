@@ -109,7 +109,7 @@ def over_ground(
     surface: Surface | None = None,
     overlap: Overlap = "add",
 ) -> Scene:
-    """Objects over a ground, its last object, so many of their diagonals above it, with all of their shadow in view.
+    """Objects above a ground, which is the last object, with all of their shadow in view.
 
     Parameters
     ----------
@@ -117,6 +117,7 @@ def over_ground(
     light : {"sun", "lamp", "spot"}
         All about equally bright on the ground.
     gap : float
+        Height above the ground, in diagonals of the objects.
     surface : Surface, optional
         Of the ground; default: white.
     overlap : str
@@ -406,7 +407,7 @@ class Ground:
         return self._relative(self._radiance(self._with(stones)))
 
     def _constant(self) -> Array:
-        """Transmittance with each body as thick everywhere as the fraction of its diagonal that fits best."""
+        """Transmittance with one thickness for each body: the fraction of its diagonal that fits best."""
         from scipy.optimize import minimize_scalar
 
         parts = []
@@ -426,7 +427,7 @@ class Ground:
         return shown(float(minimize_scalar(off, bounds=(1e-3, 1.0), method="bounded").x))
 
     def _with(self, stones: Sequence[Object]) -> Scene:
-        """The scene with these objects in place of its own, and a body of nothing, since there has to be one."""
+        """The scene with these objects in place of its own, and a clear body, since a scene needs one."""
         clear = dataclasses.replace(self.scene.bodies[0], medium=Medium(), surface=None)
         return dataclasses.replace(self.scene, objects=[clear, *stones, self.scene.objects[-1]])
 
@@ -492,20 +493,20 @@ def texel_errors(renderer: Renderer, scene: Scene, size: int) -> Array:
 
 
 def _extinctions(scene: Scene) -> Array:
-    """(k, 3): those of the bodies that differ, in order."""
+    """(k, 3): extinction of each medium, in order."""
     found = {item.medium.extinction.tobytes(): item.medium.extinction for item in scene.bodies if item.medium}
     return np.array(list(found.values()))
 
 
 def _sums(renderer: Renderer, size: int) -> Array:
-    """(size, size, 1, 2 or 4): the one map that the renderer holds, the bottom row first."""
+    """(size, size, 1, 2 or 4): texels of the renderer's shadow map, the bottom row first."""
     with renderer.gpu.context.current():
         texture = renderer.gpu.shadows.sums.color_attachments[0]
         return np.frombuffer(texture.read(), np.float32).reshape(size, size, -1).astype(np.float64)
 
 
 def halve(bench: BenchContext, scene: Scene, size: int) -> None:
-    """Round the map that the renderer holds of a scene as a target of float16 would.
+    """Round the sums of the renderer's shadow map to float16.
 
     Signed distances are those that we add up, from the center of the media; only their sums have 11 bits.
     """

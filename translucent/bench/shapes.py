@@ -62,7 +62,13 @@ def menger_sponge(level: int = 3) -> Mesh:
     for power in range(level):
         # A cell is gone where two of its three coordinates are in the middle third, at any scale.
         solid &= ((digits // 3**power % 3) == 1).sum(axis=1) < 2
-    cells = np.pad(solid.reshape(count, count, count), 1)
+    cells = surface_of_cells(solid.reshape(count, count, count))
+    return Mesh(cells.vertices / count - 0.5, cells.faces, name="menger sponge")
+
+
+def surface_of_cells(solid: npt.NDArray[np.bool_]) -> Mesh:
+    """The surface of solid cells (x, y, z), of unit size, with two triangles for each of their squares."""
+    cells = np.pad(solid, 1)
     quads = []
     for axis, side in itertools.product(range(3), (0, 1)):
         here = cells & ~np.roll(cells, -1 if side else 1, axis)
@@ -75,7 +81,7 @@ def menger_sponge(level: int = 3) -> Mesh:
     points, indices = np.unique(np.concatenate(quads).reshape(-1, 3), axis=0, return_inverse=True)
     square = indices.reshape(-1, 4)
     faces = np.concatenate([square[:, [0, 1, 2]], square[:, [0, 2, 3]]])
-    return Mesh(points / count - 0.5, faces, name="menger sponge")
+    return Mesh(points, faces, name="cells")
 
 
 def nested_shells(shells: int = 6, segments: int = 96) -> Mesh:
@@ -92,7 +98,7 @@ def lens_row(lenses: int = 3, segments: int = 64) -> Mesh:
 
 
 def plates(layers: int) -> Mesh:
-    """Square plates one behind the other, along z from 0 to -1: as many surfaces as asked for, an even number."""
+    """Square plates behind each other along z from 0 to -1, with an even number of surfaces."""
     count = layers // 2
     pitch = 1.0 / count
     plate = Box((-0.5, -0.5, -0.5 * pitch), (0.5, 0.5, 0.0)).tessellate()
@@ -108,7 +114,7 @@ def bow_tie(segments: int = 1) -> Mesh:
 def backward_window(thickness: float = 0.006, cells: int = 8) -> Mesh:
     """A plate, 1 by 1, with a window of its own tessellation on both sides, wound the wrong way.
 
-    Its vertices do not meet those of the frame around it, so that all edges between the two are open.
+    Its vertices are not those of the frame around it, so that all edges between the two are open.
     """
     steps = np.linspace(-0.2, 0.2, cells + 1)
     frame = [(-0.5, -0.5, 0.5, -0.2), (-0.5, 0.2, 0.5, 0.5), (-0.5, -0.2, -0.2, 0.2), (0.2, -0.2, 0.5, 0.2)]

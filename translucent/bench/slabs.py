@@ -44,7 +44,7 @@ HALF_WIDTH, MIDDLE = 4.0, 1.0
 
 @dataclass(frozen=True)
 class SlabComparison(Experiment[Whole]):
-    """Slabs of all combinations; a medium holds three optical depths, one in each channel."""
+    """Slabs of all combinations of parameters; a medium has three optical depths, one in each channel."""
 
     part: ClassVar[Part] = "slabs"
     label: ClassVar[str] = "slabs"
@@ -101,11 +101,17 @@ def _layer(medium: Medium) -> Array:
     """
     bare = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
     back, through = two_stream_reflectance(*bare), two_stream_transmittance(*bare)
-    mirror = diffuse_interface(medium.ior).reflected
-    whole_back, whole_through = (find(back, through, mirror) for find in (mirrored_reflectance, mirrored_transmittance))
+    reflected = diffuse_interface(medium.ior).reflected
+    whole_back, whole_through = (
+        find(back, through, reflected) for find in (mirrored_reflectance, mirrored_transmittance)
+    )
     seen = np.minimum([slabs.entering_transmittance(float(depth), medium.ior) for depth in medium.extinction], through)
     return np.maximum(
-        [whole_back - seen * mirror * whole_through, whole_through - seen * (1.0 - mirror + mirror * whole_back)], 0.0
+        [
+            whole_back - seen * reflected * whole_through,
+            whole_through - seen * (1.0 - reflected + reflected * whole_back),
+        ],
+        0.0,
     )
 
 
@@ -122,15 +128,15 @@ def _diffused(medium: Medium) -> Array:
 
 
 def _ahead(albedo: float, depth: float, anisotropy: float, ior: float) -> tuple[float, float]:
-    """Reflectance and transmittance of light that is scattered ahead, which pictures with `Diffusion` have in rays.
+    """Reflectance and transmittance of forward-scattered light, which `Diffusion` leaves to rays.
 
     The same as in ``shaders/transport/traced_interfaces.frag``: it leaves where the ray ends, or is reflected there.
     """
     mu, weight = slabs.cosines(ior)
-    mirror = optics.fresnel_dielectric(mu, 1 / ior) if ior > 1 else np.zeros_like(mu)
-    flux = mu * weight * (1.0 - mirror)
+    reflected = optics.fresnel_dielectric(mu, 1 / ior) if ior > 1 else np.zeros_like(mu)
+    flux = mu * weight * (1.0 - reflected)
     ahead = np.exp(-depth * (1.0 - albedo * anisotropy) / mu) - np.exp(-depth / mu)
-    again = mirror * np.exp(-depth / mu)
+    again = reflected * np.exp(-depth / mu)
     across = ahead / (1.0 - again**2)
     back, on = (float((flux * part).sum() / flux.sum()) for part in (across * again, across))
     # On the mean path of diffuse light across a slab, twice its thickness.

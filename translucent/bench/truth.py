@@ -39,7 +39,7 @@ RAYS = 4
 #: Width and height of the blocks over whose means errors are taken, too, in pixels.
 BLOCK = 4
 
-#: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
+#: Errors that are 0 in pictures: half of the smallest that a heat map shows. Noise does not compress.
 INVISIBLE = 5e-8
 
 #: Radiance below which a picture is black, and relative errors are meaningless.
@@ -85,7 +85,7 @@ class CaseTruth:
 
     @classmethod
     def over_pixels(cls, scene: Scene, size: Size, tolerance: float) -> CaseTruth:
-        """Trace the radiance that a camera with a box filter takes, where errors are taken; elsewhere along centers."""
+        """Trace radiance averaged over each pixel (a box filter) where errors are taken, elsewhere along centers."""
         along = cls.of(scene, size, tolerance)
         begin = time.perf_counter()
         rays = PATHS if along.halves else RAYS
@@ -116,7 +116,7 @@ class CaseTruth:
 
     @classmethod
     def of_paths(cls, scene: Scene, found: StoredTruth) -> CaseTruth:
-        """Truth of a scene that was path traced; raises `InputError` where it is that of another scene."""
+        """Truth of a scene from its path traced radiance; raises `InputError` if that covers other pixels."""
         size = found.mask.shape[1], found.mask.shape[0]
         # All but the light that media scatter.
         frame, _ = reference.path_trace(scene, size, paths=2, max_events=0)
@@ -177,7 +177,7 @@ class CaseTruth:
         used = self.compared & frame.coverage & frame.valid
         one, other = (half[used] for half in self.halves)
         square, uncertainty = noise_free_square(np.asarray(frame.radiance[used], np.float64), one, other)
-        # Over pixels the error may be less than noise can tell: then the standard error of its square is told.
+        # Over pixels the error may be less than noise can tell: then the standard error of its square is reported.
         return math.sqrt(max(square, uncertainty if self.rays > 1 else 0.0))
 
     def light_errors(self, frame: Frame, solve_seconds: float | None) -> LightErrors | None:
@@ -346,7 +346,7 @@ def stored_truth(name: str, scene: Scene) -> StoredTruth:
 
 
 def scene_parameters(scene: Scene) -> Array:
-    """Fingerprint of a scene in numbers, which are equal up to rounding where its light is.
+    """Fingerprint of a scene in numbers, equal up to rounding for equal scenes.
 
     Meshes go in by their number of faces, volume and moments. Of a mesh with other faces in the same place little
     would show.
