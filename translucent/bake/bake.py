@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arguments import checked
-from translucent.arrays import Array
+from translucent.arrays import Array, Floats
 from translucent.bake.atlas import Atlas, Unwrapped, in_tile, pad, unwrap
 from translucent.bake.measure import Measure, Measured
 from translucent.bake.settings import BakeSettings, settings_from
@@ -29,6 +29,15 @@ from translucent.geometry.normals import corner_angles
 #: Share of the surface that may have no texel of its own before a warning says so, and how many texels per face a map
 #: has that could show all.
 MOST_HIDDEN, ENOUGH_TEXELS = 0.1, 4
+
+#: Distance from its vertex of the point that stands for a face's corner, as a share of the way to the other two.
+CORNER = 1e-3
+
+#: Settings without meaning for vertices.
+_OF_MAPS: dict[str, Any] = {"size": 1, "supersample": 1, "padding": 0, "tile": None, "high_distance": None}
+
+#: Number of corners that a thread takes at a time.
+PART = 1 << 13
 
 
 @checked
@@ -101,29 +110,12 @@ def bake_thickness(
     bake_strips(strips, canvas, threads, progress, kept)
     pad(canvas.values, canvas.valued, settings.padding)
     traced = canvas.count("traced") - before
-    report = _report(unwrapped, strips, canvas, traced, time.perf_counter() - started)
+    report = _map_report(unwrapped, strips, canvas, traced, time.perf_counter() - started)
     if kept is not None:
         kept.remove()
     for text in report.warnings:
         warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=3)
     return ThicknessMap(canvas.values, canvas.coverage, canvas.errors, report.escaped, unwrapped.mesh, settings, report)
-
-
-def check_threads(threads: Any) -> int:
-    """Number of threads to use; raises `InputError` for less than one."""
-    if threads is None:
-        return processors()
-    if not (hasattr(threads, "__index__") and threads >= 1):
-        raise InputError(f"threads {threads!r}", "not a whole number above 0", "leave it out to use all processors")
-    return int(threads)
-
-
-def escape_warnings(escaped: float, closed: bool) -> list[str]:
-    """Warnings about rays that found no exit."""
-    if escaped == 0:
-        return []
-    reason = "the mesh has holes" if not closed else "faces are missing or look the wrong way"
-    return [f"{escaped:.2%} of the rays left the mesh without an exit ({reason}); they count as max_distance, or not"]
 
 
 def _check_high(high: Mesh | None, cage: Mesh | None, high_distance: float | None) -> None:
@@ -144,64 +136,6 @@ def _strips(mesh: Mesh, unwrapped: Unwrapped, settings: BakeSettings, high: Mesh
     detailed = Surface.of(high)
     projection = Projection.of(low, unwrapped, detailed, mesh, cage, settings.high_distance)
     return Strips(low, shown, atlas, Measure.of(detailed, settings), projection)
-
-
-def _share_of_area(strips: Strips, chosen: npt.NDArray[np.bool_]) -> float:
-    """The share that the chosen ones of the faces that are shown have in their area."""
-    a, b, c = strips.low.corners[strips.shown].transpose(1, 0, 2)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return float(area[chosen].sum() / area.sum())
-
-
-def _report(unwrapped: Unwrapped, strips: Strips, canvas: Canvas, traced: int, seconds: float) -> BakeReport:
-    cast, samples = max(canvas.count("cast"), 1), max(canvas.count("samples"), 1)
-    errors = canvas.errors[canvas.valued]
-    escaped, missed = canvas.count("escaped") / cast, canvas.count("missed") / samples
-    degenerate = len(unwrapped.mesh.faces) - len(strips.low.faces)
-    said = list(unwrapped.warnings)
-    source = unwrapped.mesh if strips.projection is None else None
-    said += escape_warnings(escaped, escaped == 0 or source is None or source.diagnosis.closed)
-    if overlapping := canvas.count("overlapping"):
-        said.append(f"{overlapping} texels lie in several triangles in UV; the first triangle has them")
-    hidden = ~canvas.owners[strips.shown]
-    share = _share_of_area(strips, hidden)
-    if share > MOST_HIDDEN and canvas.size**2 > ENOUGH_TEXELS * len(hidden):
-        count = f"{hidden.sum()} of {len(hidden)} faces, {share:.0%} of the surface,"
-        said.append(f"{count} have no texel: they are too small in UV, or lie below others there")
-    if missed:
-        said.append(f"{missed:.2%} of the samples found no surface of the high mesh; they get the value beside them")
-    if degenerate:
-        said.append(f"{degenerate} faces without area are left out")
-    if above := canvas.count("above"):
-        said.append(f"{above} samples stay above the tolerance with the most rays that they may have")
-    return BakeReport(
-        rays=traced,
-        seconds=seconds,
-        mrays_per_second=traced / seconds / 1e6,
-        samples=canvas.count("samples"),
-        texels=int(canvas.coverage.sum()),
-        overlapping_texels=overlapping,
-        faces_without_texel=int(hidden.sum()),
-        degenerate_faces=degenerate,
-        udim_tiles=tuple(tile for tile in unwrapped.tiles if tile),
-        uv_from=unwrapped.made_by,
-        escaped=escaped,
-        missed=missed,
-        mean_standard_error=float(errors.mean()) if errors.size else 0.0,
-        max_standard_error=float(errors.max()) if errors.size else 0.0,
-        above_tolerance=above,
-        warnings=tuple(said),
-    )
-
-
-#: Distance from its vertex of the point that stands for a face's corner, as a share of the way to the other two.
-CORNER = 1e-3
-
-#: Settings without meaning for vertices.
-_OF_MAPS: dict[str, Any] = {"size": 1, "supersample": 1, "padding": 0, "tile": None, "high_distance": None}
-
-#: Number of corners that a thread takes at a time.
-PART = 1 << 13
 
 
 @checked
@@ -257,7 +191,10 @@ def bake_vertex_thickness(
     values, errors = _at_vertices(mesh, surface, *corner)
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[mesh.faces[surface.faces]] = True
-    report = _vertex_report(mesh, surface, parts, errors[used], time.perf_counter() - started)
+    counts = {name: sum(getattr(part, name) for part in parts) for name in ("traced", "cast", "escaped", "above")}
+    counts["samples"] = 3 * len(surface.faces)
+    degenerate = len(mesh.faces) - len(surface.faces)
+    report = _report(mesh, errors[used], counts, degenerate, time.perf_counter() - started, [])
     for text in report.warnings:
         warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=3)
     return VertexThickness(values, errors, mesh, settings, report)
@@ -299,33 +236,73 @@ def _at_vertices(
         return mean[position].astype(np.float32), error[position].astype(np.float32)
 
 
-def _vertex_report(
-    mesh: Mesh, surface: Surface, parts: list[Measured], errors: npt.NDArray[np.float32], seconds: float
-) -> BakeReport:
-    traced, cast, escaped, above = (
-        sum(getattr(part, name) for part in parts) for name in ("traced", "cast", "escaped", "above")
+def check_threads(threads: Any) -> int:
+    """Number of threads to use; raises `InputError` for less than one."""
+    if threads is None:
+        return processors()
+    if not (hasattr(threads, "__index__") and threads >= 1):
+        raise InputError(f"threads {threads!r}", "not a whole number above 0", "leave it out to use all processors")
+    return int(threads)
+
+
+def _map_report(unwrapped: Unwrapped, strips: Strips, canvas: Canvas, traced: int, seconds: float) -> BakeReport:
+    doubts = []
+    if overlapping := canvas.count("overlapping"):
+        doubts.append(f"{overlapping} texels lie in several triangles in UV; the first triangle has them")
+    hidden = ~canvas.owners[strips.shown]
+    a, b, c = strips.low.corners[strips.shown].transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    share = float(area[hidden].sum() / area.sum())
+    if share > MOST_HIDDEN and canvas.size**2 > ENOUGH_TEXELS * len(hidden):
+        count = f"{hidden.sum()} of {len(hidden)} faces, {share:.0%} of the surface,"
+        doubts.append(f"{count} have no texel: they are too small in UV, or lie below others there")
+    if missed := canvas.count("missed") / max(canvas.count("samples"), 1):
+        doubts.append(f"{missed:.2%} of the samples found no surface of the high mesh; they get the value beside them")
+    report = _report(
+        unwrapped.mesh if strips.projection is None else None,
+        canvas.errors[canvas.valued],
+        {name: canvas.count(name) for name in ("samples", "cast", "escaped", "above")} | {"traced": traced},
+        len(unwrapped.mesh.faces) - len(strips.low.faces),
+        seconds,
+        doubts,
     )
-    degenerate = len(mesh.faces) - len(surface.faces)
-    said = escape_warnings(escaped / cast, mesh.diagnosis.closed)
+    return dataclasses.replace(
+        report,
+        texels=int(canvas.coverage.sum()),
+        overlapping_texels=overlapping,
+        faces_without_texel=int(hidden.sum()),
+        udim_tiles=tuple(tile for tile in unwrapped.tiles if tile),
+        uv_from=unwrapped.made_by,
+        missed=missed,
+        warnings=(*unwrapped.warnings, *report.warnings),
+    )
+
+
+def _report(
+    mesh: Mesh | None, errors: Floats, counts: dict[str, int], degenerate: int, seconds: float, doubts: list[str]
+) -> BakeReport:
+    """Report on rays from points of a mesh; None is one whose holes are not looked for."""
+    said, escaped = [], counts["escaped"] / max(counts["cast"], 1)
+    if escaped:
+        holes = mesh is not None and not mesh.diagnosis.closed
+        reason = "the mesh has holes" if holes else "faces are missing or look the wrong way"
+        said = [
+            f"{escaped:.2%} of the rays left the mesh without an exit ({reason}); they count as max_distance, or not"
+        ]
+    said += doubts
     if degenerate:
         said.append(f"{degenerate} faces without area are left out")
-    if above:
-        said.append(f"{above} samples stay above the tolerance with the most rays that they may have")
+    if counts["above"]:
+        said.append(f"{counts['above']} samples stay above the tolerance with the most rays that they may have")
     return BakeReport(
-        rays=traced,
+        rays=counts["traced"],
         seconds=seconds,
-        mrays_per_second=traced / seconds / 1e6,
-        samples=3 * len(surface.faces),
-        texels=0,
-        overlapping_texels=0,
-        faces_without_texel=0,
+        mrays_per_second=counts["traced"] / seconds / 1e6,
+        samples=counts["samples"],
         degenerate_faces=degenerate,
-        udim_tiles=(),
-        uv_from="",
-        escaped=escaped / cast,
-        missed=0.0,
-        mean_standard_error=float(errors.mean()),
-        max_standard_error=float(errors.max()),
-        above_tolerance=above,
+        escaped=escaped,
+        mean_standard_error=float(errors.mean()) if errors.size else 0.0,
+        max_standard_error=float(errors.max()) if errors.size else 0.0,
+        above_tolerance=counts["above"],
         warnings=tuple(said),
     )

@@ -29,44 +29,225 @@ from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentError
 from translucent.version import VERSION
 
-#: Parameters of glibc's mallopt (malloc.h), and the largest values that glibc itself would come to.
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
-MOST_REUSED = 32 << 20
+Status = Literal["baked", "suspect", "skipped", "failed"]
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
-
-@cache  # once for a process
-def reuse_freed_memory() -> None:
-    """Let arrays reuse the memory of freed ones; for processes that do nothing but bake.
-
-    glibc gives memory back to the system when arrays are freed, and the system clears each page anew for the next ones.
-    It learns from their sizes to do so less, but for some sizes of maps that still takes a twentieth of a bake. Larger
-    arrays than 32 MB go back as before. Other C libraries stay as they are.
-    """
-    if sys.platform != "linux":
-        return
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
-    if mallopt is not None:
-        mallopt(M_MMAP_THRESHOLD, MOST_REUSED)
-        mallopt(M_TRIM_THRESHOLD, 2 * MOST_REUSED)
-
-
-def reuse_freed_memory_if_fixed() -> None:
-    """`reuse_freed_memory` where ``MALLOC_TRIM_THRESHOLD_`` is set, as it is in workers of Dask.
-
-    With that, glibc learns nothing: each array of more than 128 KB is mapped anew, which takes an eighth of a bake.
-    """
-    if "MALLOC_TRIM_THRESHOLD_" in os.environ:
-        reuse_freed_memory()
-
+#: Largest share of rays without an exit in a map that is not suspect.
+MAX_ESCAPED = 0.05
 
 #: Seconds that a worker process has for cleaning up when the work is canceled.
 PATIENCE = 5.0
 
+#: Parameters of glibc's mallopt (malloc.h), and the largest values that glibc itself would come to.
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
+MOST_REUSED = 32 << 20
+
 #: Option of Linux's prctl: the signal that a process gets when its parent ends (linux/prctl.h).
 _PR_SET_PDEATHSIG = 1
 
-Item = TypeVar("Item")
-Result = TypeVar("Result")
+
+@dataclass(frozen=True)
+class BatchReport:
+    """Report on the jobs of a batch.
+
+    Attributes
+    ----------
+    assets : tuple of dict
+        Per job, in the order in which they were given: ``model``, ``output``, ``status`` (baked, suspect, skipped or
+        failed), ``seconds``, ``error`` (None, or one line), of baked and suspect ones ``range``, ``rays`` and
+        ``warnings``, and of suspect ones ``doubts``. What is suspect is written, and stays so when it is done already.
+    seconds : float
+        From the first to the last.
+    """
+
+    assets: tuple[Record, ...]
+    seconds: float
+
+    def count(self, status: Status) -> int:
+        """Number of jobs with this status."""
+        return sum(asset["status"] == status for asset in self.assets)
+
+    def summary(self) -> Record:
+        """Report as values that JSON can hold."""
+        counts = {status: self.count(status) for status in get_args(Status)}
+        return {**counts, "seconds": self.seconds, "assets": list(self.assets)}
+
+    def __str__(self) -> str:
+        name = max((len(Path(asset["model"]).name) for asset in self.assets), default=0)
+        return "\n".join([*(asset_line(asset, name) for asset in self.assets), self.total])
+
+    @property
+    def total(self) -> str:
+        """Counts of each status, in one line."""
+        counts = ", ".join(f"{self.count(status)} {status}" for status in get_args(Status))
+        return f"{counts} in {self.seconds:.1f} s"
+
+
+def asset_line(asset: Record, width: int = 0) -> str:
+    """Status line of one asset, with its name `width` characters wide."""
+    told = f"{Path(asset['model']).name:<{width}}  {asset['status']:<7}  {asset['seconds']:>7.1f} s"
+    if asset["status"] == "failed":
+        return f"{told}  {asset['error']}"
+    if found := asset.get("range"):
+        told += f"  {found['min']:.4g} .. {found['max']:.4g} {asset['unit']}"
+        told += f", {asset['parts']} parts" if asset["parts"] > 1 else ""
+    turned = [line for line in asset.get("repairs", []) if line.startswith("turned")]
+    return told + "".join(f"; {line}" for line in [*asset.get("doubts", []), *turned, *asset.get("warnings", [])])
+
+
+@checked
+def bake_many(
+    jobs: Iterable[Job],
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[Record], None] | None = None,
+) -> BatchReport:
+    """Bake many assets; a bad one does not stop the others.
+
+    Where an output is there already, whole, and made from the same meshes and settings by the same version, it is
+    skipped. Files appear complete or not at all, so a job may be done twice, or be killed, at any time.
+
+    Parameters
+    ----------
+    jobs : iterable of dict
+        See `translucent.bake.jobs`. Paths may be relative; an executor on other machines must see the same files.
+    executor : Executor, optional
+        Any of `concurrent.futures`, such as ``distributed.Client(...).get_executor()``. Default: processes here. They
+        are spawned, so a script calls this below ``if __name__ == "__main__":``.
+    workers : int, optional
+        Of the default: how many processes; default: one per processor.
+    progress : callable, optional
+        Gets the entry of each asset when it is finished.
+
+    Returns
+    -------
+    BatchReport
+
+    Raises
+    ------
+    InputError
+        If a job is malformed, two have one output, or `workers` is below 1. What is wrong with a single asset is
+        in the report.
+    """
+    places = ("model", "output", "high", "cage")
+    given = [{**job, **{key: str(Path(job[key]).absolute()) for key in places if job.get(key)}} for job in jobs]
+    outputs: dict[str, Job] = {}
+    for job in given:
+        # Some file systems do not tell case.
+        other = outputs.setdefault(str(job.get("output")).casefold(), job)
+        if other is not job:
+            both = f"{other.get('model')!r} and {job.get('model')!r}"
+            raise InputError(f"output {job.get('output')!r}", f"it is that of {both}", "rename one of them")
+    if workers is not None and workers < 1:
+        raise InputError(f"{workers} processes", "below 1", "give 1 or more")
+    for job in given:
+        check_job(job)
+    started = time.perf_counter()
+    found: dict[str, Record] = {}
+    records = _in_executor(executor, given) if executor is not None else _here(given, workers or processors())
+    for record in records:
+        found[record["output"]] = record
+        if progress is not None:
+            progress(record)
+    return BatchReport(tuple(found[job["output"]] for job in given), time.perf_counter() - started)
+
+
+def _here(jobs: list[Job], workers: int) -> Iterator[Record]:
+    workers = min(workers, max(len(jobs), 1))
+    share = max(processors() // workers, 1)
+    died = "its process died; out of memory, or a crash; try a smaller --size"
+    tasks = [{"threads": share, **job} for job in jobs]
+    return in_processes(run_job, tasks, workers, lambda job: failed_entry(job, died))
+
+
+def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
+    # An executor has its own idea of how many run at a time on a machine.
+    futures = {executor.submit(run_job, {"threads": 1, **job}, VERSION): job for job in jobs}
+    try:
+        for future in as_completed(futures):
+            job = futures.pop(future)  # Dask makes results of a lost worker again as long as anybody holds them
+            try:
+                yield future.result()
+            except Exception as error:  # noqa: BLE001 - lost workers, other versions: each executor raises its own kinds
+                yield failed_entry(job, f"its worker failed ({type(error).__name__}: {error})")
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def run_job(job: Job, version: str | None = None) -> Record:
+    """Run one job of a batch; errors are in the entry that it returns.
+
+    A `version` is that of who asks: on another machine there may be another one, whose maps are not the same.
+    """
+    started = time.perf_counter()
+    reuse_freed_memory_if_fixed()
+    if version not in (None, VERSION):
+        return failed_entry(job, f"its worker has version {VERSION}, and not {version}; install that")
+    status: Status = "skipped"
+    more: Record = {}
+    try:
+        content = content_hash(job)
+        if is_done(job, content):
+            record = read_record(Path(job["output"])) or {}
+        else:
+            record, results = bake_file(job, content=content)
+            status, more = "baked", told_of(record, results, Path(job["output"]).parent)
+    except TranslucentError as error:
+        return failed_entry(job, str(error), time.perf_counter() - started)
+    except Exception as error:  # noqa: BLE001 - a defect of ours, or a full memory: the others go on
+        told = f"unexpected {type(error).__name__}; {error or 'no details'}"
+        return failed_entry(job, told, time.perf_counter() - started)
+    if doubts := _doubts(job, record):
+        status, more = "suspect", {"doubts": doubts, **more}
+    return _entry(job, status, time.perf_counter() - started, **more)
+
+
+def failed_entry(job: Job, error: str, seconds: float = 0.0) -> Record:
+    """Entry of a job that failed."""
+    return _entry(job, "failed", seconds, error)
+
+
+def _entry(job: Job, status: Status, seconds: float, error: str | None = None, **more: Any) -> Record:
+    entry = {"model": job["model"], "output": job["output"], "status": status, "seconds": seconds, "error": error}
+    return {**entry, **more}
+
+
+def _doubts(job: Job, record: Record) -> list[str]:
+    """Reasons why the maps of a record are suspect."""
+    most, found = job.get("max_escaped", MAX_ESCAPED), []
+    for part in parts_of(record):
+        name = f"{part['mesh']['name']}: " if "maps" in record else ""
+        if (escaped := part["report"]["escaped"]) > most:
+            found.append(f"{name}{escaped:.0%} of the rays have no exit, more than {most:.3g}")
+        if part["range"] is None or part["range"]["max"] == 0:
+            found.append(f"{name}the thickness is 0 everywhere")
+    return found
+
+
+def told_of(record: Record, results: Any, folder: Path) -> Record:
+    """Summary of a bake: files, range, unit, rays and warnings of all its parts together."""
+    parts, files = parts_of(record), files_of(record)
+    ranges = [part["range"] for part in parts if part["range"] is not None]
+    warnings = [line for part in parts for line in (*part["report"]["warnings"], *part.get("warnings", []))]
+    repairs = [line for result in results.values() for line in result.mesh.repairs]
+    whole = {
+        "min": min((one["min"] for one in ranges), default=0.0),
+        "max": max((one["max"] for one in ranges), default=0.0),
+    }
+    return {
+        "unit": record["unit"],
+        "range": whole,
+        "rays": sum(part["report"]["rays"] for part in parts),
+        "parts": len(parts),
+        "files": [str(folder / one["file"]) for one in files],
+        "uv_file": str(folder / record["uv_file"]["file"]) if "uv_file" in record else None,
+        "left_out": record.get("left_out", []),
+        "warnings": list(dict.fromkeys(warnings)),
+        "repairs": list(dict.fromkeys(repairs)),
+        "hash": record.get("hash"),
+    }
 
 
 def in_processes(
@@ -185,222 +366,26 @@ def _end(*_: Any) -> None:
     sys.exit(143)
 
 
-Status = Literal["baked", "suspect", "skipped", "failed"]
+@cache  # once for a process
+def reuse_freed_memory() -> None:
+    """Let arrays reuse the memory of freed ones; for processes that do nothing but bake.
 
-#: Largest share of rays without an exit in a map that is not suspect.
-MAX_ESCAPED = 0.05
-
-
-@dataclass(frozen=True)
-class BatchReport:
-    """Report on the jobs of a batch.
-
-    Attributes
-    ----------
-    assets : tuple of dict
-        Per job, in the order in which they were given: ``model``, ``output``, ``status`` (baked, suspect, skipped or
-        failed), ``seconds``, ``error`` (None, or one line), of baked and suspect ones ``range``, ``rays`` and
-        ``warnings``, and of suspect ones ``doubts``. What is suspect is written, and stays so when it is done already.
-    seconds : float
-        From the first to the last.
+    glibc gives memory back to the system when arrays are freed, and the system clears each page anew for the next ones.
+    It learns from their sizes to do so less, but for some sizes of maps that still takes a twentieth of a bake. Larger
+    arrays than 32 MB go back as before. Other C libraries stay as they are.
     """
-
-    assets: tuple[Record, ...]
-    seconds: float
-
-    def count(self, status: Status) -> int:
-        """Number of jobs with this status."""
-        return sum(asset["status"] == status for asset in self.assets)
-
-    def summary(self) -> Record:
-        """Report as values that JSON can hold."""
-        counts = {status: self.count(status) for status in get_args(Status)}
-        return {**counts, "seconds": self.seconds, "assets": list(self.assets)}
-
-    def __str__(self) -> str:
-        name = max((len(Path(asset["model"]).name) for asset in self.assets), default=0)
-        return "\n".join([*(asset_line(asset, name) for asset in self.assets), self.total])
-
-    @property
-    def total(self) -> str:
-        """Counts of each status, in one line."""
-        counts = ", ".join(f"{self.count(status)} {status}" for status in get_args(Status))
-        return f"{counts} in {self.seconds:.1f} s"
+    if sys.platform != "linux":
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(M_MMAP_THRESHOLD, MOST_REUSED)
+        mallopt(M_TRIM_THRESHOLD, 2 * MOST_REUSED)
 
 
-def asset_line(asset: Record, width: int = 0) -> str:
-    """Status line of one asset, with its name `width` characters wide."""
-    told = f"{Path(asset['model']).name:<{width}}  {asset['status']:<7}  {asset['seconds']:>7.1f} s"
-    if asset["status"] == "failed":
-        return f"{told}  {asset['error']}"
-    if found := asset.get("range"):
-        told += f"  {found['min']:.4g} .. {found['max']:.4g} {asset['unit']}"
-        told += f", {asset['parts']} parts" if asset["parts"] > 1 else ""
-    turned = [line for line in asset.get("repairs", []) if line.startswith("turned")]
-    return told + "".join(f"; {line}" for line in [*asset.get("doubts", []), *turned, *asset.get("warnings", [])])
+def reuse_freed_memory_if_fixed() -> None:
+    """`reuse_freed_memory` where ``MALLOC_TRIM_THRESHOLD_`` is set, as it is in workers of Dask.
 
-
-@checked
-def bake_many(
-    jobs: Iterable[Job],
-    executor: Executor | None = None,
-    workers: int | None = None,
-    progress: Callable[[Record], None] | None = None,
-) -> BatchReport:
-    """Bake many assets; a bad one does not stop the others.
-
-    Where an output is there already, whole, and made from the same meshes and settings by the same version, it is
-    skipped. Files appear complete or not at all, so a job may be done twice, or be killed, at any time.
-
-    Parameters
-    ----------
-    jobs : iterable of dict
-        See `translucent.bake.jobs`. Paths may be relative; an executor on other machines must see the same files.
-    executor : Executor, optional
-        Any of `concurrent.futures`, such as ``distributed.Client(...).get_executor()``. Default: processes here. They
-        are spawned, so a script calls this below ``if __name__ == "__main__":``.
-    workers : int, optional
-        Of the default: how many processes; default: one per processor.
-    progress : callable, optional
-        Gets the entry of each asset when it is finished.
-
-    Returns
-    -------
-    BatchReport
-
-    Raises
-    ------
-    InputError
-        If a job is malformed, two have one output, or `workers` is below 1. What is wrong with a single asset is
-        in the report.
+    With that, glibc learns nothing: each array of more than 128 KB is mapped anew, which takes an eighth of a bake.
     """
-    given = [_absolute(job) for job in jobs]
-    _refuse_collisions(given)
-    if workers is not None and workers < 1:
-        raise InputError(f"{workers} processes", "below 1", "give 1 or more")
-    for job in given:
-        check_job(job)
-    started = time.perf_counter()
-    found: dict[str, Record] = {}
-    records = _in_executor(executor, given) if executor is not None else _here(given, workers or processors())
-    for record in records:
-        found[record["output"]] = record
-        if progress is not None:
-            progress(record)
-    return BatchReport(tuple(found[job["output"]] for job in given), time.perf_counter() - started)
-
-
-def _absolute(job: Job) -> Job:
-    paths = {key: str(Path(job[key]).absolute()) for key in ("model", "output", "high", "cage") if job.get(key)}
-    return {**job, **paths}
-
-
-def _refuse_collisions(jobs: list[Job]) -> None:
-    seen: dict[str, Job] = {}
-    for job in jobs:
-        key = str(job.get("output")).casefold()  # some file systems do not tell case
-        if key in seen:
-            both = f"{seen[key].get('model')!r} and {job.get('model')!r}"
-            raise InputError(f"output {job.get('output')!r}", f"it is that of {both}", "rename one of them")
-        seen[key] = job
-
-
-def _here(jobs: list[Job], workers: int) -> Iterator[Record]:
-    workers = min(workers, max(len(jobs), 1))
-    share = max(processors() // workers, 1)
-    return in_processes(run_job, [{"threads": share, **job} for job in jobs], workers, _lost)
-
-
-def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
-    # An executor has its own idea of how many run at a time on a machine.
-    futures = {executor.submit(run_job, {"threads": 1, **job}, VERSION): job for job in jobs}
-    try:
-        for future in as_completed(futures):
-            job = futures.pop(future)  # Dask makes results of a lost worker again as long as anybody holds them
-            try:
-                yield future.result()
-            except Exception as error:  # noqa: BLE001 - lost workers, other versions: each executor raises its own kinds
-                yield _entry(job, "failed", 0.0, error=f"its worker failed ({type(error).__name__}: {error})")
-    finally:
-        for future in futures:
-            future.cancel()
-
-
-def failed_entry(job: Job, error: str) -> Record:
-    """Entry of a job that could not be started."""
-    return _entry(job, "failed", 0.0, error=error)
-
-
-def _lost(job: Job) -> Record:
-    return _entry(job, "failed", 0.0, error="its process died; out of memory, or a crash; try a smaller --size")
-
-
-def run_job(job: Job, version: str | None = None) -> Record:
-    """Run one job of a batch; errors are in the entry that it returns.
-
-    A `version` is that of who asks: on another machine there may be another one, whose maps are not the same.
-    """
-    started = time.perf_counter()
-    reuse_freed_memory_if_fixed()
-    if version not in (None, VERSION):
-        return _entry(job, "failed", 0.0, error=f"its worker has version {VERSION}, and not {version}; install that")
-    try:
-        content = content_hash(job)
-        if is_done(job, content):
-            doubts = _doubts(job, read_record(Path(job["output"])) or {})
-            return _judged(job, "skipped", time.perf_counter() - started, doubts)
-        record, results = bake_file(job, content=content)
-    except TranslucentError as error:
-        return _entry(job, "failed", time.perf_counter() - started, error=str(error))
-    except Exception as error:  # noqa: BLE001 - a defect of ours, or a full memory: the others go on
-        told = f"unexpected {type(error).__name__}; {error or 'no details'}"
-        return _entry(job, "failed", time.perf_counter() - started, error=told)
-    seconds, doubts = time.perf_counter() - started, _doubts(job, record)
-    return _judged(job, "baked", seconds, doubts, **told_of(record, results, Path(job["output"]).parent))
-
-
-def _judged(job: Job, status: Status, seconds: float, doubts: list[str], **more: Any) -> Record:
-    if not doubts:
-        return _entry(job, status, seconds, **more)
-    return _entry(job, "suspect", seconds, doubts=doubts, **more)
-
-
-def _doubts(job: Job, record: Record) -> list[str]:
-    """Reasons why the maps of a record are suspect."""
-    most, found = job.get("max_escaped", MAX_ESCAPED), []
-    for part in parts_of(record):
-        name = f"{part['mesh']['name']}: " if "maps" in record else ""
-        if (escaped := part["report"]["escaped"]) > most:
-            found.append(f"{name}{escaped:.0%} of the rays have no exit, more than {most:.3g}")
-        if part["range"] is None or part["range"]["max"] == 0:
-            found.append(f"{name}the thickness is 0 everywhere")
-    return found
-
-
-def _entry(job: Job, status: Status, seconds: float, error: str | None = None, **more: Any) -> Record:
-    entry = {"model": job["model"], "output": job["output"], "status": status, "seconds": seconds, "error": error}
-    return {**entry, **more}
-
-
-def told_of(record: Record, results: Any, folder: Path) -> Record:
-    """Summary of a bake: files, range, unit, rays and warnings of all its parts together."""
-    parts, files = parts_of(record), files_of(record)
-    ranges = [part["range"] for part in parts if part["range"] is not None]
-    warnings = [line for part in parts for line in (*part["report"]["warnings"], *part.get("warnings", []))]
-    repairs = [line for result in results.values() for line in result.mesh.repairs]
-    whole = {
-        "min": min((one["min"] for one in ranges), default=0.0),
-        "max": max((one["max"] for one in ranges), default=0.0),
-    }
-    return {
-        "unit": record["unit"],
-        "range": whole,
-        "rays": sum(part["report"]["rays"] for part in parts),
-        "parts": len(parts),
-        "files": [str(folder / one["file"]) for one in files],
-        "uv_file": str(folder / record["uv_file"]["file"]) if "uv_file" in record else None,
-        "left_out": record.get("left_out", []),
-        "warnings": list(dict.fromkeys(warnings)),
-        "repairs": list(dict.fromkeys(repairs)),
-        "hash": record.get("hash"),
-    }
+    if "MALLOC_TRIM_THRESHOLD_" in os.environ:
+        reuse_freed_memory()

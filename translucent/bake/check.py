@@ -23,11 +23,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Pixels
+from translucent.arrays import Array, Integers, Mask, Pixels
 from translucent.bake.gltf_builder import wrapping
 from translucent.bake.gltf_targets import Bodies, first_transforms, transformed
 from translucent.bake.jobs import has_parts, stays_gltf
 from translucent.bake.record import Record, parts_of
+from translucent.bake.surface import barycentric, blend
 from translucent.bake.thickness_map import load_thickness_map
 from translucent.cpu.renderer import CpuRenderer
 from translucent.errors import InputError, RenderError, TranslucentWarning
@@ -192,20 +193,47 @@ def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | Non
     """
     if mesh.uv is None:
         raise InputError(f"mesh {mesh.name!r}", "it has no uv", "bake a map first; its mesh has them")
-    face, distance = first_hits(mesh, camera, size)
-    hit = face >= 0
-    if body is not None:
-        with np.errstate(invalid="ignore"):
-            hit &= distance <= first_hits(body, camera, size)[1] + SAME_POINT * body.diagonal
-    origins, directions = (part.reshape(-1, 3)[hit] for part in camera.rays(size))
-    corners = mesh.faces[face[hit]]
-    weights = barycentric(mesh.vertices[corners], origins + distance[hit, None] * directions)
-    found = np.full((len(hit), 2), np.nan)
-    found[hit] = np.einsum("kc,kci->ki", weights, mesh.uv[corners])
+    seen = first_hits(mesh, camera, size, body)
+    found = np.full((len(seen.hit), 2), np.nan)
+    found[seen.hit] = blend(mesh.uv[mesh.faces[seen.face]], seen.weights)
     return found.reshape(size[1], size[0], 2)
 
 
-def first_hits(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[npt.NDArray[np.int64], Array]:
+@dataclass(frozen=True, eq=False)
+class FirstHits:
+    """First hits of the rays of pixels on a mesh.
+
+    Attributes
+    ----------
+    hit : (h w,) bool
+        Pixels whose rays do hit.
+    face : (k,) int64
+        For each of those.
+    weights, points, directions : (k, 3)
+        Barycentric weights of the hits, the hits, and directions of the rays.
+    """
+
+    hit: Mask
+    face: Integers
+    weights: Array
+    points: Array
+    directions: Array
+
+
+def first_hits(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | None = None) -> FirstHits:
+    """First hits on a mesh, but for those behind other parts of its body."""
+    face, distance = _first_faces(mesh, camera, size)
+    hit = face >= 0
+    if body is not None:
+        with np.errstate(invalid="ignore"):
+            hit &= distance <= _first_faces(body, camera, size)[1] + SAME_POINT * body.diagonal
+    origins, directions = (part.reshape(-1, 3)[hit] for part in camera.rays(size))
+    points = origins + distance[hit, None] * directions
+    face = face[hit].astype(np.int64)
+    return FirstHits(hit, face, barycentric(mesh.vertices[mesh.faces[face]], points), points, directions)
+
+
+def _first_faces(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[Integers, Array]:
     """(k,), (k,): the face that the ray of each pixel first meets, and the way to it in metres; -1 and inf for none."""
     traced = EmbreeMesh(mesh)
     origins, directions = (part.reshape(-1, 3) for part in camera.rays(size))
@@ -214,18 +242,6 @@ def first_hits(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[npt.N
     ahead = np.maximum(-np.einsum("ki,ki->k", starts, directions) - 1.01, 0.0)
     face, distance = traced.first_hits(starts + ahead[:, None] * directions, directions)
     return face, np.where(face >= 0, traced.radius * (ahead + distance), np.inf)
-
-
-def barycentric(corners: Array, points: Array) -> Array:
-    """(k, 3): weights of the corners (k, 3, 3) at points (k, 3) of their triangles, each in 0..1."""
-    a, b, c = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
-    aa, ab, bb = (np.einsum("ki,ki->k", x, y) for x, y in ((a, a), (a, b), (b, b)))
-    ca, cb = (np.einsum("ki,ki->k", c, x) for x in (a, b))
-    area = aa * bb - ab * ab
-    area[area <= 0] = np.inf  # Embree hits no triangle without area; the first corner would do
-    second, third = (bb * ca - ab * cb) / area, (aa * cb - ab * ca) / area
-    weights = np.clip(np.column_stack([1.0 - second - third, second, third]), 0.0, 1.0)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def _backdrop(size: tuple[int, int]) -> Array:

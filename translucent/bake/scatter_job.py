@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from translucent.arrays import Array, Floats, Integers, Mask
-from translucent.bake.check import MOST_ROWS, NO_BODY, barycentric, first_hits, labeled, look, look_up, stacked
+from translucent.bake.check import MOST_ROWS, NO_BODY, first_hits, labeled, look, look_up, stacked
 from translucent.bake.gltf_builder import GlbBuilder
 from translucent.bake.gltf_targets import PrimitiveKey, Target, find_targets, first_transforms, left_out, transformed
 from translucent.bake.record import Record, write_record
@@ -196,10 +196,6 @@ def _stretches(builder: GlbBuilder) -> dict[int, Array]:
     return found
 
 
-#: Largest distance from a body's surface at which what is behind it still counts as that surface, over its diagonal.
-_SAME_POINT = 1e-4
-
-
 @dataclass(frozen=True, eq=False)
 class ScatterLook:
     """A body in one environment.
@@ -266,17 +262,12 @@ def check_scatter(one: Baked, values: Floats, size: tuple[int, int] = (320, 320)
     """
     baked = one.result
     camera = showcase(one.body, baked.medium, size, stage="none").camera
-    face, distance = first_hits(baked.mesh, camera, size)
-    hit = face >= 0
-    with np.errstate(invalid="ignore"):
-        hit &= distance <= first_hits(one.body, camera, size)[1] + _SAME_POINT * one.body.diagonal
-    if not hit.any():
+    first = first_hits(baked.mesh, camera, size, one.body)
+    if not first.hit.any():
         return {}
-    origins, directions = (part.reshape(-1, 3)[hit] for part in camera.rays(size))
-    points = origins + distance[hit, None] * directions
-    corners = baked.mesh.faces[face[hit]].astype(np.int64)
-    weights = barycentric(baked.mesh.vertices[corners], points)
-    normals = blend(corner_normals(baked.mesh).reshape(-1, 3, 3)[face[hit]], weights)
+    hit, points, directions, weights = first.hit, first.points, first.directions, first.weights
+    corners = baked.mesh.faces[first.face].astype(np.int64)
+    normals = blend(corner_normals(baked.mesh).reshape(-1, 3, 3)[first.face], weights)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     outside = np.clip(-(normals * directions).sum(axis=1), 0.0, 1.0)
     looked_up = _looked_up(baked.mesh, values, corners, weights, texels=isinstance(baked, ScatterMap))

@@ -25,7 +25,7 @@ from translucent.arrays import Array, Floats, Mask
 from translucent.bake.atlas import Atlas, Unwrapped
 from translucent.bake.measure import Measure
 from translucent.bake.settings import BakeSettings
-from translucent.bake.surface import Points, Surface, blend
+from translucent.bake.surface import Points, Surface, barycentric, blend
 from translucent.errors import InputError
 from translucent.files.paths import write_atomically
 from translucent.files.unpacking import read_arrays
@@ -77,22 +77,22 @@ class Projection:
             corners = cage.vertices[unwrapped.vertex][unwrapped.mesh.faces[low.faces]]
         return cls(low, high, corners, SEARCH * given.diagonal if distance is None else distance)
 
-    def points(self, points: Points, barycentric: Array) -> tuple[Points, npt.NDArray[np.bool_]]:
+    def points(self, points: Points, weights: Array) -> tuple[Points, npt.NDArray[np.bool_]]:
         """Points on the high mesh for those of the low one, and (k,) where one was found; only these are returned.
 
         Parameters
         ----------
         points : Points
             Of the low mesh (k).
-        barycentric : (k, 3) float64
-            Where they are on their faces.
+        weights : (k, 3) float64
+            Barycentric ones of their faces.
         """
         middle = points.exact * self.low.radius + self.low.embree.center
         if self.cage is None:
             begin = middle + self.distance * points.normal
             along, reach = -points.normal, np.full(len(points), 2.0 * self.distance)
         else:
-            begin = blend(self.cage[points.face], barycentric)
+            begin = blend(self.cage[points.face], weights)
             along = middle - begin
             length = np.sqrt((along**2).sum(axis=1))
             along = along / np.where(length > 0, length, 1.0)[:, None]
@@ -111,16 +111,7 @@ class Projection:
         distance = (plane[:, 3] - (normal * origin).sum(axis=1)) / np.where(facing, cosine, 1.0)
         found = facing & (distance >= 0) & (distance * high.radius <= reach)
         face, point = face[found], (origin + distance[:, None] * along)[found]
-        return high.points(face, _barycentric(high.corners[face], point)), found
-
-
-def _barycentric(corners: Array, point: Array) -> Array:
-    """(k, 3): weights of points on the planes of triangles, moved into them where rounding has led them out."""
-    a, b, c = corners.transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    areas = [np.cross(q - p, point - p) for p, q in ((b, c), (c, a), (a, b))]
-    weights = np.stack([np.maximum((area * normal).sum(axis=1), 0.0) for area in areas], axis=1)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+        return high.points(face, barycentric(high.corners[face], point)), found
 
 
 #: Texels (before supersampling) in a strip, about: one strip is what a thread takes at a time.

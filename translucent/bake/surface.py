@@ -141,6 +141,16 @@ class Surface:
         return smooth
 
 
+def barycentric(corners: Array, point: Array) -> Array:
+    """(k, 3): weights of points (k, 3) on the planes of triangles (k, 3, 3), moved into them where rounding led out."""
+    a, b, c = corners.transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    areas = [np.cross(q - p, point - p) for p, q in ((b, c), (c, a), (a, b))]
+    weights = np.stack([np.maximum((area * normal).sum(axis=1), 0.0) for area in areas], axis=1)
+    total = weights.sum(axis=1, keepdims=True)
+    return np.asarray(weights / np.where(total > 0, total, 1.0))
+
+
 def _dot(a: Array, b: Array) -> Array:
     """(k,): dot products of the rows of (k, 3) and (k, 3)."""
     return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])

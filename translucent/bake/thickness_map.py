@@ -71,7 +71,7 @@ PNG_PREFIX = "translucent:"
 ATTRIBUTE = "_THICKNESS"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BakeReport:
     """Report of a bake.
 
@@ -111,14 +111,14 @@ class BakeReport:
     seconds: float
     mrays_per_second: float
     samples: int
-    texels: int
-    overlapping_texels: int
-    faces_without_texel: int
+    texels: int = 0
+    overlapping_texels: int = 0
+    faces_without_texel: int = 0
     degenerate_faces: int
-    udim_tiles: tuple[int, ...]
-    uv_from: str
+    udim_tiles: tuple[int, ...] = ()
+    uv_from: str = ""
     escaped: float
-    missed: float
+    missed: float = 0.0
     mean_standard_error: float
     max_standard_error: float
     above_tolerance: int
