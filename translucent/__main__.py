@@ -1,7 +1,32 @@
-"""``python -m translucent`` is the command line."""
+"""``python -m translucent`` is the command line, and so is the script ``translucent``."""
 
+import os
+import signal
 import sys
 
-from translucent.cli import main
 
-sys.exit(main())
+def main() -> int:
+    """Run the command line and return its exit code; Ctrl-C is one line from the first import on."""
+    heeds = (
+        signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    )  # of those that a shell starts with &, none does
+    if heeds:
+        # Nothing has begun. An exception would be lost where Python imports by callbacks.
+        signal.signal(signal.SIGINT, _leave)
+    from translucent.cli import main
+
+    if heeds:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    code = main()
+    if heeds:  # Python shows where it was interrupted while it ends
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    return code
+
+
+def _leave(*_: object) -> None:
+    os.write(2, b"error: interrupted\n")
+    os._exit(130)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import math
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -12,6 +14,7 @@ import pytest
 
 import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
+from translucent.commands.console import echo
 
 # Bad input
 
@@ -165,6 +168,16 @@ def test_a_standard_output_that_is_full(run: Run, monkeypatch: pytest.MonkeyPatc
     assert "standard output; it cannot be written (No space left on device)" in line
 
 
+@pytest.mark.parametrize("err", [False, True])
+def test_nobody_who_reads_on_is_no_failure(monkeypatch: pytest.MonkeyPatch, err: bool) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w") as stream:
+        monkeypatch.setattr(sys, "stderr" if err else "stdout", stream)
+        for _ in range(2):
+            echo("a line", err=err)
+
+
 @pytest.mark.parametrize(
     "error",
     [
@@ -183,3 +196,24 @@ def test_a_full_memory_is_called_so(run: Run, monkeypatch: pytest.MonkeyPatch, e
     line = one_error_line(run("presets"), code=1)
     assert line.startswith("error: memory; the process may take no more (")
     assert line.endswith("; ask for less at a time, or raise its limit (ulimit -v)")
+
+
+#: The command line, with Ctrl-C while it is imported.
+STRUCK = """
+import signal, sys
+
+class Struck:
+    def find_spec(self, name, *rest):
+        if name == "translucent.commands.bake":
+            signal.raise_signal(signal.SIGINT)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.meta_path.insert(0, Struck())
+from translucent.__main__ import main
+sys.exit(main())
+"""
+
+
+def test_ctrl_c_while_modules_are_imported_is_one_line() -> None:
+    done = subprocess.run([sys.executable, "-c", STRUCK], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "error: interrupted\n")

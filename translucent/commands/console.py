@@ -23,6 +23,8 @@ _KEPT = re.compile(r"(\n|\t|\x1b\[48;2;\d{1,3};\d{1,3};\d{1,3}m {2,8}\x1b\[0m)")
 def echo(text: str, *, err: bool = False, nl: bool = True, color: bool | None = None) -> None:
     """Print text; what is not printable in it is escaped, but for line ends, tabs and swatches.
 
+    Once nobody reads any more, as ``head`` does not after its lines, nothing is printed: that is no failure.
+
     Raises
     ------
     RenderError
@@ -33,10 +35,20 @@ def echo(text: str, *, err: bool = False, nl: bool = True, color: bool | None = 
     try:
         click.echo(shown, err=err, nl=nl, color=color)
     except OSError as error:
-        if err or error.errno == errno.EPIPE:  # who has read enough is no failure: click ends quietly
+        if error.errno == errno.EPIPE:
+            _discard(sys.stderr if err else sys.stdout)
+            return
+        if err:
             raise
         found = f"it cannot be written ({error.strerror})"
         raise RenderError("standard output", found, "check the disk, and where it is redirected to") from error
+
+
+def _discard(stream: TextIO) -> None:
+    """Discard what a stream holds and all that is written to it."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
 
 
 def is_terminal(stream: TextIO | None) -> bool:
