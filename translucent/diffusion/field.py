@@ -112,7 +112,8 @@ class DiffusionField:
     @cached_property
     def volumes(self) -> tuple[Volume, Volume]:
         """Arrays (x, y, z, 3) that pictures look up: along ways on which all light is scattered."""
-        return self.fluence / self.scattered, self.entering / self.scattered
+        with np.errstate(under="ignore"):
+            return self.fluence / self.scattered, self.entering / self.scattered
 
     def radiance(self, points: Array, cosine: Array) -> Array:
         """(k, 3): basic radiance L / n^2 inside the body, below points of its surface and towards it: the mean of ways.
