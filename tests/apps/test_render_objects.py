@@ -54,6 +54,7 @@ def shown(run: Run, bar: Path, tmp_path: Path) -> Any:
         ("--object X --preset a m --object=Y --clamp -o o", "--object X m --object=Y -o o", ["--preset a", "--clamp"]),
         ("m --preset a", "m --preset a", []),
         ("--object X --roughness 0 -- --preset", "--object X -- --preset", ["--roughness 0"]),
+        ("--object X --preset a --json --debug", "--object X --json --debug", ["--preset a"]),
         ("--object", "--object", [""]),
         ("--object X --preset", "--object X", ["--preset"]),
     ],

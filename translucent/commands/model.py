@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -23,7 +23,7 @@ from translucent.commands.options import (
     FileOptions,
     collected,
     roughness_option,
-    takes,
+    with_options,
 )
 from translucent.errors import InputError
 
@@ -287,10 +287,8 @@ class _ObjectOptions(AnyMediumOptions):
     roughness: float | None = roughness_option()
 
 
-@click.command()
-@takes(_ObjectOptions)
-def _of_one_object(**_: Any) -> None:
-    """Parser of these options, which is never run."""
+#: Parser of these options alone: ``--json`` and all else behind an --object is of the verb.
+_of_one_object = click.command("object")(with_options(_ObjectOptions, lambda **_: None))
 
 
 class ObjectCommand(click.Command):

@@ -86,12 +86,16 @@ def takes(kind: type) -> Callable[[Verb], Verb]:
             rest = {name: value for name, value in found.items() if name not in set(_names(kind))}
             return verb(*arguments, given=given, **rest)
 
-        command = common_options(collecting)
-        for one in reversed(list(_options(kind))):
-            command = one(command)
-        return command
+        return with_options(kind, common_options(collecting))
 
     return decorate
+
+
+def with_options(kind: type, verb: Verb) -> Verb:
+    """Add the options of a group to a verb."""
+    for one in reversed(list(_options(kind))):
+        verb = one(verb)
+    return verb
 
 
 def common_options(verb: Verb) -> Verb:
