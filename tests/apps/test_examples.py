@@ -94,8 +94,8 @@ def test_the_notebook_about_notebooks_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("anywidget", reason="anywidget is not installed (extra notebook)")
-    from translucent.notebook import showing
     from translucent.notebook import view as module
+    from translucent.notebook import view as showing
 
     gummy = tl.preset("gummy").medium
     told = {"extinction": gummy.extinction.tolist(), "ior": gummy.ior, "roughness": 0.0, "distance": 0.002}

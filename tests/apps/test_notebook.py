@@ -17,7 +17,7 @@ from PIL import Image
 
 import translucent as tl
 from translucent.formulas.color import to_hex
-from translucent.notebook import showing
+from translucent.notebook import view as showing
 
 BOX = trimesh.creation.box((0.02, 0.02, 0.02))
 WINE = tl.Medium.from_color((0.2, 0.05, 0.1), 0.01)

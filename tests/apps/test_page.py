@@ -21,9 +21,8 @@ from PIL import Image
 import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
 from translucent.gpu.recording.frames import FrameRecorder
-from translucent.page.container import MAGIC, Container
-from translucent.page.plans import TEXTURE_UNITS, plan_page
-from translucent.page.simplify import simplified, triangles
+from translucent.page.payload import MAGIC, Container
+from translucent.page.plans import TEXTURE_UNITS, plan_page, simplified, triangles
 from translucent.planning.choices import RenderChoices
 from translucent.planning.notes import NoteKind
 from translucent.scene.showcase import showcase
@@ -251,7 +250,7 @@ def test_a_frame_writes_the_page_of_its_scene(
     look = {"name": "Ball", "exposure": 1.0, "tone": "agx", "poster": poster}
     tl.write_page(scene, path, size=(40, 30), method=tl.BackFaceDepth(), **choices, **look)
     assert text == path.read_text(encoding="utf-8")
-    monkeypatch.setattr("translucent.page.of_frame.page_html", lambda *_, poster, **__: poster)
+    monkeypatch.setattr("translucent.page.write.page_html", lambda *_, poster, **__: poster)
     assert dataclasses.replace(frame, alpha=np.ones((30, 40))).to_html() is None
 
 

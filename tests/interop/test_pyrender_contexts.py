@@ -206,7 +206,7 @@ def test_what_is_freed_is_freed_once(
 ) -> None:
     """A renderer of pyrender frees again when it is collected: by then a name may be that of somebody else."""
     from translucent.interop._pyrender_drawing import OpaqueRenderer
-    from translucent.interop._pyrender_twins import opaque_part
+    from translucent.interop._pyrender_scenes import opaque_part
 
     with renderer.gpu.context.current():
         drawing = OpaqueRenderer(SIZE)

@@ -311,12 +311,12 @@ def _bodies(scene: tl.Scene) -> tl.Scene:
 
 
 def test_at_edges_the_environment_is_seen_in_part(pyrender: ModuleType) -> None:
-    from translucent.interop._pyrender_pictures import Picture
+    from translucent.interop._pyrender_scenes import PyrenderPicture
 
     # One pixel of three is covered by half, by a surface that is encoded as 0.8.
     colors = np.array([[[0, 0, 0, 0], [102, 102, 102, 128], [204, 204, 204, 255]]], dtype=np.uint8)
     environment = tl.Environment.constant((3.0, 2.0, 1.0))
-    picture = Picture(colors, np.array([[np.inf, 2.0, 2.0]]), (0.5, 0.5, 0.5))
+    picture = PyrenderPicture(colors, np.array([[np.inf, 2.0, 2.0]]), (0.5, 0.5, 0.5))
     backdrop = picture.before(environment, tl.Camera(np.eye(4)))
     share, surface = 128 / 255, (102 / 128) ** 2.2
     np.testing.assert_allclose(backdrop.radiance[0, 1], share * surface + (1 - share) * np.array([3.0, 2.0, 1.0]), 1e-6)

@@ -333,7 +333,7 @@ class Frame:
             If the frame has no scene, or WebGL2 cannot draw it by these choices.
         """
         # By name: a frame is a value, and knows of no pages.
-        text: str = import_module("translucent.page.of_frame").frame_html(self, exposure, tone, name)
+        text: str = import_module("translucent.page.write").frame_html(self, exposure, tone, name)
         return text
 
     def _repr_mimebundle_(self, **_: Any) -> Bundle:

@@ -19,7 +19,7 @@ from OpenGL.error import Error as OpenGLError
 from translucent.errors import RenderError
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import GpuContext
-from translucent.interop._pyrender_pictures import GAMMA, Clipping, Picture, ambient_of
+from translucent.interop._pyrender_scenes import GAMMA, Clipping, PyrenderPicture, ambient_of
 
 Flags = pyrender.RenderFlags
 
@@ -142,7 +142,7 @@ def _draw(renderer: OpaqueRenderer, scene: Any, flags: int) -> None:
             GL.glDisable(state)
 
 
-def drawn_apart(scene: Any, size: tuple[int, int], flags: int) -> Picture:
+def drawn_apart(scene: Any, size: tuple[int, int], flags: int) -> PyrenderPicture:
     """Draw in a context that pyrender makes for itself, and read the picture back."""
     with _current_kept():
         offscreen = _offscreen(size)
@@ -153,7 +153,7 @@ def drawn_apart(scene: Any, size: tuple[int, int], flags: int) -> Picture:
                 colors, depth = offscreen.render(scene, flags)
             finally:
                 offscreen.delete()
-    return Picture(colors, Clipping.of(scene).metres(depth), ambient_of(scene))
+    return PyrenderPicture(colors, Clipping.of(scene).metres(depth), ambient_of(scene))
 
 
 def _offscreen(size: tuple[int, int]) -> Any:

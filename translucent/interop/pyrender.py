@@ -67,7 +67,7 @@ def scene_from_pyrender(
         If pyrender cannot be imported.
     """
     load_pyrender()
-    from translucent.interop._pyrender_reading import converted
+    from translucent.interop._pyrender_scenes import converted
 
     return converted(scene, media, check_size(size), overlap)
 
@@ -203,7 +203,7 @@ def to_pyrender(scene: Scene) -> Any:
         If pyrender cannot be imported.
     """
     load_pyrender()
-    from translucent.interop._pyrender_writing import written
+    from translucent.interop._pyrender_scenes import written
 
     _require_opaque(scene)
     return written(scene)
@@ -249,7 +249,7 @@ def render_scene(
     _require_copying("its opaque objects always come so", owned=context.owned, shared=None)
     pyrender = load_pyrender(context.backend)
     from translucent.interop._pyrender_drawing import drawn_apart
-    from translucent.interop._pyrender_writing import written
+    from translucent.interop._pyrender_scenes import written
 
     size = check_size(size)
     picture = drawn_apart(written(scene), size, 0)
@@ -273,8 +273,7 @@ def _require_opaque(scene: Scene) -> None:
 def _opaque_part(scene: Any, translucent: Collection[str], size: tuple[int, int], flags: int) -> Any:
     """Check the scene that pyrender is to draw."""
     from translucent.interop._pyrender_drawing import PICTURE_FLAGS
-    from translucent.interop._pyrender_reading import camera_of, translucent_nodes
-    from translucent.interop._pyrender_twins import opaque_part
+    from translucent.interop._pyrender_scenes import camera_of, opaque_part, translucent_nodes
 
     if flags & ~PICTURE_FLAGS:
         raise InputError(

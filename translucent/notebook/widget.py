@@ -17,7 +17,7 @@ from translucent.formulas.color import to_hex
 from translucent.media.colors import parse_color
 from translucent.media.medium import BLACKEST, Medium, extinction_at
 from translucent.media.presets import preset as named_preset
-from translucent.page.variants import editable
+from translucent.page.plans import editable
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,6 +16,8 @@ from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.sampling import sample_shifts
 from translucent.formulas.tone import TONES
 from translucent.frames.aovs import false_colors
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.normals import drawn_normals
 from translucent.gpu.balance import face_counts
 from translucent.gpu.body_uniforms import BodyRoles, bounded_extinction
 from translucent.gpu.features import FrameFeatures
@@ -26,12 +30,18 @@ from translucent.gpu.std140 import PackedTable, UniformBlock
 from translucent.gpu.uniforms import media_center
 from translucent.media.medium import Medium
 from translucent.media.presets import presets
-from translucent.page.container import LIGHT_BITS, Container
-from translucent.page.meshes import mesh_told, name_of
-from translucent.page.plans import PagePlan
-from translucent.page.variants import current, editable, variant
+from translucent.page.plans import PagePlan, current, editable, variant
 from translucent.scene.scene import Scene
 from translucent.version import VERSION
+
+#: First bytes of a container.
+MAGIC = b"TLPAGE01"
+
+#: Bits of a mantissa that are kept of light, which has no more: its error is 5e-5 of each value at most.
+LIGHT_BITS = 13
+
+#: Endings of names that meshes have of their files.
+_FILES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 
 #: Indices of refraction from 1 to 3 for which pages know the share of diffuse light that an interface mirrors.
 MIRROR_STEPS = 65
@@ -84,7 +94,7 @@ def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, e
         "present": _present_told(),
         "false_colors": into.add(false_colors()),
         "hierarchies": _hierarchies_told(recorder, scene, into),
-        "meshes": _meshes_told(gl, into),
+        "meshes": [_mesh_entry(mesh, into) for mesh in gl.meshes],
         "spectral_maps": spectral_maps,
         "aliases": aliases,
         "variants": {
@@ -250,10 +260,6 @@ def _present_told() -> dict[str, str]:
     return {"vertex": lift("geometry/fullscreen.vert", {}, "webgl2").text, **texts}
 
 
-def _meshes_told(gl: RecordingContext, into: Container) -> list[dict[str, Any]]:
-    return [mesh_told(mesh, into, with_normals=True, with_looks=True) for mesh in gl.meshes]
-
-
 def _hierarchies_told(recorder: FrameRecorder, scene: Scene, into: Container) -> dict[str, Any] | None:
     """Nodes of the hierarchy of objects, and the meshes whose hierarchies follow."""
     gl = recorder.gl
@@ -315,3 +321,115 @@ def _object_of(content: npt.NDArray[Any], mesh: object, scene: Scene) -> int | N
 
 def _bytes(content: bytes) -> npt.NDArray[np.uint8]:
     return np.frombuffer(content, np.uint8)
+
+
+def name_of(mesh: Mesh) -> str:
+    """Name of a mesh for people: without the ending of its file."""
+    stem, dot, ending = mesh.name.rpartition(".")
+    return stem if stem and (dot + ending).lower() in _FILES else mesh.name
+
+
+def _mesh_entry(mesh: Mesh, into: Container) -> dict[str, Any]:
+    """Entry of a mesh in a page's header; its arrays go into the container."""
+    low, high = mesh.bounds
+    faces = mesh.faces.astype(np.uint32)
+    told: dict[str, Any] = {
+        "name": mesh.name,
+        "center": mesh.center.tolist(),
+        "low": low.tolist(),
+        "high": high.tolist(),
+        "diagonal": mesh.diagonal,
+        "offsets": into.add((mesh.vertices - mesh.center).astype(np.float32), "rows"),
+        "faces": into.add(faces, "rows"),
+        **_normals(mesh, faces, into),
+        "uv": None,
+        "colors": None,
+    }
+    for name, values in (("uv", mesh.uv), ("colors", mesh.colors)):
+        if values is not None:
+            told[name] = into.add(np.asarray(values, np.float32), "rows")
+    return told
+
+
+def _normals(mesh: Mesh, faces: np.ndarray, into: Container) -> dict[str, int | None]:
+    """Normals of vertices, where all faces at each agree; else those that there are, and which each corner has."""
+    normals = drawn_normals(mesh).reshape(-1, 3)
+    ofs = np.zeros((len(mesh.vertices), 3), np.float32)
+    ofs[faces.ravel()] = normals
+    if np.array_equal(ofs[faces.ravel()], normals):
+        return {"normals": into.add(ofs, "rows"), "normal_index": None}
+    found, index = np.unique(normals, axis=0, return_inverse=True)
+    return {
+        "normals": into.add(found.astype(np.float32), "rows"),
+        "normal_index": into.add(index.reshape(faces.shape).astype(np.uint32), "rows"),
+    }
+
+
+class Container:
+    """Header and sections of a page's data.
+
+    Attributes
+    ----------
+    sections : list of dict
+        Where each array is, and how it is packed.
+    """
+
+    def __init__(self) -> None:
+        self.sections: list[dict[str, Any]] = []
+        self._bytes: list[bytes] = []
+        self._end = 0
+
+    def add(self, values: npt.NDArray[Any], packing: str = "plain", bits: int = 23) -> int:
+        """Number of a new section that holds an array.
+
+        Parameters
+        ----------
+        values : ndarray
+            Of float32, float16, uint32 or uint8.
+        packing : {"plain", "rows", "picture"}
+            As it is; of 4-byte values, differences along the last axis but one; or differences to what the pixels to
+            the left and above let expect, along the last axes but one. Bytes of one rank are together.
+        bits : int
+            Bits of the mantissa of floats that are kept; 23 are all.
+        """
+        held = np.ascontiguousarray(values)
+        kinds = {"f4": "float32", "f2": "float16", "u4": "uint32", "u1": "uint8"}
+        section: dict[str, Any] = {"type": kinds[held.dtype.str[1:]], "shape": list(held.shape), "packing": packing}
+        if packing == "plain":
+            packed = held.tobytes()
+        else:
+            section["shift"] = 23 - bits
+            packed = _planes(held.view(np.uint32), packing, 23 - bits)
+        section |= {"offset": self._end, "bytes": len(packed)}
+        padded = packed + bytes(-len(packed) % 8)
+        self._bytes.append(padded)
+        self._end += len(padded)
+        self.sections.append(section)
+        return len(self.sections) - 1
+
+    def packed(self, header: dict[str, Any]) -> bytes:
+        """Header and sections, compressed."""
+        text = json.dumps({**header, "sections": self.sections}, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 8)
+        whole = MAGIC + len(text).to_bytes(8, "little") + text + b"".join(self._bytes)
+        return gzip.compress(whole, 9, mtime=0)
+
+
+def header_of(data: bytes) -> dict[str, Any]:
+    """Header of a packed container."""
+    whole = gzip.decompress(data)
+    start = len(MAGIC) + 8
+    header: dict[str, Any] = json.loads(whole[start : start + int.from_bytes(whole[len(MAGIC) : start], "little")])
+    return header
+
+
+def _planes(words: npt.NDArray[np.uint32], packing: str, shift: int) -> bytes:
+    """Differences of words, their lowest `shift` bits rounded away, as planes of bytes."""
+    rounded = (words.astype(np.uint64) + ((1 << shift) >> 1)) >> np.uint64(shift)
+    found = rounded.astype(np.uint32)
+    if packing == "picture":
+        found = np.diff(found, axis=-3, prepend=np.zeros_like(found[..., :1, :, :]))
+    found = np.diff(found, axis=-2, prepend=np.zeros_like(found[..., :1, :]))
+    signed = found.view(np.int32)
+    folded = ((signed << 1) ^ (signed >> 31)).view(np.uint32)
+    return b"".join((folded >> np.uint32(8 * plane)).astype(np.uint8).tobytes() for plane in range(4))

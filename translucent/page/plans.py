@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from translucent.errors import InputError
-from translucent.page.simplify import triangles
+from translucent.geometry.mesh import Mesh
 from translucent.planning.interfaces import FrontInterface, Interfaces
 from translucent.planning.methods import DepthPeeling, Method
 from translucent.planning.notes import Note, NoteKind
@@ -18,6 +18,95 @@ from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering import Scattering
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS, ShadowMaps
 from translucent.scene.scene import Object, Scene, check_scene
+from translucent.scene.surface import Surface
+
+#: Triangles that a mesh keeps in any case.
+LEAST_FACES = 100
+
+
+def triangles(scene: Scene) -> int:
+    """Triangles of all meshes of a scene, each once."""
+    return sum(len(mesh.faces) for mesh in {body.mesh for body in scene.objects})
+
+
+def simplified(scene: Scene, faces: int) -> Scene:
+    """The scene with about so many triangles in all, by quadric error metrics (Garland & Heckbert 1997).
+
+    Meshes with texture coordinates or colors stay as they are.
+
+    Raises
+    ------
+    InputError
+        If the package fast-simplification, which does it, is not installed; if the number is not above `LEAST_FACES`.
+    """
+    if faces < LEAST_FACES:
+        raise InputError(f"--simplify {faces}", f"fewer than {LEAST_FACES} triangles", "give for example 200000")
+    share = faces / triangles(scene)
+    if share >= 1.0:
+        return scene
+    coarse = {
+        mesh: _coarse(mesh, max(int(share * len(mesh.faces)), LEAST_FACES))
+        for mesh in dict.fromkeys(body.mesh for body in scene.objects)
+        if mesh.uv is None and mesh.colors is None and len(mesh.faces) > LEAST_FACES
+    }
+    return replace(scene, objects=[replace(body, mesh=coarse.get(body.mesh, body.mesh)) for body in scene.objects])
+
+
+def _coarse(mesh: Mesh, faces: int) -> Mesh:
+    try:
+        import fast_simplification
+    except ImportError as error:
+        do = "pip install fast-simplification, or reduce the model before, for example in Blender"
+        raise InputError("--simplify", "the package fast-simplification is not installed", do) from error
+    # It asks for arrays that it could write to; more haste than this makes bodies thinner, by several percent.
+    points, triangles = np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32)
+    vertices, kept = fast_simplification.simplify(points, triangles, target_count=faces, agg=3)
+    return Mesh(vertices, kept, name=mesh.name)
+
+
+#: What a body gets in a variant whose passes it is to have, where it has none: the page puts its own in place.
+USUAL_IOR, USUAL_ROUGHNESS = 1.5, 0.5
+
+
+def editable(body: Object) -> str:
+    """Reason for which a page cannot change the medium of a body; empty if it can."""
+    medium = body.medium
+    if medium is None or body.covers:
+        return "opaque"
+    if np.any(np.asarray(medium.scattering) > 0):
+        return (
+            "This medium scatters light. How that spreads was solved when the page was written, for this medium alone: "
+            "it stays, while view, exposure and other media change. For another one, write the page again."
+        )
+    if medium.emits:
+        return "This medium glows: it stays as it is."
+    if body.density is not None:
+        return "The density of this medium varies: it stays as it is."
+    return ""
+
+
+def variant(scene: Scene, *, bends: bool, rough: bool) -> Scene:
+    """The scene with media of bodies that a page can change made to bend light or not, polished or not."""
+    return replace(scene, objects=[_changed(body, bends, rough) for body in scene.objects])
+
+
+def _changed(body: Object, bends: bool, rough: bool) -> Object:
+    if body.medium is None or editable(body):
+        return body
+    medium, surface = body.medium, body.surface or Surface()
+    ior = (medium.ior if medium.ior != 1.0 else USUAL_IOR) if bends else 1.0
+    roughness = (surface.roughness or USUAL_ROUGHNESS) if rough else 0.0
+    shown = replace(surface, roughness=roughness)
+    plain = body.surface is None and roughness == 0.0
+    return replace(body, medium=replace(medium, ior=ior), surface=None if plain else shown)
+
+
+def current(scene: Scene) -> tuple[bool, bool]:
+    """Switches as they are: any medium that a page can change bends light; any of their surfaces is rough."""
+    free = [body for body in scene.objects if body.medium is not None and not editable(body)]
+    bends = any(body.medium is not None and body.medium.ior != 1.0 for body in free)
+    return bends, any(body.surface is not None and body.surface.roughness > 0 for body in free)
+
 
 #: Textures that WebGL2 promises in a shader. Passes that trace rays have theirs put together, and so read as many as
 #: `UNITS_WITH_SHADOWS` in these.
@@ -154,9 +243,6 @@ def _planned(
     for step in chosen.passes:
         if (what := _NOT_SHOWN.get(step.name)) is not None:
             asked = f"a page of this scene with {method or chosen.method}"
-            raise InputError(asked, f"WebGL2 has no {what}", _instead(chosen))
+            do = "leave it out" if isinstance(chosen.method, DepthPeeling) else "use another --method"
+            raise InputError(asked, f"WebGL2 has no {what}", do)
     return chosen
-
-
-def _instead(chosen: RenderPlan) -> str:
-    return "use another --method" if not isinstance(chosen.method, DepthPeeling) else "leave it out"

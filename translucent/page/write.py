@@ -13,9 +13,8 @@ from translucent.assets import web_path
 from translucent.errors import InputError
 from translucent.files.paths import require_output, write_text_atomically
 from translucent.formulas.tone import tone_curve
-from translucent.frames.frame import check_exposure
-from translucent.page.meshes import name_of
-from translucent.page.payload import payload
+from translucent.frames.frame import Frame, check_exposure
+from translucent.page.payload import name_of, payload
 from translucent.page.plans import PagePlan, plan_page
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
@@ -231,3 +230,23 @@ def _kind(picture: bytes, asked: str) -> str:
         if picture.startswith(head):
             return kind
     raise InputError(asked, "no PNG, JPEG or WebP picture", "give one of these")
+
+
+def frame_html(frame: Frame, exposure: float, tone: str, name: str | None) -> str:
+    """Text of a page; see `Frame.to_html`."""
+    asked = f"a page of {frame!r}"
+    scene, choices = frame.scene, frame.choices
+    if scene is None:
+        found = "it holds no scene: it was drawn before a backdrop, or put together by hand"
+        raise InputError(asked, found, "write one of the whole scene: tl.write_page(scene, 'viewer.html')")
+    if choices.caustics is not None:
+        raise InputError(asked, "it has caustics, and WebGL2 has no photons", "render without caustics")
+    planned = plan_page(
+        scene,
+        choices.method,
+        interfaces=choices.interfaces,
+        scattering=choices.scattering,
+        shadows=choices.shadows,
+    )
+    poster = jpeg(frame.to_srgb8(exposure, tone)) if frame.alpha is None else None
+    return page_html(planned, name or title_of(scene), frame.size, exposure=exposure, tone=tone, poster=poster)

@@ -313,7 +313,7 @@ class Scene(Frozen):
     def _repr_mimebundle_(self, **_: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         """A small picture and what is in the scene, for notebooks."""
         # By name: a scene is a value, and knows of no renderer.
-        found: tuple[dict[str, Any], dict[str, Any]] = import_module("translucent.notebook.showing").scene_bundle(self)
+        found: tuple[dict[str, Any], dict[str, Any]] = import_module("translucent.notebook.view").scene_bundle(self)
         return found
 
     def _repr_html_(self) -> str:

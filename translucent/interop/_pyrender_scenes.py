@@ -1,0 +1,339 @@
+"""Conversion between scenes of pyrender and of the toolkit, and of its pictures. Import it by the shim only."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+import pyrender
+from pyrender.constants import MAX_N_LIGHTS
+
+from translucent.arrays import Array
+from translucent.errors import InputError
+from translucent.geometry.mesh import Mesh, mended
+from translucent.gpu.placement import depth_range
+from translucent.media.medium import Medium
+from translucent.scene.backdrop import Backdrop
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight, SpotLight
+from translucent.scene.scene import Light, Object, Overlap, Scene
+
+#: pyrender encodes the radiance that it finds as a power, and cuts it off at 1 (its shaders/mesh.frag).
+GAMMA = 2.2
+
+
+@dataclass(frozen=True)
+class Clipping:
+    """Depth range of a pyrender camera: from `near` to `far` metres along its forward axis."""
+
+    near: float
+    far: float
+    orthographic: bool
+
+    @classmethod
+    def of(cls, scene: Any) -> Clipping:
+        """Depth range of the scene's camera."""
+        camera = scene.main_camera_node.camera
+        far = math.inf if camera.zfar is None else camera.zfar
+        return cls(camera.znear, far, isinstance(camera, pyrender.OrthographicCamera))
+
+    def metres(self, depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+        """Metres ahead of what the depth test compared, 0 to 1; ``inf`` at 1. The twin of ``shade/backdrop.frag``."""
+        share = depth.astype(np.float64)
+        nothing = share >= 1.0
+        share[nothing] = 0.0
+        if self.orthographic:
+            metres = self.near * (1.0 - share) + self.far * share
+        elif math.isinf(self.far):
+            metres = self.near / (1.0 - share)
+        else:
+            metres = self.near * self.far / (self.far * (1.0 - share) + self.near * share)
+        metres[nothing] = math.inf
+        return np.asarray(metres)
+
+
+def ambient_of(scene: Any) -> tuple[float, float, float]:
+    """Radiance of the light from all around with which pyrender draws a scene."""
+    red, green, blue = map(float, scene.ambient_light[:3])
+    return red, green, blue
+
+
+@dataclass(frozen=True, eq=False)
+class PyrenderPicture:
+    """Picture drawn by pyrender, row 0 at the top: `colors` (h, w, 4) uint8, encoded, and `depth` (h, w) in metres; and
+    the light from all around that it was drawn with.
+    """
+
+    colors: npt.NDArray[np.uint8]
+    depth: npt.NDArray[np.float64]
+    ambient: tuple[float, float, float]
+
+    def backdrop(self) -> Backdrop:
+        """The picture with its background."""
+        return Backdrop((self.colors[..., :3] / 255.0) ** GAMMA, self.depth, ambient=self.ambient)
+
+    def before(self, environment: Environment, camera: Camera) -> Backdrop:
+        """The picture before an environment, where it was drawn on a background without opacity."""
+        height, width = self.depth.shape
+        opacity = self.colors[..., 3:] / 255.0
+        # At an edge the mean of the samples has the background in it, which is black.
+        encoded = self.colors[..., :3] / 255.0 / np.where(opacity > 0.0, opacity, 1.0)
+        positions = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1) / height
+        behind = environment.radiance(camera.rays((width, height))[1], positions)
+        radiance = opacity * encoded**GAMMA + (1.0 - opacity) * behind
+        return Backdrop(radiance, self.depth, coverage=opacity[..., 0] > 0.0, ambient=self.ambient)
+
+
+#: A camera whose optical center is off the middle by less than this, in pixels, looks through it.
+_CENTERED = 1e-6
+
+#: Meshes that have been converted, with the arrays that they are made of, as long as those of pyrender live.
+_converted: WeakKeyDictionary[Any, tuple[list[Any], list[tuple[Mesh, Array]]]] = WeakKeyDictionary()
+
+
+def translucent_nodes(scene: Any, names: Collection[str]) -> list[tuple[Any, str]]:
+    """The visible mesh nodes of these names, or with meshes of these names, and which name it was; in a fixed order."""
+    if not isinstance(scene, pyrender.Scene):
+        raise InputError(f"pyrender scene {scene!r}", f"of type {type(scene).__name__}", "give a pyrender.Scene")
+    nodes = sorted((node for node in scene.mesh_nodes if node.mesh.is_visible), key=_order)
+    known = {name for node in nodes for name in (node.name, node.mesh.name) if name is not None}
+    if unknown := sorted(set(names) - known):
+        listed = ", ".join(map(repr, sorted(known))) or "no names: give nodes some, scene.add(mesh, name=...)"
+        raise InputError(
+            f"media for {', '.join(map(repr, unknown))}",
+            f"no visible node or mesh of the pyrender scene has the name; it has {listed}",
+            "use one of its names",
+        )
+    chosen = []
+    for node in nodes:
+        if (name := next((name for name in (node.name, node.mesh.name) if name in names), None)) is not None:
+            chosen.append((node, name))
+    return chosen
+
+
+def _order(node: Any) -> tuple[str, str, list[float]]:
+    return node.name or "", node.mesh.name or "", node.matrix.ravel().tolist()
+
+
+def converted(scene: Any, media: Mapping[str, Medium], size: tuple[int, int], overlap: Overlap) -> Scene:
+    """See `translucent.interop.pyrender.scene_from_pyrender`."""
+    objects = []
+    for node, name in translucent_nodes(scene, media):
+        for mesh, pose in _meshes(node, node.mesh.name or name):
+            objects.append(Object(mesh, media[name], scene.get_pose(node) @ pose))
+    if not objects:
+        raise InputError("rendering a pyrender scene", "no medium is given", "give media={'name': tl.Medium(...)}")
+    background = Environment.constant(np.asarray(scene.bg_color[:3], dtype=np.float64) ** GAMMA)
+    return Scene(objects, camera_of(scene, size), _lights(scene), background, overlap)
+
+
+def _meshes(node: Any, name: str) -> list[tuple[Mesh, Array]]:
+    """The mesh of a node, welded and wound, and where in the node it is; several if there are instances."""
+    arrays = [array for p in node.mesh.primitives for array in (p.positions, p.indices, p.poses)]
+    known = _converted.get(node.mesh)
+    if known is None or len(known[0]) != len(arrays) or any(a is not b for a, b in zip(known[0], arrays, strict=True)):
+        placed = [(mended(raw), pose) for raw, pose in _raw_meshes(node.mesh, name)]
+        known = _converted[node.mesh] = arrays, placed
+    return known[1]
+
+
+def _raw_meshes(mesh: Any, name: str) -> Iterator[tuple[Mesh, Array]]:
+    parts = [(p, *_triangles(p, name)) for p in mesh.primitives]
+    instanced = [part for part in parts if part[0].poses is not None]
+    for primitive, vertices, faces in instanced:
+        raw = Mesh(vertices, faces, name=name)
+        for pose in primitive.poses:
+            yield raw, np.asarray(pose, dtype=np.float64)
+    # What is not instanced may bound a body only together.
+    if single := [part for part in parts if part[0].poses is None]:
+        starts = np.cumsum([0] + [len(vertices) for _, vertices, _ in single], dtype=np.int32)
+        faces = np.concatenate([faces + start for (_, _, faces), start in zip(single, starts, strict=False)])
+        yield Mesh(np.concatenate([vertices for _, vertices, _ in single]), faces, name=name), np.eye(4)
+
+
+def _triangles(primitive: Any, name: str) -> tuple[Array, npt.NDArray[np.int32]]:
+    if primitive.mode != pyrender.GLTF.TRIANGLES:
+        raise InputError(
+            f"the medium of {name!r}", f"its mesh has a primitive of mode {primitive.mode}", "give it triangles"
+        )
+    vertices = np.asarray(primitive.positions, dtype=np.float64)
+    corners = np.arange(len(vertices)) if primitive.indices is None else np.asarray(primitive.indices)
+    return vertices, corners.reshape(-1, 3).astype(np.int32)
+
+
+def camera_of(scene: Any, size: tuple[int, int]) -> Camera:
+    """The camera that a pyrender scene is drawn with, if it is one of the toolkit's kinds."""
+    node = scene.main_camera_node
+    if node is None:
+        raise InputError("rendering a pyrender scene", "it has no camera", "add one: scene.add(camera, pose=...)")
+    camera, pose = node.camera, scene.get_pose(node)
+    if isinstance(camera, pyrender.OrthographicCamera):
+        # pyrender takes the width from the picture, whatever xmag says.
+        return Camera(pose, fov_y=None, height=2.0 * camera.ymag)
+    if isinstance(camera, pyrender.IntrinsicsCamera):
+        off = (camera.cx - size[0] / 2, camera.cy - size[1] / 2)
+        if max(map(abs, off)) > _CENTERED or not math.isclose(camera.fx, camera.fy, rel_tol=1e-9):
+            raise InputError(
+                "camera of the pyrender scene",
+                f"its intrinsics fx {camera.fx:g}, fy {camera.fy:g}, cx {camera.cx:g}, cy {camera.cy:g} do not look "
+                f"through the middle of {size[0]}x{size[1]} with square pixels",
+                "draw in the size that they are for, with fx = fy, or use a PerspectiveCamera",
+            )
+        return Camera(pose, fov_y=math.degrees(2.0 * math.atan(size[1] / (2.0 * camera.fy))))
+    if camera.aspectRatio is not None and not math.isclose(camera.aspectRatio, size[0] / size[1], rel_tol=1e-6):
+        raise InputError(
+            "camera of the pyrender scene",
+            f"aspectRatio {camera.aspectRatio:g} for a picture of {size[0]}x{size[1]}, which it stretches",
+            "leave aspectRatio out: it is that of the picture then",
+        )
+    return Camera(pose, fov_y=math.degrees(camera.yfov))
+
+
+def _lights(scene: Any) -> list[Light]:
+    found: list[Light] = []
+    for node in sorted(scene.light_nodes, key=lambda node: (node.name or "", node.matrix.ravel().tolist())):
+        light, pose = node.light, scene.get_pose(node)
+        if np.linalg.matrix_rank(pose[:3, :3]) < 3:
+            raise InputError(
+                f"light {light.name or node.name or 'without a name'!r} of the pyrender scene",
+                "the transform of its node is singular (a scale of 0, in it or above it)",
+                "give every axis a scale other than 0",
+            )
+        power = light.intensity * np.asarray(light.color, dtype=np.float64)
+        if isinstance(light, pyrender.PointLight):
+            found.append(PointLight(pose[:3, 3], power))
+        elif isinstance(light, pyrender.SpotLight):
+            outer = min(math.degrees(light.outerConeAngle), 90.0)
+            # Equal cones are an edge, there.
+            inner = min(math.degrees(light.innerConeAngle), math.nextafter(outer, 0.0))
+            found.append(SpotLight(pose[:3, 3], -pose[:3, 2], power, inner, outer))
+        else:
+            found.append(DirectionalLight(-pose[:3, 2], power))
+    return found
+
+
+def written(scene: Scene, near: float | None = None) -> Any:
+    """See `translucent.interop.pyrender.to_pyrender`; `near` is that of the camera, if something closer is known."""
+    environment = scene.environment
+    part = pyrender.Scene(bg_color=np.zeros(4), ambient_light=environment.mean)
+    for item in scene.opaque:
+        part.add(pyrender.Mesh([_primitive(item, scene.camera)], name=item.mesh.name))
+    _add_lights(part, scene)
+    _add(part, _camera(scene, near), _turned(scene.camera.pose[:3, :3]))
+    return part
+
+
+def _primitive(item: Object, camera: Camera) -> Any:
+    """Flat faces whose normals look at the camera, as all faces reflect alike on both sides; offsets from the eye."""
+    vertices = item.mesh.vertices @ item.matrix[:3, :3].T + (item.matrix[:3, 3] - camera.eye)
+    corners = vertices[item.mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    view = camera.forward if camera.fov_y is None else corners[:, 0]
+    away = np.sum(normals * view, axis=1) > 0
+    normals[away] = -normals[away]
+    return pyrender.Primitive(
+        corners.reshape(-1, 3),
+        np.repeat(normals, 3, axis=0),
+        material=pyrender.MetallicRoughnessMaterial(
+            baseColorFactor=[*item.base_color, 1.0], metallicFactor=0.0, roughnessFactor=1.0, doubleSided=True
+        ),
+    )
+
+
+def _add_lights(part: Any, scene: Scene) -> None:
+    for kind in {type(light) for light in scene.lights}:
+        if (count := sum(isinstance(light, kind) for light in scene.lights)) > MAX_N_LIGHTS:
+            raise InputError(
+                "drawing with pyrender", f"{count} of {kind.__name__}", f"use at most {MAX_N_LIGHTS} of each kind"
+            )
+    for light in scene.lights:
+        pose = np.eye(4)
+        if isinstance(light, SpotLight | DirectionalLight):
+            backward = -np.asarray(light.direction)
+            right = np.cross(np.eye(3)[np.argmin(np.abs(backward))], backward)
+            right /= np.linalg.norm(right)
+            pose = _turned(np.column_stack([right, np.cross(backward, right), backward]))
+        if not isinstance(light, DirectionalLight):
+            pose[:3, 3] = np.asarray(light.position) - scene.camera.eye
+        _add(part, _light(light), pose)
+
+
+def _light(light: Light) -> Any:
+    if isinstance(light, DirectionalLight):
+        return pyrender.DirectionalLight(color=np.asarray(light.irradiance), intensity=1.0)
+    color = np.asarray(light.intensity)
+    if isinstance(light, SpotLight):
+        cones = np.radians((light.inner_cone, light.outer_cone))
+        return pyrender.SpotLight(color, intensity=1.0, innerConeAngle=cones[0], outerConeAngle=cones[1])
+    return pyrender.PointLight(color=color, intensity=1.0)
+
+
+def _camera(scene: Scene, near: float | None) -> Any:
+    camera = scene.camera
+    closest, far = depth_range(scene.boxes[~scene.filled], camera, scene.diagonal)
+    if camera.fov_y is None:
+        # What is behind an orthographic picture is not seen, and what is ahead has the same precision everywhere.
+        far = max(far, scene.diagonal)
+        return pyrender.OrthographicCamera(1.0, 0.5 * (camera.height or 1.0), znear=1e-6 * far, zfar=far)
+    return pyrender.PerspectiveCamera(np.radians(camera.fov_y), znear=near or closest, zfar=far)
+
+
+def _turned(rotation: Array) -> Array:
+    pose = np.eye(4)
+    pose[:3, :3] = rotation
+    return pose
+
+
+def _add(part: Any, item: Any, pose: Array) -> None:
+    part.set_pose(part.add(item), pose)  # as it is; nodes that are made with a matrix take it apart
+
+
+def opaque_part(scene: Any, hidden: Collection[Any]) -> Any:
+    """The scene as one of its own, in which the nodes in `hidden` are not visible; shadow maps make room for them yet.
+
+    pyrender marks what it draws as bound to the context where it does so, and refuses it elsewhere. The scene that was
+    given may be drawn by another renderer of pyrender, so this one gets twins of all that would be marked.
+    """
+    part = pyrender.Scene(bg_color=scene.bg_color, ambient_light=scene.ambient_light)
+    meshes: dict[tuple[Any, bool], Any] = {}
+    textures: dict[Any, Any] = {}
+    for node in scene.nodes:
+        mesh = light = None
+        if node.mesh is not None:
+            key = node.mesh, node.mesh.is_visible and node not in hidden
+            if key not in meshes:
+                meshes[key] = _unbound_mesh(*key, textures)
+            mesh = meshes[key]
+        if node.light is not None:
+            light = copy.copy(node.light)
+            light._shadow_texture = None
+        twin = pyrender.Node(mesh=mesh, light=light, camera=node.camera)
+        part.add_node(twin)
+        part.set_pose(twin, scene.get_pose(node))
+        if node is scene.main_camera_node:
+            part.main_camera_node = twin
+    return part
+
+
+def _unbound_mesh(mesh: Any, visible: bool, textures: dict[Any, Any]) -> Any:
+    primitives = []
+    for primitive in mesh.primitives:
+        twin = copy.copy(primitive)
+        twin._vaid, twin._buffers = None, []
+        twin.material = copy.copy(primitive.material)
+        for name, value in vars(primitive.material).items():
+            if isinstance(value, pyrender.Texture):
+                if value not in textures:
+                    textures[value] = copy.copy(value)
+                    textures[value]._texid = None
+                setattr(twin.material, name, textures[value])
+        primitives.append(twin)
+    return pyrender.Mesh(primitives, is_visible=visible)
