@@ -259,9 +259,9 @@ def test_what_has_no_page_says_what_to_do(renderer: tl.Renderer) -> None:
     frame = tl.reference.render(scene, (4, 3))
     with tl.Renderer("cpu") as cpu:
         assert frame.scene is cpu.render(scene, (4, 3)).scene is scene  # these have one
-    with pytest.raises(tl.InputError, match=r"name 3; not a text"):
+    with pytest.raises(tl.InputError, match=r"to_html name 3; it is of type int"):
         frame.to_html(name=3)  # type: ignore[arg-type]
-    with pytest.raises(tl.InputError, match=r"exposure 'Wine'; not a number"):
+    with pytest.raises(tl.InputError, match=r"to_html exposure 'Wine'; it is of type str"):
         frame.to_html("Wine")  # type: ignore[arg-type]
     with pytest.raises(tl.InputError, match=r"caustics.*render without"):
         dataclasses.replace(frame, choices=RenderChoices(caustics=tl.Caustics(100))).to_html()
