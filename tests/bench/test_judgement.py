@@ -198,6 +198,8 @@ def test_claims_hold_where_the_numbers_do() -> None:
     )
     assert claims(case(*good), case(*good, name="far slab"), hard=ALL_HARD) == [*[True] * 6, *[None] * 15, True]
     assert claims() == [None] * 22
+    counts = {len([judge for one in experiments(quick) for judge in one.claims]) for quick in (False, True)}
+    assert counts == {22}, "a quick run says what it has not checked"
 
 
 def test_hard_cases_hold_where_each_that_there_is_has_been_measured_and_holds() -> None:

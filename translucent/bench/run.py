@@ -66,6 +66,7 @@ def experiments(quick: bool, extra: Sequence[Case] = (), methods: Sequence[str] 
         ),
         SkyShadows(environments=("sky",), directions=(8, 32), size=(24, 18), strata=12),
         GroundCaustics([one for one in CAUSTIC_SCENES if one.quick], (62_500,), 10_000, (80, 60)),
+        MediumCaustics(()),  # their truths take minutes
         HardCases(),
     )
 
