@@ -7,9 +7,8 @@ import sys
 
 def main() -> int:
     """Run the command line and return its exit code; Ctrl-C is one line from the first import on."""
-    heeds = (
-        signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    )  # of those that a shell starts with &, none does
+    # A shell that starts the command with & has it ignore Ctrl-C.
+    heeds = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if heeds:
         # Nothing has begun. An exception would be lost where Python imports by callbacks.
         signal.signal(signal.SIGINT, _leave)
