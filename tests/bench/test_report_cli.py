@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import sys
+import time
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -153,10 +155,12 @@ def test_a_folder_that_cannot_be_is_an_error_before_any_work(run: Run, new: Path
         (["knot", "--color", "teal"], "--distance is missing"),
         (["knot", "--preset", "milk"], "did you mean skim_milk"),
         (["--from", "absent.json", "-o", "out"], "no such file"),
+        (["--limit", "0"], "--limit 0; not above 0; give seconds, such as 600"),
+        (["--from", "x.json", "--limit", "5"], "nothing is measured"),
     ],
     ids=[
         *("from and quick", "from and a model", "from a medium", "no such part", "a model in no part"),
-        *("no model", "no distance", "preset", "no such file"),
+        *("no model", "no distance", "preset", "no such file", "no time", "from and a limit"),
     ],
 )
 def test_bad_usage(
@@ -259,6 +263,34 @@ def test_interrupted_the_finished_scenes_are_written(run: Run, tmp_path: Path, m
     assert "Not complete." in (tmp_path / "report.html").read_text()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="there a scene is finished")
+@pytest.mark.usefixtures("nothing_else")
+def test_a_limit_ends_measuring_and_what_was_not_measured_is_named(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from translucent.bench.methods import MethodComparison
+
+    def patient(self: MethodComparison, bench: Any, case: Any) -> Any:
+        if case.name == "model bear":
+            time.sleep(60.0)
+        return self.blank(bench, case)
+
+    monkeypatch.setattr(MethodComparison, "measure", patient)
+    result = run("knot", "bear", "shell", "-o", tmp_path, "--limit", "0.5", *SMALL)
+    assert result.code == 0
+    assert result.err.splitlines() == [
+        *(f"reading {name}" for name in ("knot", "bear", "shell")),
+        "measuring 1 of 3: case model knot",
+        "measuring 2 of 3: case model bear",
+        "warning: not measured within 0.5 s: case model bear, case model shell",
+    ]
+    made = Report.from_json((tmp_path / "report.json").read_text())
+    assert [case.name for case in made.cases] == ["model knot"]
+    assert made.unmeasured == ("case model bear", "case model shell")
+    assert not made.complete
+    assert "Not measured: case model bear, case model shell." in (tmp_path / "report.html").read_text()
+
+
 @pytest.mark.usefixtures("nothing_else")
 def test_a_case_that_fails_leaves_the_others(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from translucent.bench.truth import CaseTruth
@@ -320,7 +352,7 @@ def test_bad_input_is_found_before_measuring(run: Run, tmp_path: Path, arguments
     result = run("-o", tmp_path / "out", *arguments)
     assert result.code == 2
     assert message in result.err
-    assert result.err.startswith("error: ")
+    assert result.err.splitlines()[-1].startswith("error: ")
     assert result.err.count("\n") == 1
     assert not (tmp_path / "out").exists()
 

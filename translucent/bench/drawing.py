@@ -128,6 +128,8 @@ class BenchContext:
     clock : callable
         By which drawings are compared. Where the CPU draws, it is the processor time of all threads: the work that a
         drawing is, whatever else the machine does meanwhile.
+    doing : callable
+        Hears what is done for the scene that is measured: ``"method 3 of 12"``.
     """
 
     def __init__(
@@ -139,6 +141,7 @@ class BenchContext:
         self.timer = PassTimer(self.gl)
         self.software = is_software(renderer)
         self.clock = time.process_time if self.software else time.perf_counter
+        self.doing: Callable[[str], None] = lambda _: None
         self._own: dict[Callable[[Any], Any], Any] = {}
         self._light: dict[Diffusion, DiffusionCache] = {}
 

@@ -91,8 +91,13 @@ class Experiment(Generic[SceneT]):
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", TranslucentWarning)  # rows tell what pixels are not valid
+                bench.doing("truth")
                 truth = self.truth(bench, scene)
-                rows = [self.row(bench, truth, contender) for contender in self.contenders(truth)]
+                rows, contenders = [], self.contenders(truth)
+                for number, contender in enumerate(contenders, 1):
+                    bench.doing(f"method {number} of {len(contenders)}")
+                    rows.append(self.row(bench, truth, contender))
+                bench.doing("record")
                 return self.record(bench, blank, truth, rows)
         except Exception as error:  # noqa: BLE001 - a scene that cannot be measured leaves the others alone
             return dataclasses.replace(blank, failure=one_line(error))

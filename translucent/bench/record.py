@@ -656,6 +656,8 @@ class Report:
         False where it was interrupted, or while it is being made: its numbers are usable.
     renewals : tuple of Renewal
         Parts measured anew after the rest; `provenance` and `seconds` are those of the rest.
+    unmeasured : tuple of str
+        Scenes that the run did not come to, or did not finish.
     """
 
     provenance: Provenance
@@ -668,6 +670,7 @@ class Report:
     slabs: tuple[Slab, ...] = ()
     shadows: Shadows = field(default_factory=Shadows)
     renewals: tuple[Renewal, ...] = ()
+    unmeasured: tuple[str, ...] = ()
     format: str = field(default=FORMAT)
     version: int = field(default=VERSION)
 

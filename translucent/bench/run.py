@@ -5,11 +5,15 @@ from __future__ import annotations
 import dataclasses
 import os
 import platform
+import signal
 import subprocess
+import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, get_args
@@ -81,6 +85,7 @@ def measure_all(
     effort: Effort | None = None,
     only: Sequence[Part] = (),
     base: Report | None = None,
+    limit: float | None = None,
     command: str = "tl.bench.measure_all(...)",
     progress: Progress = lambda *_: None,
     keep: Callable[[Report], None] = lambda _: None,
@@ -105,6 +110,9 @@ def measure_all(
         Parts to measure; default: all.
     base : Report, optional
         What else there is, measured before: these parts are renewed in it, as the report notes.
+    limit : float, optional
+        Seconds after which measuring ends as by a `KeyboardInterrupt`; on Windows, and outside the main thread, once
+        the scene that is measured is done.
     command : str
         What the record says has made it.
     progress : callable
@@ -115,7 +123,8 @@ def measure_all(
     Returns
     -------
     Report
-        Unfinished (``complete`` False) after a `KeyboardInterrupt`: with all that had been measured before.
+        Unfinished (``complete`` False) after a `KeyboardInterrupt`: with all that had been measured before, and the
+        names of what had not.
 
     Raises
     ------
@@ -139,13 +148,20 @@ def measure_all(
             renewals = (*base.without(parts).renewals, Renewal(parts, made, seconds))
             return dataclasses.replace(found, renewals=renewals, complete=complete and base.complete)
 
-        report = stamped(Report(made) if base is None else base.without(parts), complete=False)
+        names = [name for name, _, _ in _steps(bench, every, parts)]
+        report = Report(made) if base is None else base.without(parts)
+        others = tuple(name for name in report.unmeasured if name not in names)
+        report = stamped(dataclasses.replace(report, unmeasured=(*others, *names)), complete=False)
         try:
-            for found in measured(bench, every, parts, report, progress):
-                report = stamped(found, complete=False)
-                keep(report)
+            with _alarm(limit):
+                for number, found in enumerate(measured(bench, every, parts, report, progress), 1):
+                    left = (*others, *names[number:])
+                    report = stamped(dataclasses.replace(found, unmeasured=left), complete=False)
+                    keep(report)
+                    if limit is not None and time.perf_counter() - begin >= limit and number < len(names):
+                        raise KeyboardInterrupt
         except KeyboardInterrupt:
-            return report
+            return stamped(report, complete=False)
         report = stamped(report, complete=True)
     keep(report)
     return report
@@ -182,14 +198,42 @@ def measured(
     progress: Progress = lambda *_: None,
 ) -> Iterator[Report]:
     """Measure the experiments of some parts, and yield the report after each scene."""
-    steps = [(one, scene) for one in every if one.part in parts for scene in one.scenes(bench)]
-    for done, (experiment, scene) in enumerate(steps):
-        progress(f"{experiment.label}{scene.name}", done, len(steps))
+    steps = _steps(bench, every, parts)
+    for done, (name, experiment, scene) in enumerate(steps):
+        progress(name, done, len(steps))
+        bench.doing = partial(_tell_doing, progress, name, done, len(steps))
         report = experiment.added(report, experiment.measure(bench, scene))
         claims = tuple(judge(report) for one in every for judge in one.claims)
         report = dataclasses.replace(report, claims=claims)
         bench.renderer.gpu.context.drain()
         yield report
+
+
+def _steps(
+    bench: BenchContext, every: Sequence[Experiment[Any]], parts: Sequence[Part]
+) -> list[tuple[str, Experiment[Any], Any]]:
+    """Name, experiment and scene of each step of these parts."""
+    wanted = [(one, scene) for one in every if one.part in parts for scene in one.scenes(bench)]
+    return [(f"{one.label}{scene.name}", one, scene) for one, scene in wanted]
+
+
+def _tell_doing(progress: Progress, name: str, done: int, total: int, doing: str) -> None:
+    progress(f"{name}, {doing}", done, total)
+
+
+@contextmanager
+def _alarm(seconds: float | None) -> Iterator[None]:
+    """Raise `KeyboardInterrupt` within, after some seconds, where the system can."""
+    if sys.platform == "win32" or seconds is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def provenance(renderer: Renderer, command: str, *, quick: bool) -> Provenance:

@@ -8,6 +8,7 @@ import io
 import json
 import shlex
 import sys
+import time
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +16,10 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from translucent.commands.console import echo, is_terminal
+from translucent.commands.console import FILE, echo, is_terminal
 from translucent.commands.model import SceneRequest, read_scene, require_translucent
 from translucent.commands.options import FileOptions, MediumOptions, group, option, read_size, takes
-from translucent.errors import InputError, RenderError
+from translucent.errors import InputError, RenderError, message_of, printable
 
 if TYPE_CHECKING:
     from translucent.bench.judgement import Agreement
@@ -48,6 +49,9 @@ class ReportOptions:
         metavar="JSON",
         help="Measure nothing: take the report of this file; with --only, measure these parts of it anew.",
     )
+    limit: float | None = option(
+        metavar="SECONDS", help="End measuring after so long; the report names what was not measured."
+    )
     compare: Path | None = option(metavar="JSON", help="Tell what got worse since this; exit code 1 if so.")
     medium: MediumOptions = group(MediumOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
@@ -68,7 +72,7 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
     from translucent.bench.output import checked_folder, read_report, table, write_outputs
 
     parts, source, output, filling = _parts(given.only), given.source, given.output, given.medium
-    measuring = models or given.quick or given.size or given.methods or given.backend
+    measuring = models or given.quick or given.size or given.methods or given.backend or given.limit is not None
     if source is not None and not parts and (measuring or filling.color or filling.distance or filling.preset):
         raise InputError(
             f"--from {source}", "nothing is measured, so there is nothing else to ask for", "leave one out"
@@ -76,15 +80,20 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
     if models and parts and "scenes" not in parts:
         do = "add scenes, or leave MODEL out"
         raise InputError(f"--only {given.only}", "a MODEL is measured among the scenes", do)
+    if given.limit is not None and not given.limit > 0.0:
+        raise InputError(f"--limit {given.limit:g}", "not above 0", "give seconds, such as 600")
     medium = filling.read()
     if medium is not None and not models:
         asked = "--color" if filling.preset is None else f"--preset {filling.preset}"
         raise InputError(asked, "no MODEL to fill; the toolkit's scenes keep their media", "add a MODEL")
+    limited = False
     before = None if given.compare is None else read_report(given.compare)
     made = None if source is None else read_report(source)
     with nullcontext() if output is None else checked_folder(output):
         if made is None or parts:
+            begin = time.monotonic()
             made = _measured(models, medium, given, parts, made)
+            limited = given.limit is not None and time.monotonic() - begin >= given.limit
         files = [] if output is None else write_outputs(made, output)
     changes = None if before is None else compare_reports(before, made)
     agreed = None if before is None else agreement(before, made)
@@ -97,7 +106,10 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
     if output is None and before is None and not as_json:
         echo(table(made))
     if not made.complete and (source is None or parts):
-        raise click.exceptions.Abort
+        if not limited:
+            raise click.exceptions.Abort
+        told = message_of(f"not measured within {given.limit:g} s: {', '.join(made.unmeasured)}")
+        echo(f"warning: {told}", err=True)
     worse = [change for change in changes or () if change.worse]
     if made.failures:
         raise RenderError(
@@ -111,28 +123,37 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
 def _measured(
     models: tuple[str, ...], medium: Medium | None, given: ReportOptions, parts: tuple[Part, ...], base: Report | None
 ) -> Report:
-    """Measure, with a bar that tells how far it is; each finished scene is in ``report.json`` at once."""
+    """Measure, and tell from the beginning how far it is; each finished scene is in ``report.json`` at once."""
     from translucent.bench.cases import model_cases
     from translucent.bench.output import write_report
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
 
     pixels = read_size(given.size) if given.size is not None else QUICK_SIZE if given.quick else FULL_SIZE
     asked = SceneRequest(medium=medium, file=given.file, size=pixels)
-    scenes = {model: read_scene(model, asked) for model in models}
-    for model, scene in scenes.items():
-        require_translucent(model, scene)
+    scenes = {}
+    for model in models:
+        echo(f"reading {printable(model)}", err=True)
+        scenes[model] = read_scene(model, asked)
+        require_translucent(model, scenes[model])
 
     def keep(part: Report) -> None:
         if given.output is not None:
             write_report(part, given.output / "report.json")
 
-    # Where nobody watches, the bar would be an empty line before an error.
-    shown_in = sys.stderr if is_terminal(sys.stderr) else io.StringIO()
-    with click.progressbar(length=1, file=shown_in, item_show_func=str) as bar:
+    watched = is_terminal(sys.stderr)
+    with click.progressbar(length=1, file=sys.stderr if watched else io.StringIO(), item_show_func=_shown) as bar:
+        told = 0, -FILE[1]
 
-        def progress(what: str, done: int, parts: int) -> None:
-            bar.length = parts
+        def progress(what: str, done: int, steps: int) -> None:
+            nonlocal told
+            bar.length = steps
             bar.update(done - bar.pos, what)
+            bar.render_progress()  # without a step it would show nothing new
+            now = time.monotonic()
+            # Nobody watches the bar in a file: lines tell of each scene, and now and then of what is done for it.
+            if not watched and (done >= told[0] or now - told[1] >= FILE[1]):
+                told = done + 1, now
+                echo(f"measuring {done + 1} of {steps}: {printable(what)}", err=True)
 
         return measure_all(
             model_cases(scenes),
@@ -142,10 +163,15 @@ def _measured(
             backend=given.backend,
             only=parts,
             base=base,
+            limit=given.limit,
             command=_command(models, given),
             progress=progress,
             keep=keep,
         )
+
+
+def _shown(what: str | None) -> str:
+    return printable(what or "")
 
 
 def _parts(only: str | None) -> tuple[Part, ...]:
@@ -165,8 +191,13 @@ def _parts(only: str | None) -> tuple[Part, ...]:
 def _command(models: tuple[str, ...], given: ReportOptions) -> str:
     """Command line of the user, as far as it tells what was measured."""
     medium = given.medium
-    options = {"-o": given.output, "--size": given.size, "--methods": given.methods, "--backend": given.backend}
-    options |= {"--only": given.only, "--from": given.source}
+    options: dict[str, object] = {
+        "-o": given.output,
+        "--size": given.size,
+        "--methods": given.methods,
+        "--backend": given.backend,
+    }
+    options |= {"--only": given.only, "--from": given.source, "--limit": given.limit}
     options |= {"--color": medium.color, "--distance": medium.distance, "--preset": medium.preset}
     options |= {"--unit": given.file.unit if given.file.unit != "m" else None}
     words = ["translucent", "report", *models]
@@ -181,6 +212,7 @@ def _summary(made: Report, files: list[Path], changes: Any, agreed: Agreement | 
     return {
         "files": [str(path) for path in files],
         "complete": made.complete,
+        "unmeasured": list(made.unmeasured),
         "seconds": made.seconds,
         "answers": [_answer(case) for case in made.cases],
         "shadows": {case.name: _shadow(case) for case in made.shadows.cases},
