@@ -91,7 +91,7 @@ def throughput(
 def _embree_alone(unwrapped: Unwrapped, size: int, rays: int, threads: int) -> Callable[[], tuple[float, float]]:
     """A round of Embree alone: millions of rays a second, by the clock and of processor time."""
     surface = Surface.of(unwrapped.mesh)
-    measure = Measure.of(surface, BakeSettings(size=size, rays=rays))
+    measure = Measure(surface, BakeSettings(size=size, rays=rays))
     prepared = _prepared(measure, _some_points(surface, unwrapped, size, SAMPLE // rays))
     count = sum(len(origins) for origins, _ in prepared) / 1e6
 

@@ -62,7 +62,7 @@ def compare(mesh: tl.Mesh, mode: str, rounds: int, processor_time: bool) -> str:
     smooth = Surface.of(mesh)
     # trimesh has the normals of the faces.
     surface = dataclasses.replace(smooth, normals=np.repeat(smooth.planes[:, None, :3], 3, axis=1))
-    measure = Measure.of(surface, BakeSettings(mode=mode))  # type: ignore[arg-type]
+    measure = Measure(surface, BakeSettings(mode=mode))  # type: ignore[arg-type]
     face, weights = sampled(surface, MOST)
     position = np.einsum("kc,kci->ki", weights, mesh.vertices[mesh.faces[surface.faces[face]]])
     normals = surface.planes[face, :3]

@@ -19,7 +19,7 @@ from PIL import Image
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.bake.scatter_job import Baked, check_scatter, lines
+from translucent.bake.scatter_job import Baked, check_scatter
 from translucent.diffusion.harmonics import LitAlone, exit_radiance
 from translucent.formulas.color import linear_to_srgb
 from translucent.scene.environment_map import texel_directions
@@ -82,7 +82,7 @@ def main(models: tuple[str, ...], presets: tuple[str, ...], picture: Path | None
             preset = tl.preset(name)
             baked = tl.bake_vertex_scatter(mesh, preset.medium, roughness=preset.roughness or 0.0)
             check = check_scatter(Baked(baked, mesh, np.eye(3)), baked.values, SIZE)
-            print(f"{model}, {name}", *lines(check), of_lamps(baked), sep="\n  ")
+            print(f"{model}, {name}", *str(check).split("\n"), of_lamps(baked), sep="\n  ")
             if picture is not None:
                 found, true, error = whole(baked, check["studio"].baked)
                 print(f"  picture      nRMSE {error:.1%}")

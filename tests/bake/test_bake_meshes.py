@@ -95,7 +95,7 @@ CLEAN = ["armadillo.obj", "featuretype.STL", "idler_riser.STL", "mengerSponge3.g
 def test_no_ray_escapes_from_a_closed_mesh(assets: Path, name: str) -> None:
     """At most two rays of a hundred thousand escape, as Embree promises of watertight meshes."""
     _, surface, face, weights, _ = sampled(name, assets, 2000)
-    measured = Measure.of(surface, BakeSettings()).at(surface.points(face, weights))
+    measured = Measure(surface, BakeSettings()).at(surface.points(face, weights))
     assert measured.cast == 128_000
     assert measured.escaped <= 2
 
@@ -121,7 +121,7 @@ def test_trimesh_agrees(assets: Path, name: str) -> None:
     theirs = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     with np.errstate(all="ignore"):
         expected = trimesh.proximity.thickness(theirs, position, normals=surface.planes[face, :3], method="ray")
-    found = Measure.of(surface, BakeSettings(mode="normal")).at(surface.points(face, weights)).values
+    found = Measure(surface, BakeSettings(mode="normal")).at(surface.points(face, weights)).values
     # trimesh lets Embree's float32 tell the distance.
     assert np.allclose(found, expected, rtol=1e-6, atol=2e-6 * mesh.diagonal)
 
@@ -134,7 +134,7 @@ def test_inscribed_spheres_agree_with_trimesh(assets: Path) -> None:
     theirs = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     with np.errstate(all="ignore"):
         expected = trimesh.proximity.thickness(theirs, position, normals=surface.planes[face, :3], method="max_sphere")
-    found = Measure.of(surface, BakeSettings(mode="inscribed")).at(surface.points(face, weights)).values
+    found = Measure(surface, BakeSettings(mode="inscribed")).at(surface.points(face, weights)).values
     # Theirs stops shrinking at 1e-6 of the scale; ours starts off the edges of the face.
     assert np.allclose(found, expected, rtol=1e-4, atol=1e-4)
 

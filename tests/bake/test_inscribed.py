@@ -69,7 +69,7 @@ def trimesh_mesh(made: trimesh.Trimesh) -> tl.Mesh:
 @pytest.mark.parametrize(("make", "flat"), SHAPES)
 def test_no_point_of_the_surface_is_in_the_sphere(make: Callable[[], tl.Mesh], flat: bool) -> None:
     surface, points = points_of(make(), 40, flat=flat)
-    found = Measure.of(surface, BakeSettings(mode="inscribed")).at(points).values / surface.radius
+    found = Measure(surface, BakeSettings(mode="inscribed")).at(points).values / surface.radius
     expected = by_points(surface, points)
     assert (found <= expected * (1 + 1e-9)).all()
     # The face that touches may be met between two points, or at the edge of the cone.

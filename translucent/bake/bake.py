@@ -132,10 +132,10 @@ def _strips(mesh: Mesh, unwrapped: Unwrapped, settings: BakeSettings, high: Mesh
     side = settings.size * settings.supersample
     atlas = Atlas(uv[shown], side, side)
     if high is None:
-        return Strips(low, shown, atlas, Measure.of(low, settings), None)
+        return Strips(low, shown, atlas, Measure(low, settings), None)
     detailed = Surface.of(high)
     projection = Projection.of(low, unwrapped, detailed, mesh, cage, settings.high_distance)
-    return Strips(low, shown, atlas, Measure.of(detailed, settings), projection)
+    return Strips(low, shown, atlas, Measure(detailed, settings), projection)
 
 
 @checked
@@ -203,7 +203,7 @@ def bake_vertex_thickness(
 def _measure_corners(
     surface: Surface, settings: BakeSettings, threads: int, progress: Progress | None
 ) -> list[Measured]:
-    measure, count = Measure.of(surface, settings), 3 * len(surface.faces)
+    measure, count = Measure(surface, settings), 3 * len(surface.faces)
     parts: list[Measured] = []
 
     def bake(begin: int) -> Measured:

@@ -23,7 +23,7 @@ Where a medium has one extinction for all channels, mode "transmittance" is d = 
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -59,14 +59,6 @@ class RayMean:
     mode: str
     reach: float
     extinction: Array | None
-
-    @classmethod
-    def of(cls, settings: BakeSettings, reach: float, radius: float) -> RayMean:
-        """For lengths in units of `radius` metres, with `reach` in that unit."""
-        extinction = (
-            settings.medium.extinction * radius if settings.mode == "transmittance" and settings.medium else None
-        )
-        return cls(settings.mode, reach, extinction)
 
     def estimate(self, distance: Array, edges: Integers) -> tuple[Array, Array]:
         """Value (k,) and standard error (k,) of lengths (k, n), infinite where a ray has escaped.
@@ -193,46 +185,31 @@ class Measured:
     above: int
 
 
-@dataclass(frozen=True, eq=False)
 class Measure:
-    """Measurement of thickness at points. Any number of threads may ask at once; what they get depends on the points
-    alone.
+    """Measurement of thickness at points.
 
-    Attributes
+    Any number of threads may ask at once; what they get depends on the points alone. Once `stop` is set, whoever is at
+    work raises `StoppedError`.
+
+    Parameters
     ----------
     surface : Surface
     settings : BakeSettings
-    rays : Rays
-    directions : Directions
-    mean : RayMean
-    spheres : InscribedSpheres or None
-    stop : threading.Event
-        Once set, whoever is at work raises `StoppedError`.
     """
 
-    surface: Surface
-    settings: BakeSettings
-    rays: Rays
-    directions: Directions
-    mean: RayMean
-    spheres: InscribedSpheres | None
-    stop: threading.Event = field(default_factory=threading.Event)
-
-    @classmethod
-    def of(cls, surface: Surface, settings: BakeSettings) -> Measure:
-        """Prepare to measure."""
-        reach = np.inf if settings.max_distance is None else settings.max_distance / surface.radius
-        if settings.mode == "local" and settings.max_distance is None:
-            # The diagonal of the mesh is two radii.
-            reach = 2.0 * LOCAL_REACH
-        return cls(
-            surface,
-            settings,
-            Rays.of(surface, settings, reach),
-            Directions.of(settings),
-            RayMean.of(settings, reach, surface.radius),
-            InscribedSpheres(surface) if settings.mode == "inscribed" else None,
-        )
+    def __init__(self, surface: Surface, settings: BakeSettings) -> None:
+        self.surface, self.settings = surface, settings
+        self.stop = threading.Event()
+        # The diagonal of the mesh is two radii.
+        reach = 2.0 * LOCAL_REACH if settings.mode == "local" else np.inf
+        if settings.max_distance is not None:
+            reach = settings.max_distance / surface.radius
+        extinction = None
+        if settings.mode == "transmittance" and settings.medium is not None:
+            extinction = settings.medium.extinction * surface.radius
+        self.rays, self.directions = Rays(surface, settings, reach), Directions.of(settings)
+        self.mean = RayMean(settings.mode, reach, extinction)
+        self.spheres = InscribedSpheres(surface) if settings.mode == "inscribed" else None
 
     @property
     def unit(self) -> float:

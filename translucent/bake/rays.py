@@ -49,23 +49,15 @@ class Rays:
     Parameters
     ----------
     surface : Surface
-    gaps : str
-        "first-exit" or "total".
-    pass_entries : bool
-        Whether rays pass faces through which they enter once more, rather than stop at them.
+    settings : BakeSettings
+        Whether rays end at their first exit, and pass faces through which they enter once more.
     reach : float
         How far rays are followed, in radii; may be infinite.
     """
 
     surface: Surface
-    gaps: str
-    pass_entries: bool
+    settings: BakeSettings
     reach: float
-
-    @classmethod
-    def of(cls, surface: Surface, settings: BakeSettings, reach: float) -> Rays:
-        """Rays of a bake; `reach` as above."""
-        return cls(surface, settings.gaps, settings.ignore_back_faces, reach)
 
     def distances(self, points: Points, directions: Floats) -> tuple[Array, int]:
         """(k, r): length inside the mesh from points (k) along directions (3, k, r), and how many rays Embree traced.
@@ -75,7 +67,7 @@ class Rays:
         rays = directions.shape[2]
         shaped, leaving, faces = self.first(points, directions)
         distance, leaves, face = shaped.reshape(-1), leaving.reshape(-1), faces.reshape(-1)
-        settled = leaves if self.gaps == "first-exit" else (distance >= self.reach) & (face >= 0)
+        settled = leaves if self.settings.gaps == "first-exit" else (distance >= self.reach) & (face >= 0)
         left = np.flatnonzero(~settled)
         traced = len(face)
         for begin in range(0, len(left), FOLLOWED_RAYS):
@@ -94,7 +86,9 @@ class Rays:
         count, rays = directions.shape[1:]
         origins = np.empty((3, count, rays), dtype=np.float32)
         origins[:] = self.starts(points).T[:, :, None]
-        face = self._trace(origins.reshape(3, -1), directions.reshape(3, -1)).reshape(count, rays)
+        # The first face on each ray, -1 where there is none.
+        traced = self.surface.embree.scene.run(origins.reshape(3, -1).T, directions.reshape(3, -1).T)
+        face: npt.NDArray[np.int32] = traced.reshape(count, rays)
         distance, leaves = np.empty((count, rays)), np.empty((count, rays), dtype=bool)
         step = max(1, CACHED_RAYS // rays)
         with np.errstate(all="ignore"):
@@ -134,11 +128,6 @@ class Rays:
     def starts(self, points: Points) -> Floats:
         """(k, 3): where rays from points (k) begin, a little below the surface."""
         return (points.start - OFFSET * self.surface.planes[points.face, :3]).astype(np.float32)
-
-    def _trace(self, origins: Floats, directions: Floats) -> npt.NDArray[np.int32]:
-        """(n,): first face on rays (3, n), -1 where there is none."""
-        found: npt.NDArray[np.int32] = self.surface.embree.scene.run(origins.T, directions.T)
-        return found
 
     def _follow(self, walk: _Walk) -> int:
         """Follow rays to their ends, and tell how many rays Embree traced for that."""
@@ -182,8 +171,8 @@ class Rays:
     ) -> None:
         """Count the crossings of the live rays, and end those that leave."""
         live = walk.live
-        if self.gaps == "first-exit":
-            walk.end(leaves | (enters & (not self.pass_entries)), distance)
+        if self.settings.gaps == "first-exit":
+            walk.end(leaves | (enters & (not self.settings.ignore_back_faces)), distance)
             return
         was, entered = walk.depth[live], walk.entered[live]
         cut = walk.length[live] + np.where(was > 0, self.reach - entered, 0.0)

@@ -11,10 +11,11 @@ diffused light.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -218,8 +219,19 @@ class ScatterLook:
     error: float
 
 
-#: By environment.
-ScatterCheck = dict[str, ScatterLook]
+class ScatterCheck(dict[str, ScatterLook]):
+    """Check of baked scattered light: looks by environment."""
+
+    def summary(self) -> Record:
+        """Errors as values that JSON can hold."""
+        return {name: {"mean_nrmse": look.mean_error, "nrmse": look.error} for name, look in self.items()}
+
+    def __str__(self) -> str:
+        return "\n".join(
+            f"{name:12} nRMSE {100 * look.mean_error:.2g} % of the mean radiance, {100 * look.error:.2g} % towards the "
+            "eye"
+            for name, look in self.items()
+        )
 
 
 def environments() -> dict[str, Environment]:
@@ -264,7 +276,7 @@ def check_scatter(one: Baked, values: Floats, size: tuple[int, int] = (320, 320)
     camera = showcase(one.body, baked.medium, size, stage="none").camera
     first = first_hits(baked.mesh, camera, size, one.body)
     if not first.hit.any():
-        return {}
+        return ScatterCheck()
     hit, points, directions, weights = first.hit, first.points, first.directions, first.weights
     corners = baked.mesh.faces[first.face].astype(np.int64)
     normals = blend(corner_normals(baked.mesh).reshape(-1, 3, 3)[first.face], weights)
@@ -273,7 +285,7 @@ def check_scatter(one: Baked, values: Floats, size: tuple[int, int] = (320, 320)
     looked_up = _looked_up(baked.mesh, values, corners, weights, texels=isinstance(baked, ScatterMap))
     surface = Surface(roughness=baked.roughness)
     alone = LitAlone(Object(one.body, medium=baked.medium, surface=surface), baked.resolution)
-    looks = {}
+    looks = ScatterCheck()
     for name, environment in environments().items():
         field, ior = alone.field(environment), baked.medium.ior
         mean, true_mean = scattered_radiance(looked_up, environment.harmonics()), exit_radiance(field, points)
@@ -283,19 +295,6 @@ def check_scatter(one: Baked, values: Floats, size: tuple[int, int] = (320, 320)
         pictures = _picture(hit, seen, size), _picture(hit, true, size)
         looks[name] = ScatterLook(*pictures, hit.reshape(size[::-1]), _nrmse(mean, true_mean), _nrmse(seen, true))
     return looks
-
-
-def summary(check: ScatterCheck) -> dict[str, Any]:
-    """Errors as values that JSON can hold."""
-    return {name: {"mean_nrmse": look.mean_error, "nrmse": look.error} for name, look in check.items()}
-
-
-def lines(check: ScatterCheck) -> list[str]:
-    """Lines of text about a check."""
-    return [
-        f"{name:12} nRMSE {100 * look.mean_error:.2g} % of the mean radiance, {100 * look.error:.2g} % towards the eye"
-        for name, look in check.items()
-    ]
 
 
 def _looked_up(mesh: Mesh, values: Floats, corners: Integers, weights: Array, *, texels: bool) -> Array:
@@ -332,7 +331,7 @@ def _nrmse(found: Array, true: Array) -> float:
 MAGNIFIED = 10.0
 
 
-def write_scatter_picture(checks: dict[str, ScatterCheck], path: Path) -> None:
+def write_scatter_picture(checks: Collection[ScatterCheck], path: Path) -> None:
     """Write the checks below each other as a PNG, a row for each environment.
 
     Raises
@@ -340,7 +339,7 @@ def write_scatter_picture(checks: dict[str, ScatterCheck], path: Path) -> None:
     RenderError
         If it cannot be written.
     """
-    rows = [_row(name, look) for check in checks.values() for name, look in check.items()]
+    rows = [_row(name, look) for check in checks for name, look in check.items()]
     write_atomically(path, partial(stacked(rows[:MOST_ROWS]).save, format="PNG"))
 
 

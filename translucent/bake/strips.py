@@ -14,7 +14,7 @@ from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from contextvars import copy_context
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -195,15 +195,9 @@ class Strips:
         owners[face] = True
         counts = [measured.traced, measured.cast, measured.escaped, measured.above]
         counts += [len(texel), int((~found).sum()), int(overlapping.sum())]
-        shape = (rows, size)
-        return Strip(
-            values.reshape(shape),
-            errors.reshape(shape),
-            coverage.reshape(shape),
-            valued.reshape(shape),
-            owners,
-            np.array(counts, dtype=np.int64),
-        )
+        values, errors = values.reshape(rows, size), errors.reshape(rows, size)
+        coverage, valued = coverage.reshape(rows, size), valued.reshape(rows, size)
+        return Strip(values, errors, coverage, valued, owners, np.array(counts, dtype=np.int64))
 
 
 def _gathered(
@@ -227,7 +221,6 @@ def _gathered(
 EVERY, REST = 5.0, 20.0
 
 
-@dataclass(eq=False)
 class Canvas:
     """Canvas of a map: strips put together.
 
@@ -240,22 +233,12 @@ class Canvas:
     strips : int
     """
 
-    size: int
-    faces: int
-    strips: int
-    done: npt.NDArray[np.bool_] = field(init=False)
-    values: npt.NDArray[np.float32] = field(init=False)
-    errors: npt.NDArray[np.float32] = field(init=False)
-    coverage: npt.NDArray[np.bool_] = field(init=False)
-    valued: npt.NDArray[np.bool_] = field(init=False)
-    owners: npt.NDArray[np.bool_] = field(init=False)
-    counts: npt.NDArray[np.int64] = field(init=False)
-
-    def __post_init__(self) -> None:
-        shape = (self.size, self.size)
+    def __init__(self, size: int, faces: int, strips: int) -> None:
+        self.size, self.strips = size, strips
+        shape = (size, size)
         self.values, self.errors = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
         self.coverage, self.valued = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
-        self.done, self.owners = np.zeros(self.strips, dtype=bool), np.zeros(self.faces, dtype=bool)
+        self.done, self.owners = np.zeros(strips, dtype=bool), np.zeros(faces, dtype=bool)
         self.counts = np.zeros(len(COUNTS), dtype=np.int64)
 
     def put(self, number: int, row: int, strip: Strip) -> None:
@@ -309,13 +292,9 @@ class Checkpoint:
             setattr(canvas, name, array)
 
     def keep(self, canvas: Canvas) -> None:
-        """Write `canvas` if the last write was long enough ago."""
-        if time.monotonic() >= self._next:
-            self.write(canvas)
-
-    def write(self, canvas: Canvas) -> None:
-        """Write `canvas` atomically; raises `RenderError` if that fails."""
-        started = time.monotonic()
+        """Write `canvas` if the last write was long enough ago, atomically; raises `RenderError` if that fails."""
+        if (started := time.monotonic()) < self._next:
+            return
         arrays = {name: getattr(canvas, name) for name in self._ARRAYS}
 
         def save(path: Path) -> None:

@@ -7,7 +7,7 @@ import contextlib
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from types import ModuleType
 
-    from translucent.bake.jobs import Job, Progress, Results
+    from translucent.bake.jobs import Job, Progress
     from translucent.bake.record import Record
-    from translucent.bake.scatter_job import ScatterCheck, ScatterJob
+    from translucent.bake.scatter_job import ScatterJob
 
 #: Mode of scattered light, and texels along each side of its maps by default: what diffuses is smooth.
 SCATTER, SIZE = "scatter", 256
@@ -258,7 +258,12 @@ def _bake_one(job: Job, given: BakeOptions, as_json: bool) -> None:
     with _progress(Path(job["model"]).name) as progress:
         record, results = bake_file(job, progress)
     told = {"output": job["output"], **told_of(record, results, Path(job["output"]).parent)}
-    checks = _check(job, record, results) if given.check else {}
+    checks = {}
+    if given.check:
+        from translucent.bake.check import check_output, write_picture
+
+        found = check_output(job, record, results)
+        checks = _told_checks(found, job["output"], write_picture, "with the map, true, difference")
     _print({**told, "record": record, **checks}, [*_lines(record, told), *checks.get("lines", [])], as_json)
 
 
@@ -321,28 +326,27 @@ def _size_line(file: str, record: Record, found: Record, unit: str) -> str:
     return f"{file}: {size}{record['mode']}, {found['min']:.4g} to {found['max']:.4g}{unit}"
 
 
-def _check(job: Job, record: Record, results: Results) -> dict[str, Any]:
-    """Compare what was written with the truth; the picture goes beside it."""
-    from translucent.bake.check import check_output, write_picture
-
-    checks = check_output(job, record, results)
-    path = Path(f"{job['output']}.check.png")
-    write_picture([one for one in checks.values() if one is not None], path)
-    hidden = "it is hidden behind other parts of its body"
+def _told_checks(checks: Mapping[str, Any], output: object, write: Callable[..., None], shown: str) -> dict[str, Any]:
+    """Errors of what was baked, by mesh; their picture goes beside the output. None is a mesh that nothing shows."""
+    path, hidden = Path(f"{output}.check.png"), "it is hidden behind other parts of its body"
+    write([one for one in checks.values() if one is not None], path)
     lines = [line for name, one in checks.items() for line in (f"check of {name!r}:", *str(one or hidden).split("\n"))]
     return {
         "check": {name: None if one is None else one.summary() for name, one in checks.items()},
         "check_picture": str(path),
-        "lines": [*lines, f"{path}: with the map, true, difference"],
+        "lines": [*lines, f"{path}: {shown}"],
     }
 
 
 def _bake_scatter(job: ScatterJob, given: BakeOptions, as_json: bool) -> None:
     """Bake scattered light of one model, as the options say."""
-    from translucent.bake.scatter_job import run_scatter_job
+    from translucent.bake.scatter_job import check_scatter_output, run_scatter_job, write_scatter_picture
 
     record, results = run_scatter_job(job)
-    checks = _scatter_check(job.output, results) if given.check else {}
+    checks = {}
+    if given.check:
+        found, shown = check_scatter_output(job.output, results), "baked, diffused in pictures, difference"
+        checks = _told_checks(found, job.output, write_scatter_picture, shown)
     told = {"output": str(job.output), "record": record, **checks}
     _print(told, [*_scatter_lines(job, record), *checks.get("lines", [])], as_json)
 
@@ -358,20 +362,6 @@ def _scatter_lines(job: ScatterJob, record: dict[str, Any]) -> list[str]:
     if "uv_file" in record:
         found.append(f"{job.output.with_name(record['uv_file']['file'])}: the model with the UVs made for this map")
     return found + [f"left out, {line}" for line in record.get("left_out", [])]
-
-
-def _scatter_check(output: Path, results: Any) -> dict[str, Any]:
-    from translucent.bake.scatter_job import check_scatter_output, lines, summary, write_scatter_picture
-
-    checks: dict[str, ScatterCheck] = check_scatter_output(output, results)
-    path = Path(f"{output}.check.png")
-    write_scatter_picture(checks, path)
-    told = [line for name, one in checks.items() for line in (f"check of {name!r}:", *lines(one))]
-    return {
-        "check": {name: summary(one) for name, one in checks.items()},
-        "check_picture": str(path),
-        "lines": [*told, f"{path}: baked, diffused in pictures, difference"],
-    }
 
 
 def _bake_many(models: tuple[str, ...], out_dir: Path, given: BakeOptions, as_json: bool) -> None:

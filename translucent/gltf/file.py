@@ -216,7 +216,15 @@ def gather(file: GltfFile, tree: Json) -> tuple[Json, bytes]:
     """
     tree, binary, buffers = copy.deepcopy(tree), bytearray(), file.items("buffers")
     starts = {i: _append(binary, _content(file, i, one)) for i, one in enumerate(buffers) if "uri" in one}
-    images = _embedded_images(file, binary)
+    # An image whose kind is stated nowhere stays in its data URI: glTF wants it stated of a view.
+    images = {}
+    for i, image in enumerate(file.items("images")):
+        uri = image.get("uri")
+        if isinstance(uri, str) and uri.startswith("data:"):
+            kind = str(image.get("mimeType", uri[len("data:") :].partition(",")[0].partition(";")[0]))
+            if kind.startswith("image/"):
+                data = file.resource(image)
+                images[i] = (_append(binary, data), len(data), kind)
     if not binary:
         return tree, b""
     empty = [i for i in range(len(buffers)) if i not in starts]
@@ -228,10 +236,8 @@ def gather(file: GltfFile, tree: Json) -> tuple[Json, bytes]:
         for name, extension in extensions.items() if isinstance(extensions, dict) else ():
             if isinstance(extension, dict) and "buffer" in extension:
                 _move(file, extension, views[index]["extensions"][name], places)
-    for index, (start, length, kind) in images.items():
-        del tree["images"][index]["uri"]
-        tree["images"][index] |= {"bufferView": len(views), "mimeType": kind}
-        views.append({"buffer": 0, "byteOffset": start, "byteLength": length})
+    for index, place in images.items():
+        _make_view(tree, index, *place)
     first = {key: value for key, value in (buffers[min(starts)] if starts else {}).items() if key != "uri"}
     tree["buffers"] = [{**first, "byteLength": len(binary)}, *(buffers[i] for i in empty)]
     return tree, bytes(binary)
@@ -255,32 +261,10 @@ def _content(file: GltfFile, index: int, buffer: Json) -> bytes:
     return data[:length]
 
 
-def _embedded_images(file: GltfFile, binary: bytearray) -> dict[int, tuple[int, int, str]]:
-    """Start, length and kind of images in data URIs, by their index, now at the end of the binary.
-
-    One whose kind is stated nowhere stays in its data URI: glTF wants it stated of a view.
-    """
-    found = {}
-    for index, image in enumerate(file.items("images")):
-        uri = image.get("uri")
-        if isinstance(uri, str) and uri.startswith("data:"):
-            kind = str(image.get("mimeType", uri[len("data:") :].partition(",")[0].partition(";")[0]))
-            if kind.startswith("image/"):
-                data = file.resource(image)
-                found[index] = (_append(binary, data), len(data), kind)
-    return found
-
-
 def is_link(holder: Json) -> bool:
     """True if a buffer or an image is a file beside the glTF file."""
     uri = holder.get("uri")
     return isinstance(uri, str) and not uri.startswith("data:") and "://" not in uri
-
-
-def _picture_kind(data: bytes) -> str | None:
-    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
-        return "image/webp"
-    return next((kind for start, kind in _PICTURES.items() if data.startswith(start)), None)
 
 
 def embed_images(file: GltfFile, tree: Json, binary: bytearray) -> None:
@@ -305,17 +289,25 @@ def embed_images(file: GltfFile, tree: Json, binary: bytearray) -> None:
         except InputError as error:
             warnings.warn(f"{error}; the image stays a link", TranslucentWarning, stacklevel=5)
             continue
-        if (kind := _picture_kind(data)) is None:
+        kind = next((kind for start, kind in _PICTURES.items() if data.startswith(start)), None)
+        if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+            kind = "image/webp"
+        if kind is None:
             told = f"glTF {str(file.path)!r}: {image['uri']!r} is no picture that glTF knows; it stays a link"
             warnings.warn(told, TranslucentWarning, stacklevel=5)
             continue
-        start, views = _append(binary, data), tree.setdefault("bufferViews", [])
-        del tree["images"][index]["uri"]
-        tree["images"][index] |= {"bufferView": len(views), "mimeType": kind}
-        views.append({"buffer": 0, "byteOffset": start, "byteLength": len(data)})
+        _make_view(tree, index, _append(binary, data), len(data), kind)
     if binary:
         buffers = tree.setdefault("buffers", [{}])
         buffers[0]["byteLength"] = len(binary)
+
+
+def _make_view(tree: Json, index: int, start: int, length: int, kind: str) -> None:
+    """Turn an image that is a link into a view of the first buffer."""
+    views, image = tree.setdefault("bufferViews", []), tree["images"][index]
+    del image["uri"]
+    image |= {"bufferView": len(views), "mimeType": kind}
+    views.append({"buffer": 0, "byteOffset": start, "byteLength": length})
 
 
 def _move(file: GltfFile, old: Json, new: Json, places: dict[int, tuple[int, int]]) -> None:

@@ -225,10 +225,10 @@ def _rays(surface: Surface, points: Points) -> tuple[Array, Array, Array, Array]
     settings = BakeSettings(rays=RAYS)
     straight = -points.normal.T[:, :, None].astype(np.float32)
     spread = Directions.of(settings).at(points, 0, RAYS)
-    exits = Rays.of(surface, settings, np.inf)
+    exits = Rays(surface, settings, np.inf)
     beneath = exits.distances(points, straight)[0][:, 0]
     near = exits.distances(points, spread)[0]
-    total = Rays.of(surface, dataclasses.replace(settings, gaps="total"), np.inf).distances(points, spread)[0]
+    total = Rays(surface, dataclasses.replace(settings, gaps="total"), np.inf).distances(points, spread)[0]
     views = spread.transpose(2, 1, 0).astype(np.float64)
     with np.errstate(invalid="ignore"):
         around = near.mean(axis=1)

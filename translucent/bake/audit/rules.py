@@ -29,7 +29,6 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.bake.audit.body import Body, Placement, material_name
 from translucent.formulas.color import to_hex
-from translucent.geometry.mesh import Mesh
 from translucent.gltf.accessors import Accessors, raw_mesh
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.materials import DRAFTS, EXCLUDED, TRANSMISSION, VOLUME, GltfMaterial
@@ -38,9 +37,55 @@ from translucent.media.medium import BLACKEST, Medium, extinction_at
 from translucent.units import length_text
 
 Severity = Literal["error", "warning", "note"]
+_Told = tuple[str, Severity, str, str]
 
 #: From the worst to the mildest.
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note")
+
+#: Largest index of refraction of what is clear: rutile and moissanite have 2.6 to 2.9.
+LARGEST_IOR = 3.0
+
+#: Error of a length, by the way in which viewers scale it, that is told.
+SCALE_ERROR = 0.05
+
+#: Share of rays without an exit from which on a hole is an error.
+LEAKS = 0.02
+
+#: Points of each of two bodies whose boxes meet, and most winding numbers, times triangles, that are worked out.
+POINTS, MOST_WORK = 48, 5e7
+
+#: Winding numbers between these are those of points on a surface; shares of points that make bodies cross.
+ON_SURFACE, CROSSING = (0.2, 0.8), 0.05
+
+#: Ratios of stated to true thickness beyond which it is told, and beyond which it is an error.
+SUSPECT, WRONG = 1.5, 3.0
+
+#: A wall is this share of the smallest side of the body at most; the thickness of the body is within this factor of it.
+WALL_SHARE, OF_THE_BODY = 0.3, 2.0
+
+#: Rank correlation below which a map is dark where the body is thick, and the least spread that has a meaning.
+INVERTED, SPREAD = -0.3, 1.5
+
+#: Share of the true thickness below which a map has no value, and the share of the surface from which on it is told.
+NO_VALUE, MUCH = 0.01, 0.1
+
+#: Share of the surface from which on it is told that a map is off there by more than `WRONG`.
+MUCH_OFF = 0.25
+
+#: Transmittance that an 8-bit picture shows as black, and the one that it shows as white.
+BLACK, WHITE = 1.0 / 255.0, 254.0 / 255.0
+
+#: A medium in a body of the right size passes light between these.
+PLAUSIBLE = (0.05, 0.95)
+
+#: Units that files are written in by mistake, by their length in metres.
+UNITS = (("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254))
+
+#: Thickness in metres, along views, outside of which translucent bodies are rare.
+USUAL = (1e-5, 0.5)
+
+#: Names of viewers, in the order in which they are told.
+VIEWERS = ("three.js", "Khronos sample viewer", "Filament", "Blender (Cycles)")
 
 
 @dataclass(frozen=True)
@@ -118,23 +163,11 @@ class MaterialCheck:
         return "\n".join(map(str, self.findings)) or "no findings"
 
 
-#: Largest index of refraction of what is clear: rutile and moissanite have 2.6 to 2.9.
-LARGEST_IOR = 3.0
-
-#: Error of a length, by the way in which viewers scale it, that is told.
-SCALE_ERROR = 0.05
-
-
 def material_findings(material: GltfMaterial, entry: Json) -> Iterator[MaterialFinding]:
     """Findings about what a material states by itself."""
     extensions = entry.get("extensions", {})
-    for code, severity, text, do in _transport(material, entry, extensions):
+    for code, severity, text, do in (*_transport(material, entry, extensions), *_optics(material)):
         yield MaterialFinding(severity, code, material_name(material), text, do, material.index)
-    for code, severity, text, do in _optics(material):
-        yield MaterialFinding(severity, code, material_name(material), text, do, material.index)
-
-
-_Told = tuple[str, Severity, str, str]
 
 
 def _transport(material: GltfMaterial, entry: Json, extensions: Json) -> Iterator[_Told]:
@@ -197,8 +230,7 @@ def scale_findings(body: Body) -> Iterator[MaterialFinding]:
             "the node stretches the mesh unevenly: three.js, the Khronos viewer and PlayCanvas, which scale directions "
             f"of the world by the lengths of the matrix's columns, take {least:.2f} to {most:.2f} of the length"
         )
-        do = "apply the scale to the vertices"
-        yield MaterialFinding("warning", "scale-uneven", where, text, do, body.material.index, body.key)
+        yield _found(body, "warning", "scale-uneven", text, "apply the scale to the vertices", where)
 
 
 def scale_errors(matrix: Array) -> tuple[float, float]:
@@ -217,16 +249,6 @@ def scale_errors(matrix: Array) -> tuple[float, float]:
     return float(ratio.min()), float(ratio.max())
 
 
-#: Share of rays without an exit from which on a hole is an error.
-LEAKS = 0.02
-
-#: Points of each of two bodies whose boxes meet, and most winding numbers, times triangles, that are worked out.
-POINTS, MOST_WORK = 48, 5e7
-
-#: Winding numbers between these are those of points on a surface; shares of points that make bodies cross.
-ON_SURFACE, CROSSING = (0.2, 0.8), 0.05
-
-
 def mesh_findings(file: GltfFile, body: Body) -> Iterator[MaterialFinding]:
     """Findings about holes and winding of a body with a thickness."""
     if body.material.thickness == 0:
@@ -240,11 +262,11 @@ def mesh_findings(file: GltfFile, body: Body) -> Iterator[MaterialFinding]:
         )
         do = "close it; or, if a sheet is meant, write thicknessFactor 0 and tint it by baseColorFactor"
         severity: Severity = "error" if body.escaped > LEAKS else "warning"
-        yield MaterialFinding(severity, "open-mesh", body.where, text, do, body.material.index, body.key)
+        yield _found(body, severity, "open-mesh", text, do)
     elif body.escaped > LEAKS:
         text = f"{body.escaped:.1%} of the rays find no exit, although the mesh is closed: parts of it are inside out"
         do = "turn these parts, or split what crosses itself"
-        yield MaterialFinding("warning", "inside-out", body.where, text, do, body.material.index, body.key)
+        yield _found(body, "warning", "inside-out", text, do)
     yield from _winding(file, body)
 
 
@@ -264,7 +286,7 @@ def _winding(file: GltfFile, body: Body) -> Iterator[MaterialFinding]:
         text = f"{found.inside_out_parts} closed parts look inwards"
     else:
         return
-    yield MaterialFinding("error", "winding", body.where, text, do, body.material.index, body.key)
+    yield _found(body, "error", "winding", text, do)
 
 
 def overlap_findings(bodies: Sequence[Body]) -> Iterator[MaterialFinding]:
@@ -280,15 +302,10 @@ def overlap_findings(bodies: Sequence[Body]) -> Iterator[MaterialFinding]:
             continue  # primitives that bound one body
         work += POINTS * (len(placed[i][0].mesh.faces) + len(placed[j][0].mesh.faces))
         if work > MOST_WORK:
-            yield _unchecked(placed[i][0])
+            text = "many or large bodies are near each other: whether the later ones cross was not looked at"
+            yield _found(placed[i][0], "note", "overlap-unchecked", text, "check them in parts, if it matters")
             return
         yield from _pair(*placed[i], *placed[j])
-
-
-def _unchecked(body: Body) -> MaterialFinding:
-    text = "many or large bodies are near each other: whether the later ones cross was not looked at"
-    do = "check them in parts, if it matters"
-    return MaterialFinding("note", "overlap-unchecked", body.where, text, do, body.material.index, body.key)
 
 
 def _pair(one: Body, at: Placement, other: Body, there: Placement) -> Iterator[MaterialFinding]:
@@ -301,61 +318,25 @@ def _pair(one: Body, at: Placement, other: Body, there: Placement) -> Iterator[M
             f"{inner!r} lies inside {outer!r}: three.js and Filament do not show one transmissive body through another"
         )
         do = "leave it for ray tracers; for viewers give one of them alphaMode BLEND, or none of the transmission"
-        yield MaterialFinding("note", "nested", where, text, do, one.material.index, one.key)
+        yield _found(one, "note", "nested", text, do, where)
     elif mine > CROSSING and theirs > CROSSING:
         text = f"the bodies cross ({mine:.0%} and {theirs:.0%} of their surfaces lie in the other): what fills the "
         text += "common space, both media or one, renderers decide differently"
         do = "let them touch without crossing, or tell the renderer which one wins (tl.Object(priority=...))"
-        yield MaterialFinding("warning", "overlap", where, text, do, one.material.index, one.key)
+        yield _found(one, "warning", "overlap", text, do, where)
 
 
 def _inside(body: Body, at: Placement, other: Body, there: Placement) -> float:
     """Share of a body's surface that lies inside another, of the part that is not on its surface."""
     step = max(1, len(body.points) // POINTS)
-    world = _moved(at.matrix, body.points[::step])
+    world = body.points[::step] @ at.matrix[:3, :3].T + at.matrix[:3, 3]
     local = np.linalg.solve(there.matrix[:3, :3], (world - there.matrix[:3, 3]).T).T
     low, high = other.mesh.bounds
     boxed = ((local > low) & (local < high)).all(axis=1)
     winding = np.zeros(len(local))
-    winding[boxed] = [_winding_number(other.mesh, point) for point in local[boxed]]
+    winding[boxed] = [abs(other.mesh.winding_number(point)) for point in local[boxed]]
     clear = (winding <= ON_SURFACE[0]) | (winding >= ON_SURFACE[1])
     return float(np.mean(winding[clear] >= ON_SURFACE[1])) if clear.any() else 0.0
-
-
-def _moved(matrix: Array, points: Array) -> Array:
-    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
-
-
-def _winding_number(mesh: Mesh, point: Array) -> float:
-    return abs(mesh.winding_number(point))
-
-
-#: Ratios of stated to true thickness beyond which it is told, and beyond which it is an error.
-SUSPECT, WRONG = 1.5, 3.0
-
-#: A wall is this share of the smallest side of the body at most; the thickness of the body is within this factor of it.
-WALL_SHARE, OF_THE_BODY = 0.3, 2.0
-
-#: Rank correlation below which a map is dark where the body is thick, and the least spread that has a meaning.
-INVERTED, SPREAD = -0.3, 1.5
-
-#: Share of the true thickness below which a map has no value, and the share of the surface from which on it is told.
-NO_VALUE, MUCH = 0.01, 0.1
-
-#: Share of the surface from which on it is told that a map is off there by more than `WRONG`.
-MUCH_OFF = 0.25
-
-#: Transmittance that an 8-bit picture shows as black, and the one that it shows as white.
-BLACK, WHITE = 1.0 / 255.0, 254.0 / 255.0
-
-#: A medium in a body of the right size passes light between these.
-PLAUSIBLE = (0.05, 0.95)
-
-#: Units that files are written in by mistake, by their length in metres.
-UNITS = (("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254))
-
-#: Thickness in metres, along views, outside of which translucent bodies are rare.
-USUAL = (1e-5, 0.5)
 
 
 def thickness_findings(body: Body) -> Iterator[MaterialFinding]:
@@ -520,12 +501,8 @@ def _units(
     return False
 
 
-def _found(body: Body, severity: Severity, code: str, text: str, do: str) -> MaterialFinding:
-    return MaterialFinding(severity, code, body.where, text, do, body.material.index, body.key)
-
-
-#: Names of viewers, in the order in which they are told.
-VIEWERS = ("three.js", "Khronos sample viewer", "Filament", "Blender (Cycles)")
+def _found(body: Body, severity: Severity, code: str, text: str, do: str, where: str | None = None) -> MaterialFinding:
+    return MaterialFinding(severity, code, where or body.where, text, do, body.material.index, body.key)
 
 
 def viewer_colors(body: Body) -> dict[str, Array]:
