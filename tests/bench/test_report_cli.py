@@ -353,7 +353,7 @@ def test_bad_input_is_found_before_measuring(run: Run, tmp_path: Path, arguments
     assert result.code == 2
     assert message in result.err
     assert result.err.splitlines()[-1].startswith("error: ")
-    assert result.err.count("\n") == 1
+    assert result.err.count("error: ") == 1
     assert not (tmp_path / "out").exists()
 
 

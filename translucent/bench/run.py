@@ -161,7 +161,7 @@ def measure_all(
                     if limit is not None and time.perf_counter() - begin >= limit and number < len(names):
                         raise KeyboardInterrupt
         except KeyboardInterrupt:
-            return stamped(report, complete=False)
+            return report
         report = stamped(report, complete=True)
     keep(report)
     return report
