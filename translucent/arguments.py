@@ -16,6 +16,7 @@ from inspect import signature
 from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 import numpy.typing as npt
@@ -43,9 +44,14 @@ def checked(thing: T) -> T:
     return _checked(thing, thing.__name__, thing.__module__)  # type: ignore[attr-defined, no-any-return]
 
 
-def _checked(function: Any, title: str, module: str) -> Any:
-    annotations = {one.name: one.annotation for one in signature(function).parameters.values()}
-    names, tests = tuple(annotations), dict[str, _Test | None]()
+def checked_but(*names: str) -> Callable[[T], T]:
+    """`checked`, for a function that refuses wrong arguments of these names itself, and says more."""
+    return lambda thing: _checked(thing, thing.__name__, thing.__module__, names)  # type: ignore[attr-defined]
+
+
+def _checked(function: Any, title: str, module: str, but: tuple[str, ...] = ()) -> Any:
+    annotations = {one.name: one.annotation for one in signature(function).parameters.values() if one.name not in but}
+    names, tests = tuple(signature(function).parameters), dict[str, _Test | None]()
 
     def refusal(args: tuple[Any, ...], kwargs: dict[str, Any]) -> InputError | None:
         for name, value in (*zip(names, args, strict=False), *kwargs.items()):
@@ -53,7 +59,7 @@ def _checked(function: Any, title: str, module: str) -> Any:
                 tests[name] = _test_of(annotations.get(name), vars(sys.modules[module]))
             test = tests[name]
             if test is not None and (found := test.wrong(value)):
-                return InputError(f"{title} {name} {shown(value)}", found, f"give {test.give}")
+                return InputError(f"{title} {name} {brief(value)}", found, f"give {test.give}")
         return None
 
     @wraps(function)
@@ -64,7 +70,9 @@ def _checked(function: Any, title: str, module: str) -> Any:
         if function.__name__ == "__init__" or names[0] == "cls":
             # A value is made in no time and without a trace, and what its own checks say is more.
             try:
-                function(*args, **kwargs)
+                with catch_warnings():
+                    simplefilter("ignore")
+                    function(*args, **kwargs)
             except TranslucentError:
                 raise
             except Exception as error:
@@ -74,12 +82,24 @@ def _checked(function: Any, title: str, module: str) -> Any:
     return call
 
 
-def shown(value: object) -> str:
+def brief(value: object) -> str:
     """Short text of any value."""
     try:
-        return reprlib.repr(value)
+        return repr(value) if isinstance(value, type) else reprlib.repr(value)
     except Exception:  # noqa: BLE001 - a class of others, or a whole number of thousands of digits
         return f"of type {type(value).__name__}"
+
+
+def vectors(what: str, value: npt.ArrayLike, width: int = 3, give: str = "points") -> npt.NDArray[np.float64]:
+    """(..., width) float64; raises `InputError` where an array of numbers has another shape, or is not finite."""
+    found = np.asarray(value, dtype=np.float64)
+    if found.ndim == 0 or found.shape[-1] != width:
+        raise InputError(
+            f"{what} of shape {found.shape}", f"not (..., {width})", f"give {give} of {width} numbers each"
+        )
+    if not np.isfinite(found).all():
+        raise InputError(what, "not finite", f"give {give} of finite numbers")
+    return found
 
 
 def _test_of(annotation: object, names: Mapping[str, Any]) -> _Test | None:
@@ -121,13 +141,17 @@ def _test(kind: Any) -> _Test | None:
     if simple := _SIMPLE.get(kind) or (origin is not None and _SIMPLE.get(origin)):
         return simple
     if origin is Literal:
-        return _Test(_text, f"one of {', '.join(inner)}")
+        return _Test(
+            lambda value: _text(value) or ("" if value in inner else "not known"), f"one of {', '.join(inner)}"
+        )
     if isinstance(origin, type) and issubclass(origin, Mapping):
         return _instance(origin, "a mapping")
     if isinstance(origin, type) and issubclass(origin, Iterable):
         return _sequence(inner, many=origin is not tuple or inner[-1] is ...)
     if origin in (Union, UnionType):
         return _any_of(inner)
+    if isinstance(kind, TypeVar):
+        return None if kind.__bound__ is None else _test(kind.__bound__)
     if isinstance(kind, type) and kind is not Any and not getattr(kind, "_is_protocol", False):
         own = kind.__module__.startswith("translucent.")
         return _instance(kind, f"a tl.{kind.__name__}" if own else f"a {kind.__name__}")
@@ -146,13 +170,15 @@ def _sequence(kinds: tuple[Any, ...], many: bool) -> _Test:
     def wrong(value: Any) -> str:
         if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
             return _type(value)
+        if isinstance(value, np.ndarray) and not value.ndim:
+            return "it is an array of one number"
         if not isinstance(value, (list, tuple, np.ndarray)):
             return "" if many else _type(value)
         if not many and len(value) != len(tests):
             return f"it has {len(value)} values, not {len(tests)}"
         for test, item in zip(tests * len(value) if many else tests, value, strict=False):
             if test is not None and (found := test.wrong(item)):
-                return f"of {shown(item)} in it, {found}"
+                return f"of {brief(item)} in it, {found}"
         return ""
 
     return _Test(wrong, f"a sequence, each {gives[0]}" if many else f"({', '.join(gives)})")
@@ -201,6 +227,10 @@ def _text(value: Any) -> str:
 def _path(value: Any) -> str:
     if not isinstance(value, (str, os.PathLike)) or not isinstance(name := os.fspath(value), str):
         return _type(value)
+    try:
+        os.fsencode(name)
+    except UnicodeEncodeError:
+        return "no file has such a name"
     return "no file has a name with a zero in it" if "\0" in name else ""
 
 

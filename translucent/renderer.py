@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from translucent.arguments import checked
+from translucent.arguments import brief, checked, checked_but
 from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.formulas.tone import tone_curve
 from translucent.frames.frame import Frame, check_exposure
@@ -25,6 +25,7 @@ from translucent.planning.choices import RenderChoices
 from translucent.planning.interface_choice import check_interfaces
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
+from translucent.planning.methods.base import check_method
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan, plan_over_backdrop
 from translucent.planning.render_plan import RenderPlan
@@ -115,6 +116,7 @@ class Renderer:
             "translucent": VERSION,
         }
 
+    @checked_but("scene", "method", "interfaces", "scattering", "caustics", "shadows")
     def plan(
         self,
         scene: Scene,
@@ -128,8 +130,7 @@ class Renderer:
     ) -> RenderPlan:
         """Plan that `render` would run with this renderer, with or without a backdrop."""
         check_scene(scene)
-        if method is not None and not isinstance(method, Method):
-            raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
+        check_method(method)
         check_interfaces(interfaces)
         check_scattering(scattering)
         check_caustics(caustics)
@@ -151,6 +152,7 @@ class Renderer:
             )
         return plans[key]
 
+    @checked_but("scene", "size", "samples", "backdrop", "method", "interfaces", "scattering", "caustics", "shadows")
     def render(
         self,
         scene: Scene,
@@ -220,7 +222,9 @@ class Renderer:
             If the frame is larger than this OpenGL allows, or a backdrop is given to a renderer without OpenGL.
         """
         if not isinstance(samples, int) or not 1 <= samples <= MAX_SAMPLES:
-            raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MAX_SAMPLES}", "give for example 16")
+            raise InputError(
+                f"samples {brief(samples)}", f"not a whole number in 1 to {MAX_SAMPLES}", "give for example 16"
+            )
         self._require_open()
         size = check_size(size)
         over_backdrop = backdrop is not None and not transparent
@@ -287,6 +291,7 @@ class Renderer:
         alpha = 1.0 - passed.mean(axis=-1)
         return dataclasses.replace(before_black, alpha=alpha.astype(np.float32), passed=passed.astype(np.float32))
 
+    @checked_but("scene", "exposure", "tone", "method", "interfaces", "scattering", "shadows")
     def draw(
         self,
         scene: Scene,
@@ -380,7 +385,7 @@ def _cpu_renderer() -> CpuRenderer:
 
 def _check_backdrop(backdrop: Backdrop | TextureBackdrop | None, size: tuple[int, int]) -> None:
     if not isinstance(backdrop, Backdrop | TextureBackdrop):
-        raise InputError(f"backdrop {backdrop!r}", f"of type {type(backdrop).__name__}", "give a tl.Backdrop")
+        raise InputError(f"backdrop {brief(backdrop)}", f"of type {type(backdrop).__name__}", "give a tl.Backdrop")
     if backdrop.size != size:
         asked = f"backdrop of {backdrop.size[0]}x{backdrop.size[1]}"
         raise InputError(asked, f"the frame is {size[0]}x{size[1]}", "draw both in the same size")
@@ -389,7 +394,7 @@ def _check_backdrop(backdrop: Backdrop | TextureBackdrop | None, size: tuple[int
 def _warn(frame: Frame) -> None:
     for effect in frame.plan.unmodelled:
         if effect.kind is NoteKind.LIGHTS_LEFT_OUT:
-            warnings.warn(str(effect), TranslucentWarning, stacklevel=3)
+            warnings.warn(str(effect), TranslucentWarning, stacklevel=4)
     if not frame.valid.all():
         text = frame.plan.invalid_text(*(int(np.count_nonzero(kind)) for kind in (~frame.valid, frame.coverage)))
-        warnings.warn(text, TranslucentWarning, stacklevel=3)
+        warnings.warn(text, TranslucentWarning, stacklevel=4)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked_but
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frames.frame import Frame
 from translucent.frames.tiled import Tile
@@ -28,6 +29,7 @@ TILE = (2048, 512)
 MARGIN = 32
 
 
+@checked_but("scene", "size", "tile")
 def render_tiles(
     renderer: Renderer,
     scene: Scene,

@@ -273,10 +273,14 @@ def test_a_checkpoint_of_another_bake_is_refused(tmp_path: Path, monkeypatch: py
         tl.bake_thickness(mesh, 300, rays=4, checkpoint=path)
 
 
-def test_a_checkpoint_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(canvas, "EVERY", 0.0)
-    with pytest.raises(tl.RenderError, match="it cannot be written"):
-        tl.bake_thickness(Box().tessellate(), 64, rays=2, checkpoint=tmp_path / "no" / "such.partial")
+def test_a_checkpoint_that_cannot_be_written_is_refused_before_the_bake(tmp_path: Path) -> None:
+    for name, error, message in (
+        ("no/such.partial", tl.InputError, "no folder"),
+        ("", tl.InputError, "a folder of that name is there"),
+        ("x" * 300, tl.RenderError, "it cannot be written .File name too long"),
+    ):
+        with pytest.raises(error, match=message):
+            tl.bake_thickness(Box().tessellate(), 64, rays=2, checkpoint=tmp_path / name)
 
 
 def test_scale_and_place_change_nothing() -> None:

@@ -22,6 +22,7 @@ from translucent.bake.surface import Surface
 from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
 from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentWarning
+from translucent.files.paths import require_output
 from translucent.geometry.grouping import position_ids
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_angles
@@ -100,6 +101,8 @@ def bake_thickness(
     settings = settings_from(settings, "size", given)
     _check_high(high, cage, settings.high_distance)
     threads = check_threads(threads)
+    if checkpoint is not None:
+        require_output(Path(checkpoint), f"checkpoint {str(checkpoint)!r}")
     unwrapped = unwrap(mesh, settings.size, settings.tile)
     strips = _strips(mesh, unwrapped, settings, high, cage)
     canvas = Canvas(settings.size, len(strips.low.faces), -(-settings.size // strips.rows))

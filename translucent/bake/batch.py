@@ -22,7 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
-from translucent.arguments import checked
+from translucent.arguments import brief, checked
 from translucent.bake.jobs import Job, bake_file, check_job, content_hash, is_done
 from translucent.bake.record import Record, files_of, parts_of, read_record
 from translucent.cpu.threads import processors
@@ -130,7 +130,9 @@ def bake_many(
         If a job is malformed, two have one output, or `workers` is below 1. What is wrong with a single asset is
         in the report.
     """
-    places = ("model", "output", "high", "cage")
+    places, jobs = ("model", "output", "high", "cage"), list(jobs)
+    if wrong := [job for job in jobs if not isinstance(job, dict)]:
+        raise InputError(f"job {brief(wrong[0])}", f"of type {type(wrong[0]).__name__}", "give a dict")
     given = [{**job, **{key: str(Path(job[key]).absolute()) for key in places if job.get(key)}} for job in jobs]
     outputs: dict[str, Job] = {}
     for job in given:

@@ -142,6 +142,9 @@ def lithophane(
         found = f"{least_text} to {largest_text} thick, {wide_text} wide, points every {every}"
         raise InputError("lithophane", found, "give a least thickness, a larger one, and a width of several points")
     linear = read_picture(picture).linear if isinstance(picture, str | Path) else np.asarray(picture, dtype=np.float64)
+    if linear.ndim != 3 or linear.shape[2] != 3 or not (linear.size and np.isfinite(linear).all()):
+        found = f"a picture of shape {linear.shape}, or not of finite numbers"
+        raise InputError("lithophane", found, "give linear values (h, w, 3)")
     high, wide = linear.shape[:2]
     columns = round(width / pitch) + 1
     rows = max(round((columns - 1) * high / wide), 1) + 1

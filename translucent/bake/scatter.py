@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import checked, vectors
 from translucent.arrays import Array, Floats, Mask
 from translucent.bake.atlas import Atlas, pad, unwrap
 from translucent.bake.gltf_builder import GlbBuilder, mesh_file
@@ -301,7 +301,7 @@ class VertexScatter(BakedScatter):
         from scipy.spatial import cKDTree
 
         with np.errstate(under="ignore"):
-            _, nearest = cKDTree(self.mesh.vertices).query(positions)
+            _, nearest = cKDTree(self.mesh.vertices).query(vectors("positions", positions))
         return np.ascontiguousarray(self.values[nearest])
 
 

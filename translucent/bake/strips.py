@@ -7,6 +7,7 @@ mesh with the details, and the thickness there. A bake can be interrupted at any
 from __future__ import annotations
 
 import hashlib
+import os
 import threading
 import time
 from collections import deque
@@ -279,7 +280,7 @@ class Checkpoint:
         InputError
             If the file is no checkpoint of this bake.
         """
-        if not self._path.is_file():
+        if not os.path.isfile(self._path):
             return
         asked = f"checkpoint {str(self._path)!r}"
         found = read_arrays(self._path, asked, ("key", *self._ARRAYS), "remove it")

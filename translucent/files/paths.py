@@ -109,7 +109,9 @@ def require_folder(path: Path, asked: str) -> None:
 
 def _require_writable(path: Path, asked: str) -> None:
     """Raise `RenderError` unless a file can be made beside the path."""
-    try:  # rights do not tell: disks may be read-only, and full
+    try:  # rights do not tell: disks may be read-only, and full; and a name may be too long
+        with suppress(FileNotFoundError):
+            os.lstat(path)
         temporary, held = _temporary_file(Path(os.path.realpath(path)))
     except OSError as error:
         raise RenderError(asked, f"it cannot be written ({error.strerror})", "check the folder") from error

@@ -20,7 +20,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import brief, checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 
@@ -116,6 +116,10 @@ def phase_cosine(phase: npt.ArrayLike, share: npt.ArrayLike) -> Array:
     return np.where(draines, draine_cosine(first, draine_g, alpha), henyey_greenstein_cosine(second, g))
 
 
+#: Largest number of moments of a phase function.
+MOST_MOMENTS = 1 << 16
+
+
 class PhaseFunction(ABC):
     """A phase function, normalised to 1 over the sphere of directions. It is written as its name and its numbers."""
 
@@ -138,7 +142,10 @@ class PhaseFunction(ABC):
     @checked
     def value(self, cos_scatter: npt.ArrayLike) -> Array:
         """Phase function in 1/sr at the cosine of the angle that light turns by: 1 is straight on."""
-        return phase_value(self.parameters, cos_scatter)
+        cosine = np.asarray(cos_scatter, dtype=np.float64)
+        if not (np.abs(cosine) <= 1 + 1e-6).all():  # what rounding makes of 1
+            raise InputError("cosine of an angle of scattering", "not in -1 to 1", "give cosines, 1 for straight on")
+        return phase_value(self.parameters, cosine)
 
     def __str__(self) -> str:
         return " ".join([self.name, *map(repr, astuple(self))])  # type: ignore[call-overload]
@@ -172,7 +179,7 @@ class HenyeyGreenstein(PhaseFunction):
     def moments(self, count: int) -> Array:
         """Powers of g."""
         with np.errstate(under="ignore"):
-            return np.asarray(self.anisotropy ** np.arange(count), dtype=np.float64)
+            return np.asarray(self.anisotropy ** np.arange(_moments(count)), dtype=np.float64)
 
 
 @checked
@@ -208,7 +215,7 @@ class Draine(PhaseFunction):
     def moments(self, count: int) -> Array:
         """Those of Henyey and Greenstein's g^n, with cos^2 P_n as a sum of P_(n-2), P_n and P_(n+2)."""
         # cos P_n = (1 - d_n) P_(n+1) + d_n P_(n-1)
-        n = np.arange(-1, count + 1)
+        n = np.arange(-1, _moments(count) + 1)
         down = n / (2 * n + 1)
         before, own, after = down[:-2], down[1:-1], down[2:]
         powers = HenyeyGreenstein(self.g).moments(count + 2)
@@ -254,6 +261,12 @@ class WaterDroplets(PhaseFunction):
         g, draine_g, alpha, weight = self.parameters
         parts = HenyeyGreenstein(g).moments(count), Draine(draine_g, alpha).moments(count)
         return (1.0 - weight) * parts[0] + weight * parts[1]
+
+
+def _moments(count: int) -> int:
+    if not 0 <= count <= MOST_MOMENTS:
+        raise InputError(f"moments {brief(count)}", f"not in 0 to {MOST_MOMENTS}", "give for example 3")
+    return count
 
 
 #: Phase function of light that turns everywhere alike.

@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import brief
 from translucent.arrays import Array
 from translucent.errors import InputError
 
@@ -114,6 +115,6 @@ def tone_curve(name: str) -> Callable[[npt.ArrayLike], Array]:
     InputError
         If there is none.
     """
-    if name not in TONES:
-        raise InputError(f"tone {name!r}", "not a known tone curve", f"use one of {', '.join(TONES)}")
+    if not isinstance(name, str) or name not in TONES:
+        raise InputError(f"tone {brief(name)}", "not a known tone curve", f"use one of {', '.join(TONES)}")
     return _CURVES[name]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import brief, checked
 from translucent.errors import InputError
 from translucent.formulas.color import exposure_scale, linear_to_srgb
 from translucent.formulas.tone import tone_curve
@@ -358,9 +358,9 @@ def check_exposure(stops: float) -> float:
         If it is not a number within 100 stops.
     """
     try:
-        within = bool(abs(stops) <= MAX_EXPOSURE)
-    except (TypeError, ValueError):  # texts, arrays
-        raise InputError(f"exposure {stops!r}", "not a number", "give stops, for example 1.5") from None
+        within = bool(-MAX_EXPOSURE <= stops <= MAX_EXPOSURE)
+    except (TypeError, ValueError):  # texts, arrays, complex numbers
+        raise InputError(f"exposure {brief(stops)}", "not a number", "give stops, for example 1.5") from None
     if not within:
         raise InputError(f"exposure {stops}", f"not within {MAX_EXPOSURE:g} stops", "give for example 1.5")
     return stops

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -77,12 +77,16 @@ def compare(
     InputError
         If the sizes differ, or no pixel is left.
     """
+    if quantity not in get_args(Quantity):
+        raise InputError(f"quantity {quantity!r}", "not known", f"use one of {', '.join(get_args(Quantity))}")
     if frame.size != truth.size:
         raise InputError("compare", f"sizes {frame.size} and {truth.size}", "render both at one size")
     covered = frame.coverage | truth.coverage
     used = frame.coverage & truth.coverage & frame.valid & truth.valid
     words = "covered and valid in both"
     if mask is not None:
+        if np.shape(mask) != used.shape or np.asarray(mask).dtype != bool:
+            raise InputError("compare", f"a mask that is no array {used.shape} of bool", "give one, as `interior` does")
         used &= mask
         words += ", within the given mask"
     if not used.any():
@@ -119,6 +123,9 @@ def interior(hit_counts: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     At a silhouette a rasterizer decides coverage on a grid of sub-pixels, so it and a ray tracer may disagree there
     about which surfaces a pixel center sees: a matter of coverage, not of thickness.
     """
+    hit_counts = np.asarray(hit_counts)
+    if hit_counts.ndim != 2 or not hit_counts.size:
+        raise InputError(f"hit counts of shape {hit_counts.shape}", "no picture", "give an array (h, w)")
     padded = np.pad(hit_counts, 1, mode="edge")
     height, width = hit_counts.shape
     shifted = [padded[i : i + height, j : j + width] for i in range(3) for j in range(3)]

@@ -132,8 +132,9 @@ def fit_photographs(photographs: Sequence[Photograph], ior: float | None = None)
     InputError
         If a picture cannot be read, a patch is outside of it or brighter than white, or white is saturated.
     """
-    if not photographs:
-        raise InputError("fit to photographs", "there are none", "give at least one")
+    photographs = tuple(photographs)
+    if not (photographs and all(isinstance(one, Photograph) for one in photographs)):
+        raise InputError("fit to photographs", "there are none", "give at least one tl.Photograph")
     told: list[str] = []
     fit = fit_steps([_steps(one, number, told) for number, one in enumerate(photographs)], ior)
     return dataclasses.replace(fit, warnings=(*told, *fit.warnings))

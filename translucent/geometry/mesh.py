@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import checked, vectors
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.diagnosis import Diagnosis, diagnose
@@ -181,14 +181,14 @@ class Mesh(Frozen):
     @checked
     def winding_number(self, point: npt.ArrayLike) -> float:
         """Winding number of the surface around `point`: 0 outside, 1 inside, a fraction on it or near a hole."""
-        return winding_number(self.vertices[self.faces], point)
+        return winding_number(self.vertices[self.faces], _point(point))
 
     @checked
     def is_near(self, point: npt.ArrayLike, distance: float) -> bool:
         """True if the surface comes within `distance` metres of `point`."""
         from trimesh.triangles import closest_point
 
-        corners, target = self.vertices[self.faces], np.asarray(point, dtype=np.float64)
+        corners, target = self.vertices[self.faces], _point(point)
         near = ((corners.min(axis=1) <= target + distance) & (corners.max(axis=1) >= target - distance)).all(axis=1)
         if not near.any():
             return False
@@ -229,6 +229,13 @@ class Mesh(Frozen):
         if self.diagonal < MIN_DIAGONAL:
             return "all its vertices are at one point", "export the mesh again"
         return None
+
+
+def _point(point: npt.ArrayLike) -> Array:
+    found = vectors("point", point)
+    if found.ndim != 1:
+        raise InputError(f"point of shape {found.shape}", "more than one", "give (x, y, z)")
+    return found
 
 
 def unit_normals(vertices: Array, faces: npt.NDArray[np.integer]) -> Array:

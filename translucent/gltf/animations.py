@@ -73,7 +73,7 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
             ends.append(end)
     if ends and seconds > max(ends):
         text = f"its animations end after {max(ends):g} s; at {seconds:g} s all stays as it is then"
-        warnings.warn(f"scene {file.path.name!r}: {text}", TranslucentWarning, stacklevel=3)
+        warnings.warn(f"scene {file.path.name!r}: {text}", TranslucentWarning, stacklevel=4)
     return dataclasses.replace(file, tree={**file.tree, "nodes": moved})
 
 

@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from translucent.arguments import brief
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.gltf.fields import JsonFields, LeftOut, label
@@ -55,12 +56,12 @@ def scene_camera(
             file.item("cameras", nodes[node]["camera"])
             placed.append((nodes[node]["camera"], node))
     placed.sort()
-    if index is None or (index == 0 and not placed):
+    if index is None or (isinstance(index, int) and index == 0 and not placed):
         return None
     if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(placed):
         listed = ", ".join(f"{i} of node {label(nodes, node)}" for i, (_, node) in enumerate(placed))
         raise InputError(
-            f"camera {index!r} of {str(file.path)!r}",
+            f"camera {brief(index)} of {str(file.path)!r}",
             f"it has {listed}" if placed else "it has no cameras",
             "give one of these numbers" if placed else "leave the camera out: all objects are in view then",
         )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from translucent.arguments import checked_but
 from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
 from translucent.files.reading import require_room
@@ -78,6 +79,7 @@ class GltfScene(Scene):
     variants: tuple[str, ...] = ()
 
 
+@checked_but("camera", "size")
 def load_scene(
     path: str | Path,
     unit: str = "m",
@@ -143,7 +145,7 @@ def load_scene(
         if file.items(key) and not (key == "animations" and time is not None):
             left_out.add(key, f"{len(file.items(key))}")
     if lost := left_out.lines():
-        warnings.warn(f"scene {file.path.name!r}: left out: {'; '.join(lost)}", TranslucentWarning, stacklevel=2)
+        warnings.warn(f"scene {file.path.name!r}: left out: {'; '.join(lost)}", TranslucentWarning, stacklevel=3)
     # Surfaces mirror what is around them: that should be more than a gradient.
     polished = any(item.surface is not None for item in objects)
     environment = Environment.studio() if polished else LIGHT_TABLE

@@ -53,7 +53,7 @@ def volume_extensions(medium: Medium, distance: float | None, thickness: float, 
         Index of refraction, >= 1.
     """
     color, metres = color_at(medium, distance)
-    volume: Json = {"thicknessFactor": thickness}
+    volume: Json = {"thicknessFactor": float(thickness)}
     if medium.extinction.any():
         volume |= {"attenuationColor": color.tolist(), "attenuationDistance": metres}
     return {TRANSMISSION: {"transmissionFactor": 1}, VOLUME: volume, IOR: {"ior": ior}}

@@ -17,6 +17,7 @@ from typing import Any, Literal, get_args
 
 import moderngl
 
+from translucent.arguments import brief
 from translucent.errors import InputError, RenderError
 from translucent.files.reading import require_allowed
 from translucent.gpu.drivers import avoid_full_cache
@@ -224,6 +225,8 @@ def adopt_context(gl: moderngl.Context) -> GpuContext:
     Where it has no ``gc_mode`` it gets ``"context_gc"``, or what we drop would stay in its memory.
     """
     _note_process()
+    if not isinstance(gl, moderngl.Context):
+        raise InputError(f"context {brief(gl)}", f"of type {type(gl).__name__}", "give a moderngl.Context")
     if gl.gc_mode is None:
         gl.gc_mode = "context_gc"
     return GpuContext(gl, "adopted", gl.info)

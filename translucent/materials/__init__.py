@@ -27,6 +27,7 @@ from translucent.materials.materialx import OPENPBR_TARGET, STANDARD_SURFACE_TAR
 from translucent.materials.target import ExportTarget
 from translucent.materials.usd import USD
 from translucent.media.medium import Medium
+from translucent.units import metres_per_unit
 
 __all__ = ["TARGETS", "load_medium", "load_roughness", "text_block"]
 
@@ -113,6 +114,7 @@ def load_medium(path: str | Path, unit: str = "m") -> Medium:
     InputError
         If there is no such file, or it holds no such material.
     """
+    metres_per_unit(unit)
     what, reader = f"material {str(path)!r}", _target_of(path)
     if reader is None or reader.read is None:
         suffixes = dict.fromkeys(target.suffix for target in TARGETS.values() if target.suffix)

@@ -132,8 +132,11 @@ def condition_number(colors: npt.ArrayLike) -> Array:
     It is infinite at t_c = 1 (near white, rounding a color to 8 bits changes everything), and below 1 for t_c < 1/e.
     The way back multiplies by -log(t_c): a relative error e of sigma_t is one of e -log(t_c) in the color.
     """
+    found = np.asarray(colors, dtype=np.float64)
+    if (found < 0).any():
+        raise InputError("condition number of a color", "a channel below 0", "give linear colors, 0 to 1")
     with np.errstate(divide="ignore"):
-        return 1.0 / np.abs(np.log(np.asarray(colors, dtype=np.float64)))
+        return 1.0 / np.abs(np.log(found))
 
 
 def mean_free_path(extinction: npt.ArrayLike) -> Array:
@@ -193,7 +196,7 @@ def distance_for_color(extinction: npt.ArrayLike, color: npt.ArrayLike) -> Dista
         If the medium extinguishes nothing, or a channel is outside its range.
     """
     sigma, depth = _triples(extinction), extinction_from_colors(color, 1.0)
-    if not (np.isfinite(sigma).all() and (sigma >= 0).all() and (sigma > 0).any()):
+    if sigma.shape != (3,) or not (np.isfinite(sigma).all() and (sigma >= 0).all() and (sigma > 0).any()):
         raise InputError(f"extinction {sigma.tolist()}", "not three numbers >= 0, one above", "give one that absorbs")
     peak = sigma.max()
     with np.errstate(under="ignore", over="ignore"):  # relative to the largest channel, no square can overflow

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import checked, vectors
 from translucent.arrays import Array, Frozen, Integers
 from translucent.errors import InputError
 from translucent.files.reading import open_file
@@ -91,7 +91,7 @@ class DensityGrid(Frozen):
         """(...,): density at points (..., 3)."""
         values = np.asarray(self.values)
         count = np.array(values.shape)
-        position = np.clip(np.asarray(points, dtype=np.float64) * count - 0.5, 0.0, count - 1.0)
+        position = np.clip(vectors("density at points", points) * count - 0.5, 0.0, count - 1.0)
         low = np.minimum(position.astype(np.int64), np.maximum(count - 2, 0))
         share = position - low
         high = np.minimum(low + 1, count - 1)
@@ -106,6 +106,7 @@ class DensityGrid(Frozen):
         Between the planes through the centers of voxels the density is a cubic of the position on the line.
         """
         count = np.array(np.shape(self.values))
+        start, end = _ends(start, end)
         begin, stop = start * count - 0.5, end * count - 0.5
         ends = np.cumsum(3 + np.abs(stop - begin).sum(axis=1).astype(np.int64))
         means = np.zeros(len(start))
@@ -133,6 +134,15 @@ class DensityGrid(Frozen):
         with np.errstate(under="ignore"):
             mean = self.at((position + 0.5) / count).mean(axis=1)
             return np.asarray(np.bincount(line, mean * length, len(begin)), dtype=np.float64)
+
+
+def _ends(start: npt.ArrayLike, end: npt.ArrayLike) -> tuple[Array, Array]:
+    """Ends of lines, (k, 3) each."""
+    first, last = vectors("density between points", start), vectors("density between points", end)
+    if first.ndim != 2 or first.shape != last.shape:
+        found = f"shapes {first.shape} and {last.shape}"
+        raise InputError("density between points", found, "give as many starts as ends, (k, 3) each")
+    return first, last
 
 
 def _cuts(begin: Array, stop: Array, count: int) -> tuple[Integers, Array]:
@@ -290,7 +300,7 @@ def trilinear(low: npt.ArrayLike, high: npt.ArrayLike, share: npt.ArrayLike) -> 
 
 def _along(points: npt.ArrayLike, axis: int) -> Array:
     """Positions on one axis of the unit box; positions that rounding puts outside are clamped to the boundary."""
-    return np.clip(np.asarray(points, dtype=np.float64)[..., axis], 0.0, 1.0)
+    return np.clip(vectors("density at points", points)[..., axis], 0.0, 1.0)
 
 
 def _check_profile(name: str, axis: int, start: float, end: float, positive: bool = False) -> None:

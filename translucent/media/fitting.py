@@ -426,6 +426,8 @@ def _samples(
 ) -> tuple[Array, Array, Array]:
     """Checked distances (n,), linear colors (n, 3) and weights (n,), largest 1."""
     d = np.asarray(distances, dtype=np.float64)
+    if np.ndim(colors) == 0:
+        raise InputError("fit to colors", "one number", "give a color for each distance")
     listed = colors if isinstance(colors, np.ndarray) else list(colors)  # type: ignore[arg-type]
     t = np.array([parse_color(color) for color in listed], dtype=np.float64).reshape(-1, 3)
     w = np.ones(len(t)) if weights is None else np.asarray(weights, dtype=np.float64)

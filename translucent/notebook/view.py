@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
+from translucent.arguments import checked_but
 from translucent.assets import web_path
 from translucent.errors import InputError, RenderError, TranslucentError
 from translucent.extras import install_command, require_package
@@ -110,6 +111,7 @@ def _view(scene: Scene) -> str:
 VIEW_SAMPLES = 8
 
 
+@checked_but("scene", "size", "method", "interfaces", "tone")
 def view(
     scene: Scene,
     size: tuple[int, int] = (640, 480),

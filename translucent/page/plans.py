@@ -11,6 +11,7 @@ from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 from translucent.planning.interfaces import FrontInterface, Interfaces
 from translucent.planning.methods import DepthPeeling, Method
+from translucent.planning.methods.base import check_method
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName
 from translucent.planning.plan import plan
@@ -209,6 +210,7 @@ def plan_page(
         If WebGL2 cannot draw the scene, or not by what was asked for.
     """
     check_scene(scene)
+    check_method(method)
     if interfaces is None and triangles(scene) > MOST_TRACED:
         interfaces = FrontInterface()
     asked = method, interfaces, scattering, shadows

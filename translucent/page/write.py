@@ -8,6 +8,7 @@ import io
 import os
 from pathlib import Path
 
+from translucent.arguments import brief, checked_but
 from translucent.arrays import Pixels
 from translucent.assets import web_path
 from translucent.errors import InputError
@@ -56,6 +57,7 @@ SAMPLES, POSTER_SAMPLES, MOST_SAMPLES = 16, 4, 256
 MOST_SIDE = 8192
 
 
+@checked_but("scene", "size", "method", "interfaces", "scattering", "shadows", "tone", "samples")
 def write_page(
     scene: Scene,
     path: str | os.PathLike[str],
@@ -162,9 +164,12 @@ def page_html(
     check_exposure(exposure)
     tone_curve(tone)
     if not isinstance(name, str):
-        raise InputError(f"name {name!r}", "not a text", "give the title of the page, for example 'Wine'")
+        raise InputError(f"name {brief(name)}", "not a text", "give the title of the page, for example 'Wine'")
     if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
-        raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MOST_SAMPLES}", "give for example 16")
+        raise InputError(
+            f"samples {brief(samples)}", f"not a whole number in 1 to {MOST_SAMPLES}", "give for example 16"
+        )
+    name = name.encode("utf-8", "replace").decode()  # a name of a file may hold what is no character
     script = web_path("page.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     data = payload(planned, name, size, samples, exposure, tone)
     picture = "" if poster is None else f'<img alt="" src="{_data_url(poster)}">'

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from translucent.arguments import checked
+from translucent.arguments import brief, checked
 from translucent.errors import InputError
 from translucent.planning.methods.base import check_count
 
@@ -70,4 +70,6 @@ class Caustics:
 def check_caustics(caustics: Caustics | None) -> None:
     """Raise `InputError` unless caustics are ones, or None."""
     if caustics is not None and not isinstance(caustics, Caustics):
-        raise InputError(f"caustics {caustics!r}", "not tl.Caustics", "give for example tl.Caustics(photons=1_000_000)")
+        raise InputError(
+            f"caustics {brief(caustics)}", "not tl.Caustics", "give for example tl.Caustics(photons=1_000_000)"
+        )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from translucent.arguments import brief
 from translucent.errors import InputError
 from translucent.planning.interfaces import FrontInterface, Interfaces, ScreenInterfaces, TracedInterfaces
 from translucent.planning.interfaces.places import with_interfaces
@@ -30,7 +31,7 @@ def check_interfaces(interfaces: object) -> None:
     known = [f"tl.{one}" for one in (TracedInterfaces(), ScreenInterfaces(), FrontInterface())]
     old = _OLD_NAMES.get(interfaces) if isinstance(interfaces, str) else None
     do = f"give {', '.join(known[:-1])} or {known[-1]}" if old is None else f"write interfaces=tl.{old}"
-    raise InputError(f"interfaces {interfaces!r}", "not a choice of interfaces", do)
+    raise InputError(f"interfaces {brief(interfaces)}", "not a choice of interfaces", do)
 
 
 def chosen_interfaces(scene: Scene, asked: Interfaces | None, *, sheets: bool) -> tuple[Interfaces, str]:

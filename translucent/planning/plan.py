@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from translucent.arguments import checked_but
 from translucent.errors import InputError
 from translucent.geometry.together import diagnose_together
 from translucent.media.given_back import DiffusedVolume
@@ -25,6 +26,7 @@ from translucent.planning.methods import (
     SignedDepth,
     ThinLayer,
 )
+from translucent.planning.methods.base import check_method
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.order import why_order_matters
 from translucent.planning.passes import PassName, PassSpec
@@ -37,6 +39,7 @@ from translucent.planning.slots import require_clear_priorities
 from translucent.scene.scene import Scene, check_scene, object_names
 
 
+@checked_but("scene", "method", "interfaces", "scattering", "caustics", "shadows")
 def plan(
     scene: Scene,
     method: Method | None = None,
@@ -104,8 +107,7 @@ def _plan(
     caustics: Caustics | None = None,
 ) -> RenderPlan:
     """The plan but for shadows and photons."""
-    if method is not None and not isinstance(method, Method):
-        raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
+    check_method(method)
     check_interfaces(interfaces)
     check_scattering(scattering)
     capabilities = capabilities or Capabilities()

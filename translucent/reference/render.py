@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arguments import checked_but
 from translucent.errors import InputError
 from translucent.files.reading import require_memory
 from translucent.formulas import optics
@@ -18,6 +19,7 @@ from translucent.frames.frame import Frame
 from translucent.planning.choices import RenderChoices
 from translucent.planning.effects import STRAIGHT
 from translucent.planning.methods import Method
+from translucent.planning.methods.base import check_method
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities, RenderPlan
@@ -50,6 +52,7 @@ _PIXEL_BYTES = 200
 TOLERANCE = 1e-6
 
 
+@checked_but("scene", "size", "method")
 def render(
     scene: Scene,
     size: tuple[int, int],
@@ -111,6 +114,7 @@ def render(
     start = time.perf_counter()
     check_scene(scene)
     size = check_size(size)
+    check_method(method)
     if not 1e-12 <= tolerance <= 1:
         raise InputError(f"tolerance {tolerance}", "not in 1e-12 to 1", f"use for example {TOLERANCE:g}")
     bent = bends(scene) if refraction is None else refraction

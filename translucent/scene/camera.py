@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import brief, checked
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.geometry.grouping import extent
@@ -129,6 +129,9 @@ class Camera(Frozen):
             Upwards in the picture.
         """
         seen = np.asarray(points, dtype=np.float64)
+        if seen.ndim != 2 or seen.shape[1] != 3 or not len(seen):
+            raise InputError(f"camera framing points of shape {seen.shape}", "no points", "give an array (n, 3)")
+        size = check_size(size)
         low, high = extent(seen)
         reach = float(np.linalg.norm(high - low)) or 1.0
         axis = np.asarray(direction, dtype=np.float64)
@@ -209,6 +212,8 @@ class Camera(Frozen):
         origins, directions : (h, w, 3) float64
             Directions have unit length; all origins of a perspective camera are the eye.
         """
+        if any(np.shape(one) not in ((), tuple(size)[::-1]) for one in offset):
+            raise InputError("offset of rays", "neither two numbers nor two arrays (h, w)", "give (right, down)")
         half_width, half_height = self.half_extent(size)
         aside, above = self.center(size)
         x = ((np.arange(size[0]) + 0.5 + offset[0]) / size[0] * 2 - 1 + aside) * half_width
@@ -226,12 +231,12 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
     try:
         width, height = (int(v) for v in size)
         exact = (width, height) == tuple(size)
-    except (TypeError, ValueError, OverflowError):
+    except Exception:  # noqa: BLE001 - whatever may be given as a size
         raise InputError(
-            f"frame size {size!r}", "not (width, height)", "give two whole numbers, for example (1280, 720)"
+            f"frame size {brief(size)}", "not (width, height)", "give two whole numbers, for example (1280, 720)"
         ) from None
     if not exact or width < 1 or height < 1:
-        raise InputError(f"frame size {size!r}", "not two whole numbers above 0", "give for example (1280, 720)")
+        raise InputError(f"frame size {brief(size)}", "not two whole numbers above 0", "give for example (1280, 720)")
     return width, height
 
 

@@ -16,7 +16,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import brief, checked
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.formulas.spherical_harmonics import COUNT, real_harmonics
@@ -156,7 +156,7 @@ class Environment(Frozen):
         """Copy with another environment as the visible background; light and reflections stay."""
         if not isinstance(background, Environment):
             raise InputError(
-                f"background {background!r}", f"of type {type(background).__name__}", "give a tl.Environment"
+                f"background {brief(background)}", f"of type {type(background).__name__}", "give a tl.Environment"
             )
         return dataclasses.replace(self, background=background.seen)
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import brief, checked, vectors
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.formulas.light import ALL_AROUND, cone_attenuation, light_cone
@@ -170,7 +170,9 @@ class DirectionalLight(Frozen):
     def irradiance_on(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> Array:
         """Irradiance on surfaces with unit `normals` (..., 3) that nothing shadows, (..., 3) in W/m^2, at any point."""
         with np.errstate(under="ignore"):
-            cosine = np.maximum(-np.sum(np.asarray(normals) * np.asarray(self.direction), axis=-1, keepdims=True), 0.0)
+            cosine = np.maximum(
+                -np.sum(vectors("normals", normals) * np.asarray(self.direction), axis=-1, keepdims=True), 0.0
+            )
             return np.asarray(cosine * np.asarray(self.irradiance))
 
 
@@ -195,10 +197,10 @@ def _angle(name: str, value: object) -> float:
 def _vector(what: str, value: npt.ArrayLike, do: str = "give (x, y, z)") -> Array:
     try:
         vector = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         vector = np.zeros(0)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{what} {value!r}", "not three finite numbers", do)
+        raise InputError(f"{what} {brief(value)}", "not three finite numbers", do)
     vector.setflags(write=False)
     return vector
 
@@ -207,8 +209,8 @@ def positive_triple(what: str, value: npt.ArrayLike) -> Array:
     """(3,) float64, read-only: one or three numbers in 0 to `MAX_RADIANCE`, else an `InputError` about `what`."""
     try:
         triple = np.broadcast_to(np.array(value, dtype=np.float64), (3,))
-    except (TypeError, ValueError):
-        raise InputError(f"{what} {value!r}", "not one or three numbers", "give (r, g, b)") from None
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{what} {brief(value)}", "not one or three numbers", "give (r, g, b)") from None
     triple = _vector(what, triple)
     if (triple < 0).any() or (triple > MAX_RADIANCE).any():
         raise InputError(

@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import checked, vectors
 from translucent.arrays import Array, Frozen, Mask
 from translucent.errors import InputError
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh
@@ -231,7 +231,7 @@ class Object(Frozen):
     @checked
     def winding_number(self, point: npt.ArrayLike) -> float:
         """Winding number around a world-space point: 0 or 1 for a simple solid; quick outside the bounds."""
-        local = np.linalg.solve(self.matrix[:3, :3], np.asarray(point, dtype=np.float64) - self.matrix[:3, 3])
+        local = np.linalg.solve(self.matrix[:3, :3], vectors("point", point) - self.matrix[:3, 3])
         if (local < self.mesh.bounds[0]).any() or (local > self.mesh.bounds[1]).any():
             return 0.0
         number = self.mesh.winding_number(local)

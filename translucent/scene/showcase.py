@@ -89,6 +89,7 @@ def showcase(
     InputError
         If there is no such stage.
     """
+    lights = tuple(lights)
     own = environment is not None or len(lights) > 0
     chosen = stage_named(stage or (NO_STAGE if own else DEFAULT_STAGE))
     shown = Object(mesh, medium=medium or default_medium(mesh, chosen))

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import checked, vectors
 from translucent.arrays import Frozen
 from translucent.errors import InputError
 
@@ -79,7 +79,7 @@ class Texture(Frozen):
     def sample(self, uv: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """(..., 3) or (..., 4): bilinear values at texture coordinates (..., 2), v upwards."""
         height, width = self.pixels.shape[:2]
-        at = np.asarray(uv, dtype=np.float64) @ self.rows[:, :2].T + self.rows[:, 2]
+        at = vectors("uv", uv, 2, "texture coordinates") @ self.rows[:, :2].T + self.rows[:, 2]
         column, row = at[..., 0] * width - 0.5, (1.0 - at[..., 1]) * height - 0.5
         left, top = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
         right_share, low_share = (column - left)[..., None], (row - top)[..., None]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from translucent.arguments import brief
 from translucent.errors import InputError
 from translucent.planning.notes import Note
 from translucent.planning.passes import PassSpec
@@ -111,4 +112,12 @@ class Method:
 def check_count(what: str, value: object, most: int, *, least: int = 1, example: int = 8) -> None:
     """Raise `InputError` unless a value is a whole number from `least` to `most`."""
     if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-        raise InputError(f"{what} {value!r}", f"not a whole number in {least} to {most}", f"give for example {example}")
+        raise InputError(
+            f"{what} {brief(value)}", f"not a whole number in {least} to {most}", f"give for example {example}"
+        )
+
+
+def check_method(method: object) -> None:
+    """Raise `InputError` for what is no method; None leaves the choice to the planner."""
+    if method is not None and not isinstance(method, Method):
+        raise InputError(f"method {brief(method)}", "not a thickness method", "give for example tl.SignedDepth()")

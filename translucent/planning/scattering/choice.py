@@ -7,6 +7,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from translucent.arguments import brief
 from translucent.errors import InputError
 from translucent.media.given_back import DiffusedMedium, DiffusedVolume, LayeredMedium
 from translucent.media.medium import Medium
@@ -81,7 +82,7 @@ def check_scattering(scattering: object) -> None:
         return
     known = [f"tl.{one}" for one in (Diffusion(), ScatteringLayer(), SingleScattering())]
     raise InputError(
-        f"scattering {scattering!r}",
+        f"scattering {brief(scattering)}",
         "not a choice of scattering",
         f"give {', '.join(known[:-1])} or {known[-1]}",
     )

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from translucent.arguments import checked
+from translucent.arguments import brief, checked
 from translucent.errors import InputError
 from translucent.planning.methods.base import check_count
 from translucent.planning.scattering.base import Scattering
@@ -51,10 +51,10 @@ class Diffusion(Scattering):
 
     def __post_init__(self) -> None:
         if isinstance(self.resolution, int) and self.resolution > MOST_RESOLUTION:
-            gigabytes = CELL_BYTES * self.resolution**3 / 4 / 1e9
+            cells = 0.25 * min(self.resolution, 10**9) ** 3
             raise InputError(
-                f"Diffusion resolution {self.resolution}",
-                f"a body would have {self.resolution**3 / 4:.2g} cells and take about {gigabytes:.0f} GB",
+                f"Diffusion resolution {brief(self.resolution)}",
+                f"a body would have {cells:.2g} cells and take about {CELL_BYTES * cells / 1e9:.0f} GB",
                 f"give at most {MOST_RESOLUTION}; 32 is enough where scattering dominates",
             )
         check_count("Diffusion resolution", self.resolution, MOST_RESOLUTION, least=LEAST_RESOLUTION, example=32)
