@@ -124,7 +124,7 @@ def drawn_in(context: GpuContext, scene: Any, size: tuple[int, int], flags: int)
 
 
 def _forget_errors(gl: Any) -> None:
-    """Read what others, such as moderngl when it builds programs, left for PyOpenGL to take for its own."""
+    """Clear errors of OpenGL that others, such as moderngl when it builds programs, left behind."""
     while gl.error != "GL_NO_ERROR":
         pass
 

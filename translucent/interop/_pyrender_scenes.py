@@ -45,7 +45,7 @@ class Clipping:
         return cls(camera.znear, far, isinstance(camera, pyrender.OrthographicCamera))
 
     def metres(self, depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
-        """Metres ahead of what the depth test compared, 0 to 1; ``inf`` at 1. The twin of ``shade/backdrop.frag``."""
+        """Distance ahead in metres from window depth, 0 to 1; ``inf`` at 1. The twin of ``shade/backdrop.frag``."""
         share = depth.astype(np.float64)
         nothing = share >= 1.0
         share[nothing] = 0.0
@@ -67,8 +67,16 @@ def ambient_of(scene: Any) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, eq=False)
 class PyrenderPicture:
-    """Picture drawn by pyrender, row 0 at the top: `colors` (h, w, 4) uint8, encoded, and `depth` (h, w) in metres; and
-    the light from all around that it was drawn with.
+    """Picture drawn by pyrender, and its ambient light; row 0 at the top.
+
+    Attributes
+    ----------
+    colors : (h, w, 4) uint8
+        Encoded.
+    depth : (h, w) float64
+        In metres.
+    ambient : tuple of 3 floats
+        Radiance of the light from all around.
     """
 
     colors: npt.NDArray[np.uint8]
@@ -99,7 +107,7 @@ _converted: WeakKeyDictionary[Any, tuple[list[Any], list[tuple[Mesh, Array]]]] =
 
 
 def translucent_nodes(scene: Any, names: Collection[str]) -> list[tuple[Any, str]]:
-    """The visible mesh nodes of these names, or with meshes of these names, and which name it was; in a fixed order."""
+    """Visible mesh nodes that have one of these names, or whose meshes do, with that name; in a fixed order."""
     if not isinstance(scene, pyrender.Scene):
         raise InputError(f"pyrender scene {scene!r}", f"of type {type(scene).__name__}", "give a pyrender.Scene")
     nodes = sorted((node for node in scene.mesh_nodes if node.mesh.is_visible), key=_order)
@@ -135,7 +143,7 @@ def converted(scene: Any, media: Mapping[str, Medium], size: tuple[int, int], ov
 
 
 def _meshes(node: Any, name: str) -> list[tuple[Mesh, Array]]:
-    """The mesh of a node, welded and wound, and where in the node it is; several if there are instances."""
+    """Meshes of a node, welded and wound, with their poses in it; several if there are instances."""
     arrays = [array for p in node.mesh.primitives for array in (p.positions, p.indices, p.poses)]
     known = _converted.get(node.mesh)
     if known is None or len(known[0]) != len(arrays) or any(a is not b for a, b in zip(known[0], arrays, strict=True)):
@@ -169,7 +177,7 @@ def _triangles(primitive: Any, name: str) -> tuple[Array, npt.NDArray[np.int32]]
 
 
 def camera_of(scene: Any, size: tuple[int, int]) -> Camera:
-    """The camera that a pyrender scene is drawn with, if it is one of the toolkit's kinds."""
+    """The camera that a pyrender scene is drawn with, if the toolkit has such cameras."""
     node = scene.main_camera_node
     if node is None:
         raise InputError("rendering a pyrender scene", "it has no camera", "add one: scene.add(camera, pose=...)")
@@ -297,7 +305,7 @@ def _add(part: Any, item: Any, pose: Array) -> None:
 
 
 def opaque_part(scene: Any, hidden: Collection[Any]) -> Any:
-    """The scene as one of its own, in which the nodes in `hidden` are not visible; shadow maps make room for them yet.
+    """Copy of a scene in which the nodes in `hidden` are invisible; shadow maps still make room for them.
 
     pyrender marks what it draws as bound to the context where it does so, and refuses it elsewhere. The scene that was
     given may be drawn by another renderer of pyrender, so this one gets twins of all that would be marked.

@@ -1,4 +1,4 @@
-"""Stock pyrender 0.1.45 on today's NumPy and Python: every mend that it needs, in one place.
+"""Stock pyrender 0.1.45 on today's NumPy and Python: every fix that it needs, in one place.
 
 - NumPy 2 removed `infty`, which every bounding box of pyrender asks for.
 - From Python 3.12 on, ctypes references have another type name, which PyOpenGL 3.1.0 does not know: textures and
@@ -31,7 +31,7 @@ _PRIVATE = {
 
 
 def load_pyrender(backend: str | None = None) -> ModuleType:
-    """Import pyrender and mend it.
+    """Import pyrender and fix it.
 
     Parameters
     ----------

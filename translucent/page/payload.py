@@ -112,7 +112,7 @@ def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, e
 def _recorded(
     recorder: FrameRecorder, planned: PagePlan
 ) -> tuple[dict[str, tuple[Scene, RecordedFrame]], dict[str, str]]:
-    """Frames of the scene and of its variants, and which of them each switch setting is shown by."""
+    """Frames of the scene and its variants, and the variant that shows each setting of the switches."""
     frames = {"base": (planned.scene, recorder.record(planned.scene, planned.plan))}
     aliases: dict[str, str] = {}
     if all(editable(body) for body in planned.scene.objects):
@@ -310,7 +310,7 @@ def _variant_told(
 
 
 def _object_of(content: npt.NDArray[Any], mesh: object, scene: Scene) -> int | None:
-    """Number of the object that a Body block of a map of shadows belongs to."""
+    """Number of the object that a Body block of a shadow map belongs to."""
     extinction = np.frombuffer(content.tobytes(), BODY.dtype)["extinction"][0, :3]
     for i, body in enumerate(scene.objects):
         own = bounded_extinction(body.medium, scene.diagonal).astype(np.float32)
@@ -352,7 +352,7 @@ def _mesh_entry(mesh: Mesh, into: Container) -> dict[str, Any]:
 
 
 def _normals(mesh: Mesh, faces: np.ndarray, into: Container) -> dict[str, int | None]:
-    """Normals of vertices, where all faces at each agree; else those that there are, and which each corner has."""
+    """Normals of vertices where all faces around each agree; else the distinct normals, with an index per corner."""
     normals = drawn_normals(mesh).reshape(-1, 3)
     ofs = np.zeros((len(mesh.vertices), 3), np.float32)
     ofs[faces.ravel()] = normals

@@ -65,7 +65,7 @@ def _coarse(mesh: Mesh, faces: int) -> Mesh:
     return Mesh(vertices, kept, name=mesh.name)
 
 
-#: What a body gets in a variant whose passes it is to have, where it has none: the page puts its own in place.
+#: Index of refraction and roughness of variants for bodies without their own: the page puts the chosen ones in place.
 USUAL_IOR, USUAL_ROUGHNESS = 1.5, 0.5
 
 
@@ -87,7 +87,7 @@ def editable(body: Object) -> str:
 
 
 def variant(scene: Scene, *, bends: bool, rough: bool) -> Scene:
-    """The scene with media of bodies that a page can change made to bend light or not, polished or not."""
+    """Scene whose editable media refract or not, with rough or smooth surfaces."""
     return replace(scene, objects=[_changed(body, bends, rough) for body in scene.objects])
 
 
@@ -103,7 +103,7 @@ def _changed(body: Object, bends: bool, rough: bool) -> Object:
 
 
 def current(scene: Scene) -> tuple[bool, bool]:
-    """Switches as they are: any medium that a page can change bends light; any of their surfaces is rough."""
+    """Present setting of the switches: whether any editable medium refracts, and any of their surfaces is rough."""
     free = [body for body in scene.objects if body.medium is not None and not editable(body)]
     bends = any(body.medium is not None and body.medium.ior != 1.0 for body in free)
     return bends, any(body.surface is not None and body.surface.roughness > 0 for body in free)
@@ -164,7 +164,7 @@ class PagePlan:
 
     @property
     def own_notes(self) -> tuple[Note, ...]:
-        """Notes that are not of the plan."""
+        """Notes on the page itself, beside those of the plan."""
         found = []
         if (count := triangles(self.scene)) > MANY_TRIANGLES:
             text = f"{count:,} triangles load and turn slowly in a browser: --simplify 300000 shows a coarser copy"

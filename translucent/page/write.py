@@ -183,7 +183,7 @@ def page_html(
 
 
 def title_of(scene: Scene) -> str:
-    """Title of a page: the name of the first body, without that of its file's kind."""
+    """Title of a page: the name of the first body, without the suffix of its file."""
     mesh = scene.bodies[0].mesh if scene.bodies else scene.objects[0].mesh
     return name_of(mesh) or "scene"
 

@@ -120,9 +120,6 @@ class Zoom:
 
 Action = SetField | Open | ChoosePreset | Assign | Hide | Adopt | Replace | SetOrbit | Turn | Pan | Zoom
 
-#: Actions that move the camera: they are no undo steps, and undo leaves the camera where it is.
-CAMERA_ACTIONS = (SetOrbit, Turn, Pan, Zoom)
-
 #: Fields with which a preset is none any more.
 _OF_PRESET = ("absorption", "scattering", "anisotropy", "phase", "emission")
 
@@ -245,7 +242,8 @@ class History:
     def done(self, action: Action) -> History:
         """History after an action; one that changes nothing leaves no step, and a drag leaves one."""
         after = apply(self.present, action)
-        if isinstance(action, (*CAMERA_ACTIONS, Adopt)):
+        # Moves of the camera are no steps, and undo leaves it where it is.
+        if isinstance(action, (SetOrbit, Turn, Pan, Zoom, Adopt)):
             return dataclasses.replace(self, present=after)
         if after == self.present:
             return self

@@ -76,7 +76,7 @@ class Browser:
         return self._listed[1]
 
     def enter(self, folder: str | Path) -> None:
-        """Show another folder; one that is none is told."""
+        """Show another folder; `problem` says if there is none."""
         found = Path(os.path.normpath(self.folder / Path(folder).expanduser()))
         if not found.is_dir():
             self.problem = f"{found}: no such folder"
@@ -171,7 +171,7 @@ def open_dialog(kind: str) -> Any | None:
 
 
 def browser_for(kind: str, folder: Path) -> Browser:
-    """Browser of our own for a kind of dialog."""
+    """Our own browser for a type of dialog."""
     title, proposed, kinds = QUESTIONS[kind]
     return Browser(kind, title, tuple(kinds[1].split()), proposed is not None, folder, proposed or "")
 
@@ -188,8 +188,9 @@ _Callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.POINTER
 
 
 def accept_drops(take: Callable[[list[str]], None]) -> object:
-    """Call `take` with the files that are dropped on the window; the returned object has to be kept alive. None: not
-    possible.
+    """Call `take` with the files that are dropped on the window, where the system can do that.
+
+    The returned object has to be kept alive as long as the window.
     """
     if (library := _glfw()) is None:
         return None
@@ -210,7 +211,7 @@ def move_pointer(x: float, y: float) -> None:
 
 @cache
 def _glfw() -> ctypes.CDLL | None:
-    """The very library that the window uses, as another copy would know no windows; None if it is not there."""
+    """The library that the window itself uses, as another copy would know no windows; None if it is not there."""
     folder = Path(imgui_bundle.__file__).parent
     names = ("libglfw.so.3", "libglfw.3.dylib", "glfw3.dll")
     libraries = [folder / name for name in names if (folder / name).exists()]

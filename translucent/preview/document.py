@@ -107,12 +107,12 @@ class Material:
 
     @property
     def finish(self) -> dict[str, float]:
-        """Values of its surface, by the names of `Surface`."""
+        """Parameters of its surface, by their names in `Surface`."""
         return {name: getattr(self, name) for name in FINISH}
 
     @property
     def unsaid(self) -> list[str]:
-        """Parts of the finish that neither presets nor options of the command line hold."""
+        """Parameters of the surface that neither presets nor options of the command line state."""
         parts = ("transmission", "dispersion", "iridescence", "clearcoat")
         return [name for name in parts if getattr(self, name) != getattr(Material, name)]
 
@@ -398,7 +398,7 @@ def turned(orbit: Orbit, right: float, up: float) -> Orbit:
 
 
 def panned(orbit: Orbit, right: float, down: float) -> Orbit:
-    """Pan the picture to the right and down, by shares of its height."""
+    """Pan the picture to the right and down, by fractions of its height."""
     camera = camera_of(orbit)
     step = height_at_target(orbit) * (down * camera.up - right * camera.right)
     target = np.clip(np.asarray(orbit.target) + step, -MAX_COORDINATE, MAX_COORDINATE)

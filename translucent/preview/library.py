@@ -88,7 +88,7 @@ class Library:
     Parameters
     ----------
     refuse : callable
-        Is told what is wrong with files of own presets, once.
+        Takes the errors in files of own presets, once each.
     folder : Path, optional
         Of own presets. Default: `presets_folder`.
 

@@ -123,6 +123,10 @@ class Compiled:
     problem: str = ""
 
 
+#: Takes the result, in the thread of the window.
+Take = Callable[[Compiled], None]
+
+
 class Compiler:
     """Compiler of shaders, and maker of normals, in a worker process.
 
@@ -146,20 +150,14 @@ class Compiler:
         self.lane = Lane("compile")
         self.device = ""
 
-    def begin(self, scene: Scene, plans: Sequence[RenderPlan], then: Callable[[Compiled], None]) -> None:
+    def begin(self, scene: Scene, plans: Sequence[RenderPlan], then: Take) -> None:
         """Start the worker process, with a frame like the one on show; from now on, the context waits for it."""
         self.budget.postpones = True
         self.budget.elsewhere |= self.budget.needed
         self.request("", scene, plans, then, presents=True)
 
     def request(
-        self,
-        name: str,
-        scene: Scene,
-        plans: Sequence[RenderPlan],
-        then: Callable[[Compiled], None],
-        *,
-        presents: bool = False,
+        self, name: str, scene: Scene, plans: Sequence[RenderPlan], then: Take, *, presents: bool = False
     ) -> Task:
         """Request the programs and normals for plans of a scene; with `presents`, those that show a frame, too."""
 
@@ -256,7 +254,7 @@ def _object_like(item: Object) -> Object:
             pictures[field.name] = dataclasses.replace(texture, pixels=pixels)
     if surface is not None:
         surface = dataclasses.replace(surface, **pictures)
-    # A mesh as flat as a ground throws its shadow in another way than boxes.
+    # A mesh as flat as a ground casts its shadow in another way than boxes.
     simple = item.medium is None and len(item.mesh.faces) <= len(Box().tessellate().faces)
     return dataclasses.replace(item, mesh=item.mesh if simple else _boxes(item.mesh), surface=surface)
 

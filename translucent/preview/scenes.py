@@ -205,7 +205,7 @@ def _prepare(names: Names) -> None:
 
 
 def prepare(_: Task) -> None:
-    """Prepare the data of frames with surfaces or smooth edges, before it is waited for."""
+    """Compute the shared data of frames with surfaces or smooth edges before one needs them."""
     corner_normals(Box().tessellate())
     brdf_table()
     for name in ("light-table", "studio"):
@@ -260,7 +260,7 @@ def _environment(name: str, background: str, rotation: float, default: Environme
 
 
 def _shown_from(loaded: Loaded, name: str) -> Camera:
-    """Camera to which a stage is turned: the model's own, or the one that frames it there."""
+    """Camera that a stage faces: the model's own, or the one that frames it there."""
     scene = loaded.scene
     return scene.camera if loaded.has_camera else framing(scene.objects, (16, 9), stage=stage_named(name))
 
@@ -280,7 +280,7 @@ def turn_from(document: Document, loaded: Loaded, camera: Camera) -> float:
 
 
 def first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
-    """First orbit of a model: that of the file's own camera, or from where `render` sees it, close as F frames it."""
+    """First orbit of a model: of the file's own camera, or from the view of ``translucent render``, framed as by F."""
     scene, seen = loaded.scene, None
     if loaded.has_camera:
         return orbit_of(scene.camera, scene.bounds.mean(axis=0))
@@ -382,7 +382,7 @@ def _filled(item: Object, material: Material, medium: Medium) -> Object:
 
 @lru_cache(maxsize=2)
 def _light(yaw: float, pitch: float, irradiance: float) -> DirectionalLight:
-    """Light that the look adds; cached, since what it does in bodies is cached with it."""
+    """Light that the look adds; cached, as the solutions for its scattered light are cached by it."""
     return DirectionalLight(-direction_from(yaw, pitch), irradiance)
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import inspect
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -101,7 +101,6 @@ class Script:
     _frames: int = 0
     _waiting: float | None = None
     _until: float = 0.0
-    done: list[Step] = field(default_factory=list)
 
     @classmethod
     def of(cls, steps: list[Step]) -> Script:
@@ -127,7 +126,6 @@ class Script:
         if not self.steps:
             return True
         step = self.steps.pop()
-        self.done.append(step)
         if step.do == "wait":
             self._waiting, self._until = time.monotonic(), step.values["seconds"]
         VERBS[step.do](state, **step.values)

@@ -40,7 +40,7 @@ def to_table(document: Document) -> dict[str, Any]:
 
 
 def from_table(table: dict[str, Any], where: str) -> Document:
-    """Document of a table; absent fields have their defaults, and those of older versions are passed over.
+    """Document of a table; absent fields have their defaults, and fields of older versions are ignored.
 
     Raises
     ------
@@ -53,18 +53,15 @@ def from_table(table: dict[str, Any], where: str) -> Document:
     if not isinstance(table.get("assigned", []), list):
         raise InputError(where, "assigned is no list", "write [[assigned]]")
     for section, fields in table.items():
-        if section == "version":
-            continue
         if section == "assigned":
             sections[section] = tuple(_assigned(entry, where) for entry in fields)
-            continue
-        if section == "hidden":
+        elif section == "hidden":
             sections[section] = _hidden(fields, where)
-            continue
-        if section not in _SECTIONS or not isinstance(fields, dict):
+        elif section in _SECTIONS and isinstance(fields, dict):
+            default = Orbit() if section == "orbit" else getattr(Document(), section)
+            sections[section] = dataclasses.replace(default, **_fields(section, default, fields, where))
+        elif section != "version":
             raise InputError(where, f"an unknown [{section}]", f"use {', '.join(_SECTIONS)}")
-        default = Orbit() if section == "orbit" else getattr(Document(), section)
-        sections[section] = dataclasses.replace(default, **_fields(section, default, fields, where))
     return Document(**sections)
 
 

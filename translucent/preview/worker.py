@@ -100,7 +100,7 @@ class WorkerMessage:
 
     @classmethod
     def of(cls, value: object, token: Token | None = None) -> WorkerMessage:
-        """Pack a value; others in it are left out for which there is a token.
+        """Pack a value; parts of it that have a token are left out.
 
         Raises
         ------
@@ -283,7 +283,7 @@ class Pool:
             worker.close(max(end - time.monotonic(), 0.0))
 
     def _taken(self, task: Task, work: Callable[..., Any], urgency: Urgency) -> _Worker:
-        """Worker for some work: one that has done such before, or is idle, or a new one."""
+        """Worker for a task: one that has done similar work before, an idle one, or a new one."""
         ticket = urgency, next(self._numbers)
         with self._changed:
             insort(self._waiting, ticket)
@@ -501,7 +501,7 @@ def _run(pipe: Connection) -> None:
 
 
 def _end(*_: object) -> None:
-    """End, but not at once: files are removed that are half written; and only once, as that takes a while."""
+    """End after half-written files are removed, and only once, as that takes a while."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     sys.exit(1)
 

@@ -158,15 +158,7 @@ class Workspace:
 
     def open(self, model: Model, then: Document | None = None) -> None:
         """Read a model in the background, and show it, or the document `then` with it, once it is there."""
-
-        def show(loaded: Loaded) -> None:
-            self._keep(loaded)
-            self._set(self.history.done(Replace(then) if then is not None else Open(model.path, model.unit)))
-            if os.path.exists(model.path):
-                path = str(Path(model.path).resolve())
-                self.recent = [path, *(p for p in self.recent if p != path)][:MAX_RECENT]
-
-        self._load(model, show)
+        self._load(model, Open(model.path, model.unit) if then is None else Replace(then))
 
     def open_session(self, path: str) -> None:
         """Show the document of a file."""
@@ -386,20 +378,24 @@ class Workspace:
                 self._keep(loaded)
                 return self._complete()
         if self.lanes["load"].task is None and not self.lanes["load"].failed(model):
-            self._load(model, self._take)
+            self._load(model)
         return None
 
-    def _take(self, loaded: Loaded) -> None:
-        self._keep(loaded)
-        if self.document.model == loaded.model:
-            self._complete()
+    def _load(self, model: Model, action: Action | None = None) -> None:
+        """Read a model in the background; then apply an action, by which the document shows it, if it does not yet."""
 
-    def _load(self, model: Model, then: Callable[[Loaded], None]) -> None:
         def work(task: Task) -> Loaded:
             task.report(None, f"reading {Path(model.path).name}")
             return load_with(task, self.pool, model, self.allow_outside, pictured=self.loaded is not None)
 
-        self.lanes["load"].start(f"opening {Path(model.path).name}", work, then).key = model
+        def take(loaded: Loaded) -> None:
+            self._keep(loaded)
+            self._set(self.history if action is None else self.history.done(action))
+            if action is not None and os.path.exists(model.path):
+                path = str(Path(model.path).resolve())
+                self.recent = [path, *(p for p in self.recent if p != path)][:MAX_RECENT]
+
+        self.lanes["load"].start(f"opening {Path(model.path).name}", work, take).key = model
 
     def _keep(self, loaded: Loaded) -> None:
         self._models = [loaded, *(one for one in self._models if one.model != loaded.model)][:KEPT_MODELS]

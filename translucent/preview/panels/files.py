@@ -9,18 +9,7 @@ from imgui_bundle import ImVec2, imgui
 
 from translucent.preview.dialogs import Browser
 from translucent.preview.library import model_key
-from translucent.preview.panels.widgets import (
-    FAINT,
-    WARNING,
-    begin_rows,
-    combo,
-    em,
-    fact,
-    row,
-    text_field,
-    tooltip,
-    wrapped,
-)
+from translucent.preview.panels import widgets as ui
 from translucent.preview.window_state import WindowState
 
 RECIPES = (
@@ -49,7 +38,7 @@ def files_panel(state: WindowState) -> None:
     for label, kind, tip in RECIPES:
         if imgui.button(label):
             state.copy_recipe(kind)
-        tooltip(tip)
+        ui.tooltip(tip)
         imgui.same_line()
     imgui.new_line()
     imgui.separator_text("Session")
@@ -61,18 +50,18 @@ def files_panel(state: WindowState) -> None:
     imgui.separator_text("Model")
     if imgui.button("Save medium into .glb ..."):
         state.ask_file("save glb")
-    wrapped("A copy of the model's file with this medium in its materials.", FAINT)
+    ui.wrapped("A copy of the model's file with this medium in its materials.", ui.FAINT)
     _bake(state)
 
 
 def _bake(state: WindowState) -> None:
     imgui.separator_text("Bake thickness")
     modes, sizes, rays = ("cone", "normal", "transmittance", "inscribed"), (256, 512, 1024, 2048), (16, 64, 256)
-    if begin_rows("bake"):
+    if ui.begin_rows("bake"):
         for label, values in (("mode", modes), ("size", sizes), ("rays", rays)):
-            row(label)
+            ui.row(label)
             now, choose = state.baking[label], partial(state.baking.__setitem__, label)
-            combo(f"bake{label}", str(now), [(str(value), value) for value in values], now, choose)
+            ui.combo(f"bake{label}", str(now), [(str(value), value) for value in values], now, choose)
         imgui.end_table()
     task = state.work.lanes["bake"].task
     if task is not None:
@@ -88,9 +77,9 @@ def _bake(state: WindowState) -> None:
         changed, shown = imgui.checkbox("show on the model", state.work.show_bake)
         if changed:
             state.work.show_bake = shown
-        if begin_rows("baked"):
-            fact("thickest", bake.thickest_text(state.get("display.unit")))
-            fact("covered", f"{bake.covered:.0%} of the texels")
+        if ui.begin_rows("baked"):
+            ui.fact("thickest", bake.thickest_text(state.get("display.unit")))
+            ui.fact("covered", f"{bake.covered:.0%} of the texels")
             imgui.end_table()
 
 
@@ -102,7 +91,7 @@ def file_browser(state: WindowState) -> None:
     if not imgui.is_popup_open(POPUP):
         imgui.open_popup(POPUP)
     room = imgui.get_io().display_size
-    imgui.set_next_window_size(ImVec2(min(em(52.0), 0.9 * room.x), min(em(34.0), 0.85 * room.y)))
+    imgui.set_next_window_size(ImVec2(min(ui.em(52.0), 0.9 * room.x), min(ui.em(34.0), 0.85 * room.y)))
     imgui.set_next_window_pos(ImVec2(0.5 * room.x, 0.5 * room.y), imgui.Cond_.appearing, ImVec2(0.5, 0.5))
     flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
     imgui.push_style_color(imgui.Col_.popup_bg, imgui.ImVec4(0.16, 0.165, 0.175, 1.0))
@@ -120,34 +109,34 @@ def _content(state: WindowState, browser: Browser) -> None:
         browser.enter("..")
     imgui.same_line()
     imgui.set_next_item_width(-1.0)
-    if (text := text_field(state, "path", "folder", str(browser.folder))) is not None:
+    if (text := ui.text_field(state, "path", "folder", str(browser.folder))) is not None:
         browser.enter(text)
     below = -2.0 * imgui.get_frame_height_with_spacing() - imgui.get_text_line_height_with_spacing()
-    if imgui.begin_child("##places", ImVec2(em(PLACES), below)):
+    if imgui.begin_child("##places", ImVec2(ui.em(PLACES), below)):
         for folder in state.places():
             if imgui.selectable(f"{Path(folder).name or folder}##{folder}", folder == str(browser.folder))[0]:
                 browser.enter(folder)
-            tooltip(folder)
+            ui.tooltip(folder)
     imgui.end_child()
     imgui.same_line()
     chosen = None
     if imgui.begin_child("##files", ImVec2(0.0, below), imgui.ChildFlags_.borders):
         chosen = _files(state, browser)
     imgui.end_child()
-    wrapped(browser.problem or " ", WARNING)
+    ui.wrapped(browser.problem or " ", ui.WARNING)
     _, browser.every = imgui.checkbox("all files", browser.every)
     imgui.same_line()
-    imgui.text_colored(FAINT, " ".join(browser.patterns))
-    imgui.set_next_item_width(-em(11.0))
+    imgui.text_colored(ui.FAINT, " ".join(browser.patterns))
+    imgui.set_next_item_width(-ui.em(11.0))
     flags = imgui.InputTextFlags_.enter_returns_true
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
     entered, browser.text = imgui.input_text_with_hint("##name", "name or path of a file", browser.text, flags)
     imgui.same_line()
-    if imgui.button(browser.button, ImVec2(em(5.0), 0.0)) or entered or chosen:
+    if imgui.button(browser.button, ImVec2(ui.em(5.0), 0.0)) or entered or chosen:
         state.answer()
     imgui.same_line()
-    if imgui.button("Cancel", ImVec2(em(5.0), 0.0)):
+    if imgui.button("Cancel", ImVec2(ui.em(5.0), 0.0)):
         state.browser = None
 
 
@@ -155,7 +144,7 @@ def _files(state: WindowState, browser: Browser) -> bool:
     """Draw the list; returns whether a file was double-clicked."""
     entries, chosen = browser.entries(), False
     if not entries:
-        imgui.text_colored(FAINT, "nothing of these kinds is here")
+        imgui.text_colored(ui.FAINT, "nothing of these kinds is here")
     clipper = imgui.ListClipper()
     clipper.begin(len(entries))
     while clipper.step():
@@ -177,5 +166,5 @@ def _thumbnail_tooltip(state: WindowState, path: Path) -> None:
     key = model_key(str(path))
     if (picture := state.work.thumbnails.picture(key)) is not None and imgui.begin_tooltip():
         texture = state.texture(key, picture)
-        imgui.image(imgui.ImTextureRef(texture.glo), ImVec2(em(12.0), em(12.0) * texture.height / texture.width))
+        imgui.image(imgui.ImTextureRef(texture.glo), ImVec2(ui.em(12.0), ui.em(12.0) * texture.height / texture.width))
         imgui.end_tooltip()

@@ -21,24 +21,7 @@ from translucent.preview.actions import Assign, SetField
 from translucent.preview.document import SHOWN_UNITS, TIPS, Material, Triple, length_text, triple_of, triple_text
 from translucent.preview.library import ball_key, draw_ball
 from translucent.preview.measuring import ThicknessStatistics
-from translucent.preview.panels.widgets import (
-    FAINT,
-    WARNING,
-    Card,
-    begin_drag,
-    begin_rows,
-    combo,
-    draw_cards,
-    em,
-    fact,
-    of_hex,
-    row,
-    slider,
-    text_field,
-    tooltip,
-    triple,
-    wrapped,
-)
+from translucent.preview.panels import widgets as ui
 from translucent.preview.scenes import medium_of
 from translucent.preview.window_state import WindowState
 from translucent.units import metres_per_unit
@@ -61,68 +44,68 @@ def material_panel(state: WindowState) -> None:
     material = state.material
     _source(state, material)
     imgui.separator_text("Volume")
-    if begin_rows("volume"):
+    if ui.begin_rows("volume"):
         _color(state, material)
         imgui.end_table()
     _distance(state, material)
-    if begin_rows("thickness"):
-        slider(state, "thickness", "material.thickness", 1e-5, 10.0, "%.5f m", log=True)
+    if ui.begin_rows("thickness"):
+        ui.slider(state, "thickness", "material.thickness", 1e-5, 10.0, "%.5f m", log=True)
         imgui.end_table()
     _swatches(state, material)
     _curves(state, material)
     imgui.separator_text("Surface")
-    if begin_rows("surface"):
-        slider(state, "ior", "material.ior", 1.0, 2.5, "%.3f")
-        slider(state, "roughness", "material.roughness", 0.0, 1.0)
-        slider(state, "transmission", "material.transmission", 0.0, 1.0)
-        slider(state, "dispersion", "material.dispersion", 0.0, 10.0)
+    if ui.begin_rows("surface"):
+        ui.slider(state, "ior", "material.ior", 1.0, 2.5, "%.3f")
+        ui.slider(state, "roughness", "material.roughness", 0.0, 1.0)
+        ui.slider(state, "transmission", "material.transmission", 0.0, 1.0)
+        ui.slider(state, "dispersion", "material.dispersion", 0.0, 10.0)
         imgui.end_table()
     imgui.separator_text("Thin film and clear coat")
-    if begin_rows("film"):
-        slider(state, "iridescence", "material.iridescence", 0.0, 1.0)
-        slider(state, "film ior", "material.iridescence_ior", 1.0, 3.0, "%.3f")
-        slider(state, "film thickness", "material.iridescence_thickness", 0.0, 1e-6, "%.0f nm", unit=1e-9)
-        slider(state, "clearcoat", "material.clearcoat", 0.0, 1.0)
-        slider(state, "coat roughness", "material.clearcoat_roughness", 0.0, 1.0)
+    if ui.begin_rows("film"):
+        ui.slider(state, "iridescence", "material.iridescence", 0.0, 1.0)
+        ui.slider(state, "film ior", "material.iridescence_ior", 1.0, 3.0, "%.3f")
+        ui.slider(state, "film thickness", "material.iridescence_thickness", 0.0, 1e-6, "%.0f nm", unit=1e-9)
+        ui.slider(state, "clearcoat", "material.clearcoat", 0.0, 1.0)
+        ui.slider(state, "coat roughness", "material.clearcoat_roughness", 0.0, 1.0)
         imgui.end_table()
     imgui.separator_text("Scattering and emission")
-    triple(state, "absorption, 1/m", "material.absorption", 0.5)
-    triple(state, "scattering, 1/m", "material.scattering", 0.5)
-    triple(state, "emission, radiance per m", "material.emission", 0.05)
-    if begin_rows("scattering"):
-        slider(state, "anisotropy g", "material.anisotropy", -0.99, 0.99)
+    ui.triple(state, "absorption, 1/m", "material.absorption", 0.5)
+    ui.triple(state, "scattering, 1/m", "material.scattering", 0.5)
+    ui.triple(state, "emission, radiance per m", "material.emission", 0.05)
+    if ui.begin_rows("scattering"):
+        ui.slider(state, "anisotropy g", "material.anisotropy", -0.99, 0.99)
         imgui.end_table()
     imgui.separator_text("Numbers")
-    if begin_rows("numbers"):
+    if ui.begin_rows("numbers"):
         for label, text in extinction_lines(material):
-            fact(label, text)
+            ui.fact(label, text)
         imgui.end_table()
     for text in extinction_facts(material)["warnings"]:
-        wrapped(text, WARNING)
+        ui.wrapped(text, ui.WARNING)
     imgui.separator_text("Copy")
     _copies(state, material)
 
 
 def _source(state: WindowState, material: Material) -> None:
-    if begin_rows("source"):
+    if ui.begin_rows("source"):
         if len(state.objects) > 1:
             _object(state)
-        row("preset", "A named medium; the Library has them as pictures.")
+        ui.row("preset", "A named medium; the Library has them as pictures.")
         if imgui.begin_combo("##preset", material.preset or "none"):
             for group, members in grouped(presets()).items():
-                imgui.text_colored(FAINT, group)
+                imgui.text_colored(ui.FAINT, group)
                 for each in members:
                     if imgui.selectable(f"{each.name}  ({each.kind})", each.name == material.preset)[0]:
                         state.choose_preset(each.name)
-                    tooltip(preset_text(each))
+                    ui.tooltip(preset_text(each))
             imgui.end_combo()
         words = {"file": "the model's own", "color": "color at a distance", "preset": f"preset {material.preset}"}
-        fact("medium from", words.get(material.source, material.source))
+        ui.fact("medium from", words.get(material.source, material.source))
         imgui.end_table()
     if material.source == "preset" and (found := state.work.library.find(material.preset)) is not None:
-        wrapped(f"{found.kind}: {found.source}", FAINT)
+        ui.wrapped(f"{found.kind}: {found.source}", ui.FAINT)
         if found.warning:
-            wrapped(found.warning, WARNING)
+            ui.wrapped(found.warning, ui.WARNING)
 
 
 def _object(state: WindowState) -> None:
@@ -134,25 +117,27 @@ def _object(state: WindowState) -> None:
             return "all without their own"
         return state.name_of(number) + (" *" if document.own_material(number) is not None else "")
 
-    row("object", "Click one in the picture, or choose it here. Changes are then of its own material.")
+    ui.row("object", "Click one in the picture, or choose it here. Changes are then of its own material.")
     numbers: list[int | None] = [None, *range(len(state.objects))]
-    combo("object", name(target), ((f"{name(number)}##{number}", number) for number in numbers), target, state.select)
+    ui.combo(
+        "object", name(target), ((f"{name(number)}##{number}", number) for number in numbers), target, state.select
+    )
     if target is not None and document.own_material(target) is not None:
-        row("")
+        ui.row("")
         if imgui.button("No material of its own"):
             state.work.do(Assign(target, None))
 
 
 def _color(state: WindowState, material: Material) -> None:
-    row("attenuationColor", TIPS["material.color"])
+    ui.row("attenuationColor", TIPS["material.color"])
     flags = imgui.ColorEditFlags_.display_hex | imgui.ColorEditFlags_.picker_hue_wheel
     changed, encoded = imgui.color_edit3("##color", list(to_display(material.color)), flags)
-    begin_drag(state)
+    ui.begin_drag(state)
     if changed:
         state.change("material.color", from_display(np.asarray(list(encoded)[:3])))
-    fact("linear", triple_text(material.color))
-    row("as text", "A hex color, a CSS name, srgb(r,g,b) or linear(r,g,b); press Enter.")
-    if text := text_field(state, "colortext", to_hex(material.color)):
+    ui.fact("linear", triple_text(material.color))
+    ui.row("as text", "A hex color, a CSS name, srgb(r,g,b) or linear(r,g,b); press Enter.")
+    if text := ui.text_field(state, "colortext", to_hex(material.color)):
         try:
             color = np.asarray(parse_color(text)).tolist()
         except InputError as error:
@@ -166,32 +151,32 @@ def _distance(state: WindowState, material: Material) -> None:
     unit = state.get("display.unit")
     scale = metres_per_unit(unit)
     imgui.text("attenuationDistance")
-    tooltip(TIPS["material.distance"])
-    imgui.set_next_item_width(-em(4.2))
+    ui.tooltip(TIPS["material.distance"])
+    imgui.set_next_item_width(-ui.em(4.2))
     flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
     ends = 1e-5 / scale, 1e2 / scale
     changed, value = imgui.slider_float("##distance", material.distance / scale, *ends, "%.5g", flags)
-    begin_drag(state)
+    ui.begin_drag(state)
     if changed and value > 0:
         # Five digits are what is shown, so that what is copied is what is seen.
         state.change("material.distance", float(f"{value:.5g}") * scale)
     imgui.same_line()
     imgui.set_next_item_width(-1.0)
     units = [(word, word) for word in SHOWN_UNITS]
-    combo("unit", unit, units, unit, lambda word: state.work.do(SetField("display.unit", word)))
+    ui.combo("unit", unit, units, unit, lambda word: state.work.do(SetField("display.unit", word)))
 
 
 def _swatches(state: WindowState, material: Material) -> None:
-    imgui.text_colored(FAINT, "white light after")
+    imgui.text_colored(ui.FAINT, "white light after")
     found, unit = swatches(material), state.get("display.unit")
     width = imgui.get_content_region_avail().x
-    each = max((width - em(0.25) * (len(found) - 1)) / len(found), em(1.0))
+    each = max((width - ui.em(0.25) * (len(found) - 1)) / len(found), ui.em(1.0))
     for i, (metres, text) in enumerate(found):
         if i:
-            imgui.same_line(0.0, em(0.25))
+            imgui.same_line(0.0, ui.em(0.25))
         flags = imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop
-        imgui.color_button(f"##swatch{i}", imgui.ImVec4(*of_hex(text), 1.0), flags, imgui.ImVec2(each, em(1.6)))
-        tooltip(f"{length_text(metres, unit)}\n{text}")
+        imgui.color_button(f"##swatch{i}", imgui.ImVec4(*ui.of_hex(text), 1.0), flags, imgui.ImVec2(each, ui.em(1.6)))
+        ui.tooltip(f"{length_text(metres, unit)}\n{text}")
 
 
 def _curves(state: WindowState, material: Material) -> None:
@@ -202,7 +187,7 @@ def _curves(state: WindowState, material: Material) -> None:
     curves = medium.transmittance(distances)
     quiet = implot.AxisFlags_.no_menus | implot.AxisFlags_.no_highlight
     plain = implot.Flags_.no_menus | implot.Flags_.no_inputs | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text
-    if not implot.begin_plot("##curves", imgui.ImVec2(-1.0, em(9.0)), plain | implot.Flags_.no_legend):
+    if not implot.begin_plot("##curves", imgui.ImVec2(-1.0, ui.em(9.0)), plain | implot.Flags_.no_legend):
         return
     implot.setup_axes(f"thickness, {unit}", "transmittance", quiet, quiet)
     implot.setup_axes_limits(0.0, distances[-1] / scale, 0.0, 1.05, implot.Cond_.always)
@@ -219,7 +204,7 @@ def _curves(state: WindowState, material: Material) -> None:
     implot.end_plot()
     if seen is not None and seen.thickness.size:
         median, average = length_text(float(np.median(seen.thickness)), unit), _average_hex(seen, material)
-        wrapped(f"bars: thickness of the model, median {median}; on average it shows {average}", FAINT)
+        ui.wrapped(f"bars: thickness of the model, median {median}; on average it shows {average}", ui.FAINT)
 
 
 @lru_cache(maxsize=1)
@@ -255,28 +240,28 @@ def library_panel(state: WindowState) -> None:
     hint = "search: wine, measured, stone ..."
     _, library.search = imgui.input_text_with_hint("##search", hint, library.search)
     target = "fills the model" if state.target is None else f"assigns to {state.name_of(state.target)}"
-    wrapped(f"Click: {target}. Drag: onto an object.", FAINT)
+    ui.wrapped(f"Click: {target}. Drag: onto an object.", ui.FAINT)
     groups, chosen = library.groups(), state.material.preset
     if not groups:
-        wrapped("None has these words.", FAINT)
+        ui.wrapped("None has these words.", ui.FAINT)
 
-    def card(one: Preset) -> Card:
+    def card(one: Preset) -> ui.Card:
         key, title = ball_key(one), one.name.replace("_", " ")
         picture, lines = state.work.thumbnails.picture(key, draw_ball, one), ((title, True), (one.kind, False))
         swatch = "" if picture is not None else seen_color(one)
-        return Card(f"##{one.name}", key, picture, lines, preset_text(one), one.name == chosen, swatch, one.name)
+        return ui.Card(f"##{one.name}", key, picture, lines, preset_text(one), one.name == chosen, swatch, one.name)
 
-    if imgui.begin_child("##presets", ImVec2(0.0, -em(3.6))):
+    if imgui.begin_child("##presets", ImVec2(0.0, -ui.em(3.6))):
         for group, members in groups.items():
             imgui.separator_text(f"{group} ({len(members)})")
-            draw_cards(state, members, CARD, 1.0, card, lambda one: state.choose_preset(one.name), lines=2)
+            ui.draw_cards(state, members, CARD, 1.0, card, lambda one: state.choose_preset(one.name), lines=2)
     imgui.end_child()
     imgui.separator()
-    imgui.set_next_item_width(-em(6.2))
-    entered = text_field(state, "name", "name of this material")
+    imgui.set_next_item_width(-ui.em(6.2))
+    entered = ui.text_field(state, "name", "name of this material")
     imgui.same_line()
     pressed = imgui.button("Save preset")
-    tooltip(f"{SAVE_TIP}\n{library.folder}")
+    ui.tooltip(f"{SAVE_TIP}\n{library.folder}")
     words = state.texts["name"]
     if (entered or pressed) and words.strip() and state.save_preset(words):
         state.texts["name"] = ""

@@ -12,7 +12,7 @@ from translucent.errors import shortened
 from translucent.preview.actions import Hide
 from translucent.preview.document import Model
 from translucent.preview.library import model_key
-from translucent.preview.panels.widgets import FAINT, em, tooltip
+from translucent.preview.panels import widgets as ui
 from translucent.preview.window_state import WindowState
 from translucent.units import METRES_PER_UNIT
 
@@ -89,7 +89,7 @@ def _file(state: WindowState) -> None:
 
 def _recent(state: WindowState, path: str, unit: str) -> None:
     """Draw a recent file, with its thumbnail."""
-    size, key = ImVec2(em(4.5), em(3.0)), model_key(path)
+    size, key = ImVec2(ui.em(4.5), ui.em(3.0)), model_key(path)
     if (picture := state.work.thumbnails.picture(key)) is not None:
         imgui.image(imgui.ImTextureRef(state.texture(key, picture).glo), size)
     else:
@@ -97,7 +97,7 @@ def _recent(state: WindowState, path: str, unit: str) -> None:
     imgui.same_line()
     label = f"{Path(path).name}\n{shortened(str(Path(path).parent), 60)}##{path}"
     menu_item(label, lambda: state.work.open(Model(path, unit)))
-    tooltip(path)
+    ui.tooltip(path)
 
 
 def status(state: WindowState) -> None:
@@ -128,12 +128,12 @@ def keys_page(state: WindowState) -> None:
     if imgui.begin_popup_modal(PAGE, None, flags)[0]:
         imgui.text(PAGE)
         if imgui.begin_table("keys", 2):
-            imgui.table_setup_column("keys", imgui.TableColumnFlags_.width_fixed, em(13.0))
-            imgui.table_setup_column("what", imgui.TableColumnFlags_.width_fixed, em(26.0))
+            imgui.table_setup_column("keys", imgui.TableColumnFlags_.width_fixed, ui.em(13.0))
+            imgui.table_setup_column("what", imgui.TableColumnFlags_.width_fixed, ui.em(26.0))
             for keys, what in KEYS:
                 imgui.table_next_row()
                 imgui.table_next_column()
-                imgui.text_colored(FAINT, keys)
+                imgui.text_colored(ui.FAINT, keys)
                 imgui.table_next_column()
                 imgui.text(what)
             imgui.end_table()

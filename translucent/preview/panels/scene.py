@@ -5,17 +5,17 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from translucent.preview.actions import Assign, Hide
+from translucent.preview.panels import widgets as ui
 from translucent.preview.panels.material import seen_color, to_display
 from translucent.preview.panels.menus import menu_item
-from translucent.preview.panels.widgets import FAINT, accepts_preset, em, of_hex, tooltip, wrapped
 from translucent.preview.window_state import WindowState
 
 
 def scene_panel(state: WindowState) -> None:
-    """Draw the panel."""
+    """Draw the scene panel."""
     count = len(state.objects)
     shown = len(state.work.document.shown_among(count))
-    wrapped(f"{shown} of {count} objects are on show. Drop a preset of the Library on one.", FAINT)
+    ui.wrapped(f"{shown} of {count} objects are on show. Drop a preset of the Library on one.", ui.FAINT)
     imgui.begin_disabled(shown == count)
     if imgui.button("Show all"):
         state.work.do(Hide(()))
@@ -25,7 +25,7 @@ def scene_panel(state: WindowState) -> None:
     if imgui.button("Isolate") and state.target is not None:
         state.isolate(state.target)
     imgui.end_disabled()
-    tooltip("The selected object alone; once more: all (I).")
+    ui.tooltip("The selected object alone; once more: all (I).")
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y
     if not imgui.begin_table("objects", 3, flags):
         return
@@ -47,7 +47,7 @@ def _row(state: WindowState, number: int) -> None:
     imgui.table_next_column()
     name = state.name_of(number)
     changed, _ = imgui.checkbox("##shown", number not in state.work.document.hidden)
-    tooltip("Show or hide (H).")
+    ui.tooltip("Show or hide (H).")
     if changed:
         state.hide(number)
     imgui.table_next_column()
@@ -58,8 +58,8 @@ def _row(state: WindowState, number: int) -> None:
         state.select(number)
         if imgui.is_mouse_double_clicked(0):
             state.work.frame(number)
-    tooltip("Click: select, for the Material and Library panels. Double click: frame. Right click: more.")
-    if accepts_preset():
+    ui.tooltip("Click: select, for the Material and Library panels. Double click: frame. Right click: more.")
+    if ui.accepts_preset():
         state.choose_preset(state.dragged, number if len(state.objects) > 1 else None)
     own = state.work.document.own_material(number) is not None
     if imgui.begin_popup_context_item("more"):
@@ -84,14 +84,14 @@ def _more(state: WindowState, number: int, own: bool) -> None:
 def _material(state: WindowState, number: int, own: bool) -> None:
     """Draw the color and name of an object's material; faint, if it is that of the model."""
     if state.objects[number].medium is None and not own and state.work.document.material.source == "file":
-        return imgui.text_colored(FAINT, "opaque")
+        return imgui.text_colored(ui.FAINT, "opaque")
     material = state.material_of(number)
     preset = state.work.library.find(material.preset)
-    color = to_display(material.color) if preset is None else of_hex(seen_color(preset))
+    color = to_display(material.color) if preset is None else ui.of_hex(seen_color(preset))
     flags = imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop | imgui.ColorEditFlags_.no_inputs
-    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + (imgui.get_frame_height() - em(1.0)) / 2)
-    imgui.color_button("##color", imgui.ImVec4(*color, 1.0), flags, ImVec2(em(1.0), em(1.0)))
+    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + (imgui.get_frame_height() - ui.em(1.0)) / 2)
+    imgui.color_button("##color", imgui.ImVec4(*color, 1.0), flags, ImVec2(ui.em(1.0), ui.em(1.0)))
     imgui.same_line()
     source = "the model's" if material.source == "file" else material.source
     text = material.preset.replace("_", " ") or source
-    return imgui.text(text) if own else imgui.text_colored(FAINT, text)
+    return imgui.text(text) if own else imgui.text_colored(ui.FAINT, text)

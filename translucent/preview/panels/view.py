@@ -14,21 +14,7 @@ from translucent.preview.actions import SetField, SetOrbit
 from translucent.preview.document import AUTO, METHOD_NAMES, STAGE_WORDS, TIPS, Compare, Mode, length_text
 from translucent.preview.library import BUILT_IN, draw_panorama, panorama_key, title
 from translucent.preview.measuring import MOST_TRIANGLES, measurable
-from translucent.preview.panels.widgets import (
-    ERROR,
-    FAINT,
-    WARNING,
-    Card,
-    begin_rows,
-    check,
-    choice,
-    draw_cards,
-    fact,
-    row,
-    slider,
-    text_field,
-    wrapped,
-)
+from translucent.preview.panels import widgets as ui
 from translucent.preview.quality import StepTiming
 from translucent.preview.window_state import WindowState
 
@@ -39,16 +25,16 @@ CARD = 8.0
 CLOSE_HOLES = "Close the holes, or declare the model a sheet (thin-layer). translucent explain tells which edges."
 
 #: Colors of messages.
-COLORS = {"info": FAINT, "warning": WARNING, "error": ERROR}
+COLORS = {"info": ui.FAINT, "warning": ui.WARNING, "error": ui.ERROR}
 
 
 def look_panel(state: WindowState) -> None:
     """Draw the look panel: camera, stage, environment, light and exposure."""
     imgui.separator_text("Camera")
     orbit = state.work.document.orbit
-    if orbit is not None and begin_rows("camera"):
-        slider(state, "field of view", "orbit.fov_y", 5.0, 120.0, "%.0f deg")
-        check(state, "orthographic", "orbit.orthographic")
+    if orbit is not None and ui.begin_rows("camera"):
+        ui.slider(state, "field of view", "orbit.fov_y", 5.0, 120.0, "%.0f deg")
+        ui.check(state, "orthographic", "orbit.orthographic")
         imgui.end_table()
     if imgui.button("Frame (F)"):
         state.work.frame()
@@ -56,30 +42,30 @@ def look_panel(state: WindowState) -> None:
     if imgui.button("Reset") and orbit is not None:
         state.work.do(SetOrbit(None))
     imgui.separator_text("Stage and environment")
-    if begin_rows("environment"):
-        choice(state, "stage", "look.stage", STAGE_WORDS)
+    if ui.begin_rows("environment"):
+        ui.choice(state, "stage", "look.stage", STAGE_WORDS)
         _environment(state, "lights with", "environment", "the stage's, or the model's own")
         _environment(state, "background", "background", "the same")
-        slider(state, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg")
+        ui.slider(state, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg")
         imgui.end_table()
     imgui.separator_text("Light")
-    if begin_rows("light"):
-        check(state, "directional light", "look.light")
+    if ui.begin_rows("light"):
+        ui.check(state, "directional light", "look.light")
         if state.get("look.light"):
-            slider(state, "from around", "look.light_yaw", -180.0, 180.0, "%.0f deg")
-            slider(state, "from above", "look.light_pitch", -89.0, 89.0, "%.0f deg")
-            slider(state, "irradiance", "look.light_irradiance", 0.0, 50.0, "%.2f W/m2")
+            ui.slider(state, "from around", "look.light_yaw", -180.0, 180.0, "%.0f deg")
+            ui.slider(state, "from above", "look.light_pitch", -89.0, 89.0, "%.0f deg")
+            ui.slider(state, "irradiance", "look.light_irradiance", 0.0, 50.0, "%.2f W/m2")
         imgui.end_table()
     imgui.separator_text("Picture")
-    if begin_rows("picture"):
-        slider(state, "exposure", "look.exposure", -6.0, 6.0, "%.2f stops")
-        choice(state, "tone curve", "look.tone", (AUTO, *TONES))
+    if ui.begin_rows("picture"):
+        ui.slider(state, "exposure", "look.exposure", -6.0, 6.0, "%.2f stops")
+        ui.choice(state, "tone curve", "look.tone", (AUTO, *TONES))
         imgui.end_table()
 
 
 def _environment(state: WindowState, label: str, name: str, empty: str) -> None:
     field = f"look.{name}"
-    row(label, TIPS[field])
+    ui.row(label, TIPS[field])
     now = state.get(field)
     if imgui.begin_combo(f"##{field}", now or empty):
         for word in BUILT_IN:
@@ -92,54 +78,53 @@ def _environment(state: WindowState, label: str, name: str, empty: str) -> None:
 
 def environments_panel(state: WindowState) -> None:
     """Draw the environments panel: thumbnails of all that can light the model, with rotation and exposure."""
-    if begin_rows("light"):
-        slider(state, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg")
-        slider(state, "exposure", "look.exposure", -6.0, 6.0, "%.2f stops")
+    if ui.begin_rows("light"):
+        ui.slider(state, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg")
+        ui.slider(state, "exposure", "look.exposure", -6.0, 6.0, "%.2f stops")
         imgui.end_table()
     folder = state.environments
     if imgui.button("Open ..."):
         state.ask_file("environment")
     imgui.same_line()
     imgui.set_next_item_width(-1.0)
-    if (text := text_field(state, "folder", "folder with .hdr and .exr", folder.path)) is not None:
+    if (text := ui.text_field(state, "folder", "folder with .hdr and .exr", folder.path)) is not None:
         folder.take(text)
     files = folder.files()
     if folder.problem:
-        wrapped(folder.problem, WARNING)
+        ui.wrapped(folder.problem, ui.WARNING)
 
-    def card(name: str) -> Card:
+    def card(name: str) -> ui.Card:
         chosen = state.get("look.environment") == name
         key = panorama_key(name) if name else ""
         picture = state.work.thumbnails.picture(key, draw_panorama, name) if name else None
         tip = name or "The stage's, or the model's own."
-        return Card(f"##card{name}", key, picture, ((title(name), chosen),), tip, chosen)
+        return ui.Card(f"##card{name}", key, picture, ((title(name), chosen),), tip, chosen)
 
     if imgui.begin_child("##environments"):
-        groups = {"built in": list(BUILT_IN), f"in the folder ({len(files)})": files}
-        for group, names in groups.items():
+        for group, names in (("built in", list(BUILT_IN)), (f"in the folder ({len(files)})", files)):
             if names:
                 imgui.separator_text(group)
                 choose = partial(state.change, "look.environment", step=True)
-                draw_cards(state, names, CARD, 0.5, card, choose)
+                ui.draw_cards(state, names, CARD, 0.5, card, choose)
     imgui.end_child()
 
 
 def method_panel(state: WindowState) -> None:
     """Draw the method panel: the plan and its reasons, times, errors, and the comparison."""
     display = state.work.document.display
-    if begin_rows("method"):
-        choice(state, "method", "display.method", METHOD_NAMES)
-        choice(state, "scattering", "display.scattering", (AUTO, *SCATTERINGS))
-        choice(state, "show", "display.mode", get_args(Mode))
-        choice(state, "right of split", "display.compare", get_args(Compare))
+    if ui.begin_rows("method"):
+        ui.choice(state, "method", "display.method", METHOD_NAMES)
+        ui.choice(state, "scattering", "display.scattering", (AUTO, *SCATTERINGS))
+        ui.choice(state, "show", "display.mode", get_args(Mode))
+        ui.choice(state, "right of split", "display.compare", get_args(Compare))
         if display.compare == "method":
-            choice(state, "method there", "display.method_b", METHOD_NAMES)
+            ui.choice(state, "method there", "display.method_b", METHOD_NAMES)
         if display.compare != "off":
-            slider(state, "split", "display.split", 0.0, 1.0, "%.2f")
-        check(state, "reference inset", "display.inset")
-        check(state, "smooth edges", "display.antialias")
-        check(state, "caustics (P)", "display.caustics")
-        check(state, "converge (C)", "display.converge")
+            ui.slider(state, "split", "display.split", 0.0, 1.0, "%.2f")
+        ui.check(state, "reference inset", "display.inset")
+        ui.check(state, "smooth edges", "display.antialias")
+        ui.check(state, "caustics (P)", "display.caustics")
+        ui.check(state, "converge (C)", "display.converge")
         imgui.end_table()
     for side, (plan, timing) in enumerate(zip(state.view.plans, state.view.timings, strict=True)):
         if plan is not None:
@@ -152,19 +137,19 @@ def method_panel(state: WindowState) -> None:
 
 
 def _plan(plan: RenderPlan, timing: StepTiming) -> None:
-    if begin_rows("plan"):
+    if ui.begin_rows("plan"):
         exact = "exact" if plan.exact else "not exact everywhere"
-        fact("runs", f"{type(plan.method).__name__}: {exact}", None if plan.exact else WARNING)
+        ui.fact("runs", f"{type(plan.method).__name__}: {exact}", None if plan.exact else ui.WARNING)
         part = "" if timing.share == 1.0 else f", for 1/{1 / timing.share:.3g} of the pixels"
         passes = timing.passes or {}
-        fact("time", f"{1e3 * timing.wall:.1f} ms, GPU {1e3 * sum(passes.values()):.1f} ms{part}")
+        ui.fact("time", f"{1e3 * timing.wall:.1f} ms, GPU {1e3 * sum(passes.values()):.1f} ms{part}")
         for step in plan.passes:
             spent = passes.get(step.name)
-            fact(step.name, f"{step.reason}" + (f" ({1e3 * spent:.1f} ms)" if spent is not None else ""))
+            ui.fact(step.name, f"{step.reason}" + (f" ({1e3 * spent:.1f} ms)" if spent is not None else ""))
         imgui.end_table()
     for kind, texts in (("limit", plan.limits), ("not modelled", plan.unmodelled), ("remark", plan.remarks)):
         for text in texts:
-            wrapped(f"{kind}: {text}", WARNING)
+            ui.wrapped(f"{kind}: {text}", ui.WARNING)
 
 
 def _errors(state: WindowState) -> None:
@@ -172,20 +157,20 @@ def _errors(state: WindowState) -> None:
     scene, display = state.work.scene(), state.work.document.display
     if scene is not None and not (display.inset or measurable(scene)):
         many = f"{MOST_TRIANGLES:,} triangles and more take much memory"
-        wrapped(f"not measured, unless its inset is shown: {many}", FAINT)
+        ui.wrapped(f"not measured, unless its inset is shown: {many}", ui.FAINT)
     elif measured is None or measured.scene is not scene:
-        wrapped("measured as soon as the view is still", FAINT)
+        ui.wrapped("measured as soon as the view is still", ui.FAINT)
     if measured is None:
         return
     if measured.doubt:
-        wrapped(measured.doubt, WARNING)
-    if measured.errors and begin_rows("errors"):
+        ui.wrapped(measured.doubt, ui.WARNING)
+    if measured.errors and ui.begin_rows("errors"):
         thickness, transmittance = measured.errors
-        fact("median", f"{length_text(thickness.median, unit)} of thickness")
-        fact("99 %", f"below {length_text(thickness.p99, unit)}")
-        fact("largest", length_text(thickness.max, unit))
-        fact("transmittance", f"median {transmittance.median:.2g}, largest {transmittance.max:.2g}")
-        fact("coverage", f"differs on {thickness.coverage_mismatch:.2%} of {thickness.pixels} pixels")
+        ui.fact("median", f"{length_text(thickness.median, unit)} of thickness")
+        ui.fact("99 %", f"below {length_text(thickness.p99, unit)}")
+        ui.fact("largest", length_text(thickness.max, unit))
+        ui.fact("transmittance", f"median {transmittance.median:.2g}, largest {transmittance.max:.2g}")
+        ui.fact("coverage", f"differs on {thickness.coverage_mismatch:.2%} of {thickness.pixels} pixels")
         imgui.end_table()
 
 
@@ -194,25 +179,25 @@ def _validity(state: WindowState) -> None:
     if measured is not None:
         invalid = measured.seen.invalid
         text = f"{invalid} of {measured.truth.shape[0] * measured.truth.shape[1]} measured pixels are not valid"
-        wrapped(text, ERROR if invalid else FAINT)
+        ui.wrapped(text, ui.ERROR if invalid else ui.FAINT)
     if loaded is None:
         return
     for item in loaded.scene.objects:
         found = item.mesh.diagnosis
         if not found.solid:
-            wrapped(f"{item.mesh.name}: {found}", WARNING)
-            wrapped(CLOSE_HOLES, FAINT)
+            ui.wrapped(f"{item.mesh.name}: {found}", ui.WARNING)
+            ui.wrapped(CLOSE_HOLES, ui.FAINT)
         for repair in item.mesh.repairs:
-            wrapped(f"{item.mesh.name}: {repair}", FAINT)
+            ui.wrapped(f"{item.mesh.name}: {repair}", ui.FAINT)
     for line in getattr(loaded.scene, "left_out", ()):
-        wrapped(f"left out: {line}", WARNING)
+        ui.wrapped(f"left out: {line}", ui.WARNING)
 
 
 def messages_panel(state: WindowState) -> None:
     """Draw the messages panel, the latest first."""
     for text in filter(None, (state.view.problem, state.view.shader_problem)):
-        wrapped(text, ERROR)
+        ui.wrapped(text, ui.ERROR)
     if not state.work.messages:
-        imgui.text_colored(FAINT, "Drop a model here: .glb .gltf .obj .stl .ply")
+        imgui.text_colored(ui.FAINT, "Drop a model here: .glb .gltf .obj .stl .ply")
     for message in reversed(state.work.messages):
-        wrapped(message.text, COLORS[message.kind])
+        ui.wrapped(message.text, COLORS[message.kind])
