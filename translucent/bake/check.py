@@ -148,7 +148,9 @@ def check_map(
     true = renderer.render(scene, size, plan(scene, None, renderer.capabilities), 1)
     renderer.close()
     directions = scene.camera.rays(size)[1]
-    background = scene.environment.radiance(directions, _backdrop(size))
+    # Positions of pixel centers in the picture, in units of its height.
+    across, down = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
+    background = scene.environment.radiance(directions, np.stack([across, down], axis=-1) / size[1])
     inside = scene.bodies[0].medium
     assert inside is not None  # a showcase has one
     seen = true.coverage & true.valid
@@ -242,12 +244,6 @@ def _first_faces(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[Int
     ahead = np.maximum(-np.einsum("ki,ki->k", starts, directions) - 1.01, 0.0)
     face, distance = traced.first_hits(starts + ahead[:, None] * directions, directions)
     return face, np.where(face >= 0, traced.radius * (ahead + distance), np.inf)
-
-
-def _backdrop(size: tuple[int, int]) -> Array:
-    """(h, w, 2): positions of pixel centers in the picture, in units of its height."""
-    across, down = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
-    return np.stack([across, down], axis=-1) / size[1]
 
 
 #: Corners: positions (n, 3) in metres and texture coordinates (n, 2), v upwards, or none.

@@ -265,14 +265,19 @@ def find_targets(
         if only is None or key in only
     }
     # All that is read of the file as it is, before anything is added to it.
-    chosen = {key: bodies.around(key) for key, material in lit.items() if not _is_sheet(material, key, bodies)}
+    # An open mesh that its material makes a thin wall has no inside.
+    walls = {key for key, material in lit.items() if material is not None and material.kind == "thin wall"}
+    chosen = {key: bodies.around(key) for key in lit if key not in walls or bodies.is_closed(key)}
     found: list[Target] = []
     for key, around in chosen.items():
         material, medium = lit[key], _medium(lit[key], metres)
         if not needs_uv:
             found.append(Target(key, read_primitive(file, key, metres), medium=medium))
             continue
-        tex_coord, keeps = None if new_uv else _tex_coord(builder.primitive(*key), material), False
+        # That of the thickness texture, if the primitive has it.
+        wanted = material.thickness_transform.tex_coord if material and material.has_thickness_texture else 0
+        sets = [n for n in (wanted, 0) if f"TEXCOORD_{n}" in builder.primitive(*key)["attributes"] and not new_uv]
+        tex_coord, keeps = next(iter(sets), None), False
         if made := tex_coord is None:
             tex_coord = add_uv(builder, key, size)
         mesh = read_primitive(builder.file() if made else file, key, metres, tex_coord)
@@ -314,11 +319,6 @@ def _names(file: GltfFile, keys: list[PrimitiveKey]) -> list[str]:
     return [primitive_name(file, key) for key in keys]
 
 
-def _is_sheet(material: GltfMaterial | None, key: PrimitiveKey, bodies: Bodies) -> bool:
-    """True if a primitive is an open mesh that its material makes a thin wall."""
-    return material is not None and material.kind == "thin wall" and not bodies.is_closed(key)
-
-
 def _keys(file: GltfFile, materials: list[GltfMaterial]) -> list[PrimitiveKey]:
     """Triangle primitives of meshes that nodes use: those with a translucent material, or all."""
     everything = {key: primitive.get("material") for key, primitive in triangle_primitives(file).items()}
@@ -326,12 +326,6 @@ def _keys(file: GltfFile, materials: list[GltfMaterial]) -> list[PrimitiveKey]:
         raise file.refused("no node has triangles", "give a file with a mesh")
     lit = [key for key, index in everything.items() if index is not None and materials[index].transmits]
     return lit or list(everything)
-
-
-def _tex_coord(primitive: Json, material: GltfMaterial | None) -> int | None:
-    """Set of UVs for the thickness texture, if the primitive has one."""
-    wanted = material.thickness_transform.tex_coord if material and material.has_thickness_texture else 0
-    return next((n for n in (wanted, 0) if f"TEXCOORD_{n}" in primitive["attributes"]), None)
 
 
 def _transformed(mesh: Mesh, material: GltfMaterial | None, tex_coord: int) -> tuple[Mesh, bool]:

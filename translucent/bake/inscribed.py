@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Floats, Integers, Mask
+from translucent.arrays import Array, Floats, Integers
 from translucent.bake.rays import SPHERE_CONE
 from translucent.bake.surface import Points, Surface
 from translucent.geometry.bvh import curve_order
@@ -117,7 +117,9 @@ class InscribedSpheres:
         kept = np.flatnonzero(touching < radius[pair])
         pair, face, point, inward = pair[kept], face[kept], point[kept], inward[kept]
         found = touching[kept]
-        outside = np.flatnonzero(~_inside(self._sides.take(face, axis=0), point + touch[kept]))
+        sides, touched = self._sides.take(face, axis=0), point + touch[kept]
+        a, b, c = (_dot(sides[:, i], touched) > sides[:, i, 3] for i in range(3))
+        outside = np.flatnonzero(~(a & b & c))
         corners = self._corners.take(face[outside], axis=0) - point[outside, None]
         found[outside] = _smallest(corners, inward[outside])
         np.minimum.at(radius, pair, found)
@@ -256,12 +258,6 @@ def _smallest(corners: Array, inward: Array) -> Array:
     for i in range(3):
         np.minimum(least, _on_edge(corners[:, i], corners[:, (i + 1) % 3] - corners[:, i], inward), out=least)
     return least
-
-
-def _inside(sides: Array, point: Array) -> Mask:
-    """(n,): whether points of the planes of triangles are inside them."""
-    a, b, c = (_dot(sides[:, i], point) > sides[:, i, 3] for i in range(3))
-    return a & b & c
 
 
 def _sides(corners: Array, normals: Array) -> Array:

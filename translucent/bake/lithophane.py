@@ -138,8 +138,8 @@ def lithophane(
     """
     least, largest = thickness
     if not (0 < least < largest < np.inf and 0 < pitch <= width / 2 < np.inf):
-        least_text, largest_text, wide_text, every = map(_in_millimetres, (least, largest, width, pitch))
-        found = f"{least_text} to {largest_text} thick, {wide_text} wide, points every {every}"
+        thin, thick, wide_text, every = (f"{1e3 * metres:.6g} mm" for metres in (least, largest, width, pitch))
+        found = f"{thin} to {thick} thick, {wide_text} wide, points every {every}"
         raise InputError("lithophane", found, "give a least thickness, a larger one, and a width of several points")
     linear = read_picture(picture).linear if isinstance(picture, str | Path) else np.asarray(picture, dtype=np.float64)
     if linear.ndim != 3 or linear.shape[2] != 3 or not (linear.size and np.isfinite(linear).all()):
@@ -160,10 +160,6 @@ def lithophane(
     shown = _shown(mesh, medium, (columns - 1, rows - 1)) / passed[0]
     rms = float(np.sqrt(((luminance(shown) - between) ** 2).mean()))
     return Lithophane(mesh, depth, between, shown, contrast, rms)
-
-
-def _in_millimetres(metres: float) -> str:
-    return f"{1e3 * metres:.6g} mm"
 
 
 def _passed(medium: Medium, least: float, largest: float) -> tuple[Array, Array]:

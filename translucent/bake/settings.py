@@ -128,21 +128,12 @@ class BakeSettings:
                 raise InputError(f"{name} {value!r}", "not positive and finite", "give metres above 0, or leave it out")
         if self.tile is not None and not (_is_whole(self.tile) and 1001 <= self.tile <= 9999):
             raise InputError(f"tile {self.tile!r}", "not a UDIM tile", "give 1001 to 9999, or leave it out")
-        self._check_medium()
-
-    def _check_medium(self) -> None:
-        if self.mode != "transmittance":
-            return
-        if self.medium is None:
-            raise InputError(
-                "mode 'transmittance'",
-                "no medium",
-                "give one, for example tl.Medium.from_color('#7b1e3a', 0.01), or --color '#7b1e3a' --distance 1cm",
-            )
-        if not (self.medium.extinction > 0).any():
-            raise InputError(
-                "mode 'transmittance'", "a medium that takes no light away", "give one with absorption or scattering"
-            )
+        if self.mode == "transmittance" and self.medium is None:
+            do = "give one, for example tl.Medium.from_color('#7b1e3a', 0.01), or --color '#7b1e3a' --distance 1cm"
+            raise InputError("mode 'transmittance'", "no medium", do)
+        if self.mode == "transmittance" and self.medium is not None and not (self.medium.extinction > 0).any():
+            found = "a medium that takes no light away"
+            raise InputError("mode 'transmittance'", found, "give one with absorption or scattering")
 
     @property
     def unit(self) -> str:

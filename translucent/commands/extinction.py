@@ -127,6 +127,7 @@ def extinction(
     With --fit PHOTO, the medium of plates photographed before a light, with error bars; --ior says what their faces
     reflect: translucent extinction --fit steps.jpg --white 10,10,60,60 --patch 90,10,400,60=1mm,2mm,4mm,8mm
     """
+    from translucent.frames.appearance import appearance_of
     from translucent.media.colors import QUOTE_HINT
     from translucent.units import metres_per_unit
 
@@ -150,7 +151,7 @@ def extinction(
     told, medium = _converted(medium, color, distance if given.td is None else given.td, frame, given)
     stated = told["distance"]
     if frame is not None:
-        told["on"] = _appearance(frame, medium, given)
+        told["on"] = {"model": given.model, **appearance_of(frame, medium).summary()}
         told["warnings"] += [
             f"the average {name} is made by the edges: {share:.0%} of it comes from the thinnest 5 % of the pixels"
             for name, share in zip(("red", "green", "blue"), told["on"]["thin_share"], strict=True)
@@ -227,13 +228,6 @@ def _frame(model: str, given: ExtinctionOptions) -> Frame:
     scene = read_scene(model, SceneRequest(medium=filling, camera=camera, file=file, size=SIZE))
     with tl.Renderer() as renderer:
         return renderer.render(scene, SIZE)
-
-
-def _appearance(frame: Frame, medium: Medium, given: ExtinctionOptions) -> dict[str, Any]:
-    """Appearance of a medium on a model as values that JSON can hold."""
-    from translucent.frames.appearance import appearance_of
-
-    return {"model": given.model, **appearance_of(frame, medium).summary()}
 
 
 def _converted(

@@ -87,7 +87,7 @@ def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
             # The error by which the script fails is the last line, as that of any verb.
             if failure is None or message.text != problem(failure):
                 echo(f"{message.kind}: {message.text}", err=True)
-    error = None if failure is None else _script_error(failure)
+    error = failure if failure is None or isinstance(failure, TranslucentError) else RenderError(problem(failure))
     if error is not None and not work.ended:
         echo(f"error: {message_of(str(error))}", err=True)
     leave(work, 0 if error is None else 2 if isinstance(error, InputError) else 1)
@@ -107,10 +107,3 @@ def require_display() -> None:
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise RenderError("preview", "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)", without)
     require_package("imgui_bundle", "preview", without)
-
-
-def _script_error(failure: Exception) -> TranslucentError:
-    """Error of a script: that of its first failed action, or a defect."""
-    from translucent.preview.tasks import problem
-
-    return failure if isinstance(failure, TranslucentError) else RenderError(problem(failure))

@@ -68,7 +68,6 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.gltf.fields import JsonFields, Triple
@@ -77,6 +76,28 @@ from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform, textu
 from translucent.media.albedo import hulst_albedo, hulst_color
 from translucent.media.conversion import html_strip
 from translucent.media.medium import BLACKEST, Medium, extinction_at
+
+TRANSMISSION = "KHR_materials_transmission"
+VOLUME = "KHR_materials_volume"
+IOR = "KHR_materials_ior"
+EMISSIVE_STRENGTH = "KHR_materials_emissive_strength"
+DISPERSION = "KHR_materials_dispersion"
+IRIDESCENCE = "KHR_materials_iridescence"
+CLEARCOAT = "KHR_materials_clearcoat"
+#: Extensions that must not be used with a volume.
+EXCLUDED = ("KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness")
+
+#: Default index of refraction.
+DEFAULT_IOR = 1.5
+
+_VOLUME_KEYS = {
+    "thicknessFactor", "thicknessTexture", "attenuationDistance", "attenuationColor", "extensions", "extras",
+}  # fmt: skip
+_SUMMARIZED = (
+    "index", "name", "transmission", "ior", "thickness", "thickness_texture", "thickness_transform",
+    "attenuation_color", "attenuation_distance", "dispersion", "emissive", "iridescence", "iridescence_ior",
+    "iridescence_thickness", "clearcoat", "clearcoat_roughness",
+)  # fmt: skip
 
 SCATTER = "KHR_materials_scatter"
 VOLUME_SCATTER = "KHR_materials_volume_scatter"
@@ -171,29 +192,6 @@ def _spelling(fields: JsonFields, names: Sequence[str]) -> str:
     return next((name for name in names if name in fields.values), names[0])
 
 
-TRANSMISSION = "KHR_materials_transmission"
-VOLUME = "KHR_materials_volume"
-IOR = "KHR_materials_ior"
-EMISSIVE_STRENGTH = "KHR_materials_emissive_strength"
-DISPERSION = "KHR_materials_dispersion"
-IRIDESCENCE = "KHR_materials_iridescence"
-CLEARCOAT = "KHR_materials_clearcoat"
-#: Extensions that must not be used with a volume.
-EXCLUDED = ("KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness")
-
-#: Default index of refraction.
-DEFAULT_IOR = 1.5
-
-_VOLUME_KEYS = {
-    "thicknessFactor",
-    "thicknessTexture",
-    "attenuationDistance",
-    "attenuationColor",
-    "extensions",
-    "extras",
-}
-
-
 @dataclass(frozen=True)
 class GltfMaterial:
     """Volume of a glTF material; lengths and ranges are those of the module's table.
@@ -271,31 +269,19 @@ class GltfMaterial:
 
     def summary(self) -> dict[str, Any]:
         """Fields and medium as values that JSON can hold; None stands for an infinite distance."""
-        medium = self.medium()
+        medium, textured = self.medium(), self.has_thickness_texture
         return {
-            "index": self.index,
-            "name": self.name,
-            "transmission": self.transmission,
-            "ior": self.ior,
-            "thickness": self.thickness,
-            "thickness_texture": self.thickness_texture,
-            "thickness_transform": vars(self.thickness_transform) if self.has_thickness_texture else None,
+            **{name: getattr(self, name) for name in _SUMMARIZED},
+            "thickness_transform": vars(self.thickness_transform) if textured else None,
             "attenuation_color": list(self.attenuation_color),
             "attenuation_distance": self.attenuation_distance if math.isfinite(self.attenuation_distance) else None,
-            "dispersion": self.dispersion,
             "emissive": list(self.emissive),
-            "iridescence": self.iridescence,
-            "iridescence_ior": self.iridescence_ior,
-            "iridescence_thickness": self.iridescence_thickness,
-            "clearcoat": self.clearcoat,
-            "clearcoat_roughness": self.clearcoat_roughness,
             "extinction": None if medium is None else medium.extinction.tolist(),
             "scattering": None if medium is None else np.asarray(medium.scattering).tolist(),
             "warnings": list(self.warnings),
         }
 
 
-@checked
 def read_materials(path: str | Path, *, draft_extensions: bool = False) -> list[GltfMaterial]:
     """Read all materials of a .gltf or .glb file, in its order, without the files that it links to.
 

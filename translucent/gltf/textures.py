@@ -163,7 +163,9 @@ class Textures:
         if (picture := self._picture(entry["source"], name)) is None:
             return None
         if made not in self._made:
-            pixels = _diluted(_scaled_normals(_linear(picture, srgb=srgb), normal_scale), strength)
+            pixels = _scaled_normals(_linear(picture, srgb=srgb), normal_scale)
+            if strength != 1.0:  # mixed with white
+                pixels = (1.0 + strength * (pixels - 1.0)).astype(np.float32)
             self._made[made] = _texture(pixels, wraps, transform)
         return self._made[made]
 
@@ -235,11 +237,6 @@ def _scaled_normals(pixels: Pixels, scale: float) -> Pixels:
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
     unit = normals / np.where(length > 0, length, 1.0)
     return np.concatenate([0.5 + 0.5 * unit, pixels[..., 3:]], axis=-1).clip(0.0, 1.0).astype(np.float32)
-
-
-def _diluted(pixels: Pixels, strength: float) -> Pixels:
-    """Mix a picture with white."""
-    return pixels if strength == 1.0 else (1.0 + strength * (pixels - 1.0)).astype(np.float32)
 
 
 def _texture(pixels: Pixels, wraps: tuple[str, ...], transform: TextureTransform) -> Texture:

@@ -9,6 +9,7 @@ refraction.
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,7 +101,8 @@ class Body:
     @property
     def typical(self) -> tuple[float, float, float]:
         """Medians of the true thickness: along normals, around them, and along views; NaN without any exit."""
-        beneath, around, chords = (_median(values) for values in (self.beneath, self.around, self.chords))
+        finite = [values[np.isfinite(values)] for values in (self.beneath, self.around, self.chords)]
+        beneath, around, chords = (float(np.median(values)) if values.size else math.nan for values in finite)
         return beneath, around, chords
 
     def world_views(self) -> Array:
@@ -243,8 +245,3 @@ def _enter_first(surface: Surface, points: Points, views: Array) -> Any:
     face, _ = surface.embree.first_hits(origins, -views.reshape(-1, 3))
     towards = np.einsum("rki,ki->rk", views, surface.planes[points.face, :3]) < 0
     return (face < 0).reshape(views.shape[:2]) & towards
-
-
-def _median(values: Array) -> float:
-    finite = values[np.isfinite(values)]
-    return float(np.median(finite)) if finite.size else float("nan")
