@@ -1,29 +1,28 @@
 """Damaged files for every reader: ``python tools/fuzz_readers.py RUNS SEED [--seeds FOLDER] [--reader NAME]``.
 
 Each run damages a good file, at random and by the seed, and reads it. It may be read, or refused by an `InputError` of
-one printable line. Everything else is a fault: another exception, a warning that is not the toolkit's, more than 20
-seconds, or more than 1 GB. Faults are printed, and their files kept in a folder that is named at the end; the exit
-status is 1 then. With --seeds, files of that folder are damaged as well, which are as large as they are.
+one printable line. Everything else is a fault: another exception, a warning that is not the toolkit's, a word of a
+library, more than 20 seconds of processor time, or more than 1 GB. Each run is a process of its own, whose time and
+largest resident memory the system tells, and which may crash. Faults are printed, and their files kept in a folder
+that is named at the end; the exit status is 1 then. With --seeds, files of that folder are damaged as well, which are
+as large as they are.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import random
 import resource
 import signal
 import sys
 import tempfile
-import time
 import traceback
 import warnings
-from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, NoReturn
 
 from fuzz_seeds import Reader, packed_glb, readers
 
@@ -153,52 +152,18 @@ def damaged(name: str, data: bytes, chance: random.Random) -> bytes:
     return damaged_bytes(data, chance)
 
 
-class TooLongError(BaseException):
-    """A reader took too long."""
+class Run(NamedTuple):
+    """One run: ``"read"``, ``"refused"`` or what went wrong; processor time in seconds and largest memory in bytes."""
 
-
-@contextmanager
-def limits() -> Iterator[None]:
-    """No more than so much memory beyond what the process has, nor than so many seconds."""
-
-    def too_long(*_: object) -> None:
-        raise TooLongError(f"more than {SECONDS} s")
-
-    before, limit = signal.signal(signal.SIGALRM, too_long), resource.getrlimit(resource.RLIMIT_AS)
-    mapped = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (mapped + MEMORY, limit[1]))
-    signal.setitimer(signal.ITIMER_REAL, SECONDS)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
-        resource.setrlimit(resource.RLIMIT_AS, limit)
-
-
-@dataclass
-class Tally:
-    """Counts of what the runs were."""
-
-    runs: int = 0
-    read: int = 0
-    refused: int = 0
-    faults: list[str] = field(default_factory=list)
-    per_reader: Counter[str] = field(default_factory=Counter)
-    slowest: tuple[float, str] = (0.0, "")
-
-    def __str__(self) -> str:
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-        return (
-            f"{self.runs} runs: {self.read} read, {self.refused} refused, {len(self.faults)} faults; "
-            f"the slowest took {self.slowest[0]:.2f} s ({self.slowest[1]}); the process had at most {peak:.2f} GB"
-        )
+    found: str
+    seconds: float
+    memory: int
 
 
 def attempt(reader: Reader, path: Path) -> str:
     """``"read"``, ``"refused"``, or what went wrong."""
     try:
-        with limits(), warnings.catch_warnings():
+        with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.simplefilter("ignore", tl.TranslucentWarning)
             reader.read(path)
@@ -209,22 +174,88 @@ def attempt(reader: Reader, path: Path) -> str:
         if len(text) > LONGEST or not text.isprintable():
             return f"its message is {len(text)} characters long, or not printable: {text[:500]!r}"
         return "refused"
-    except (Exception, TooLongError):  # noqa: BLE001
+    except Exception:  # noqa: BLE001
         return traceback.format_exc()
     return "read"
+
+
+def run_alone(reader: Reader, path: Path) -> Run:
+    """Read a file in a process of its own, within the limits."""
+    with tempfile.TemporaryFile() as told, tempfile.TemporaryFile() as printed:
+        before = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of threads, none of which reads
+            child = os.fork()
+        if child == 0:
+            _read_and_exit(reader, path, told.fileno(), printed.fileno())
+        _, status, used = os.wait4(child, 0)
+        told.seek(0)
+        printed.seek(0)
+        found, words = told.read().decode("utf-8", "replace"), printed.read(300)
+    code = os.waitstatus_to_exitcode(status)
+    seconds, memory = used.ru_utime + used.ru_stime, 1024 * used.ru_maxrss
+    if seconds > SECONDS:
+        found = f"it took {seconds:.1f} s of processor time"
+    elif code < 0:
+        found = f"it was ended by signal {-code}"
+    elif memory > MEMORY + (before if before > MEMORY / 2 else 0):  # in a test, what other tests have left
+        found = f"it had {memory / 1e9:.2f} GB"
+    elif words and found in ("read", "refused"):
+        found = f"it printed {words!r}"
+    return Run(found, seconds, memory)
+
+
+def _read_and_exit(reader: Reader, path: Path, told: int, printed: int) -> NoReturn:
+    """Read in the child, and leave what came of it in a file; never returns."""
+    try:
+        os.dup2(printed, 1)
+        os.dup2(printed, 2)
+        # Beyond the limits of a run, so that it is measured, and not only stopped; more would harm the machine.
+        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS + 1, SECONDS + 2))
+        mapped = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (mapped + 2 * MEMORY, resource.RLIM_INFINITY))
+        signal.alarm(10 * SECONDS)  # of one that only waits
+        os.write(told, attempt(reader, path).encode("utf-8", "replace"))
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        os._exit(0)
+
+
+@dataclass
+class Tally:
+    """Counts of what the runs were."""
+
+    runs: int = 0
+    read: int = 0
+    refused: int = 0
+    faults: list[str] = field(default_factory=list)
+    slowest: tuple[float, str] = (0.0, "")
+    largest: tuple[float, str] = (0.0, "")
+
+    def __str__(self) -> str:
+        return (
+            f"{self.runs} runs: {self.read} read, {self.refused} refused, {len(self.faults)} faults; "
+            f"the slowest took {self.slowest[0]:.2f} s of processor time ({self.slowest[1]}); "
+            f"the largest had {self.largest[0] / 1e9:.2f} GB ({self.largest[1]})"
+        )
 
 
 def fuzz(known: dict[str, Reader], runs: int, seed: int, folder: Path, kept: Path) -> Tally:
     """Damage and read files, in turns; what went wrong is printed at once."""
     tally, names = Tally(), sorted(known)
+    for reader in names:  # what they import is imported once, and not in each process
+        name, good = known[reader].seeds[0]
+        (folder / name).write_bytes(good)
+        attempt(known[reader], folder / name)
     for run in range(runs):
         chance, reader = random.Random(f"{seed} {run}"), names[run % len(names)]
         name, good = chance.choice(known[reader].seeds)
         path = folder / name
         path.write_bytes(damaged(name, good, chance))
-        began = time.perf_counter()
-        found = attempt(known[reader], path)
-        tally.slowest = max(tally.slowest, (time.perf_counter() - began, f"{reader}, run {run}"))
+        found, seconds, memory = run_alone(known[reader], path)
+        tally.slowest = max(tally.slowest, (seconds, f"{reader}, run {run}"))
+        tally.largest = max(tally.largest, (memory, f"{reader}, run {run}"))
         tally.runs += 1
         if found in ("read", "refused"):
             setattr(tally, found, getattr(tally, found) + 1)

@@ -76,6 +76,10 @@ scattering = [1.0, 1, 1]
 """
 
 
+#: A key of many dots, which may become a session, a script, photographs or presets.
+DEEP = b"[model.a.a.a]\npath = 'bear'\n" + b".".join([b"a"] * 90) + b" = 1\nb = [[[{c.d.e.f = [1, 2]}]]]\n"
+
+
 class Reader(NamedTuple):
     """A reader of files, and good files for it: name and content of each."""
 
@@ -205,8 +209,39 @@ def _meshes() -> list[tuple[str, bytes]]:
         content = solid.export(file_type=kind, **options)
         found.append((f"mesh.{kind}", content if isinstance(content, bytes) else content.encode()))
     found.append(("text.stl", solid.export(file_type="stl_ascii").encode()))
+    found += [("fan.obj", _fan(300)), ("polygon.obj", _polygon(300)), ("apart.obj", _apart(60))]
     found.append(("uv.obj", b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nusemtl a\nf 1/1 2/2 3/1\n"))
     return found
+
+
+def _obj(vertices: Any, faces: Any) -> bytes:
+    lines = [f"v {x:.5g} {y:.5g} {z:.5g}" for x, y, z in vertices]
+    lines += ["f " + " ".join(str(corner + 1) for corner in face) for face in faces]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _fan(count: int) -> bytes:
+    """Many faces on one edge."""
+    angle = np.linspace(0, 6, count)
+    rim = np.stack([np.cos(angle), np.sin(angle), np.full(count, 0.5)], axis=1)
+    return _obj([(0, 0, 0), (0, 0, 1), *rim], [(0, 1, i + 2) for i in range(count)])
+
+
+def _polygon(count: int) -> bytes:
+    """One polygon whose corners repeat."""
+    return _obj([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[i % 3 for i in range(count)]])
+
+
+def _apart(count: int) -> bytes:
+    """Tetrahedra, apart and one in another, half of which look inwards."""
+    corners, faces = (
+        np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]),
+        [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)],
+    )
+    vertices = [(i % 7, i % 5, i % 3) + corners * (1 + i % 4) for i in range(count)]
+    turned = [[face[:: 1 if i % 2 else -1] for face in faces] for i in range(count)]
+    listed = [[4 * i + corner for corner in face] for i in range(count) for face in turned[i]]
+    return _obj(np.concatenate(vertices), listed)
 
 
 def _hdr(folder: Path) -> list[tuple[str, bytes]]:
@@ -214,7 +249,12 @@ def _hdr(folder: Path) -> list[tuple[str, bytes]]:
     head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\n\n-Y 8 +X 16\n"
     coded = b"".join(b"\2\2\0\20" + b"".join(b"\20" + channel.tobytes() for channel in row) for row in rows)
     flat = np.moveaxis(rows, 1, 2).tobytes()
-    return [("runs.hdr", head + coded), ("flat.hdr", head + flat), ("old.hdr", head + b"\x80\x80\x80\x80\1\1\1\x7f")]
+    return [
+        ("runs.hdr", head + coded),
+        ("flat.hdr", head + flat),
+        ("old.hdr", head + b"\x80\x80\x80\x80\1\1\1\x7f"),
+        ("long.hdr", head + b"\5\5\5\x80" + b"\1\1\1\0" * 3 + b"\1\1\1\xff"),
+    ]
 
 
 def _exr(folder: Path) -> bytes:
@@ -232,6 +272,19 @@ def _read_report(path: Path) -> None:
     for case in report.cases:
         for one in case.pictures:
             heat_map(one)
+
+
+def _read_mesh(path: Path) -> None:
+    str(tl.load_mesh(path).diagnosis)
+
+
+def _read_scene(path: Path) -> None:
+    for item in tl.load_scene(path).objects:
+        str(item.mesh.diagnosis)
+
+
+def _read_presets(path: Path) -> None:
+    read_presets(path.read_text("utf-8", "replace"))
 
 
 def _read_table(path: Path) -> None:
@@ -266,11 +319,11 @@ def readers(folder: Path) -> dict[str, Reader]:
     grid = np.linspace(0, 1, 24)
     map_values = {"scale": np.array(1.0), "offset": np.array(0.0), "values": np.ones((4, 4), np.float32)}
     return {
-        "scene": Reader(tl.load_scene, [glb, text]),
-        "gltf mesh": Reader(tl.load_mesh, [glb, text]),
+        "scene": Reader(_read_scene, [glb, text]),
+        "gltf mesh": Reader(_read_mesh, [glb, text]),
         "gltf materials": Reader(read_materials, [glb, text]),
         "gltf written": Reader(lambda path: write_medium(path, path.with_name("out.glb"), JADE), [glb, text]),
-        "mesh": Reader(tl.load_mesh, _meshes()),
+        "mesh": Reader(_read_mesh, _meshes()),
         "hdr": Reader(read_environment_map, _hdr(folder)),
         "exr": Reader(read_environment_map, [("sky.exr", _exr(folder))]),
         "environment": Reader(read_environment_map, [("a.png", picture("PNG")), ("a.jpg", picture("JPEG"))]),
@@ -286,11 +339,11 @@ def readers(folder: Path) -> dict[str, Reader]:
         "material": Reader(load_medium, list(materials.items())),
         "table": Reader(_read_table, [("t.csv", TABLE), ("t.json", ROWS)]),
         "wedge": Reader(fit_wedge, [("w.csv", b"distance,color,weight\n1cm,#7b1e3a,1\n2cm,#3b0e1a,2\n")]),
-        "photographs": Reader(read_photographs, [("p.toml", PHOTOGRAPHS)]),
+        "photographs": Reader(read_photographs, [("p.toml", PHOTOGRAPHS), ("d.toml", DEEP)]),
         "picture": Reader(read_picture, [("a.png", picture("PNG")), ("a.exr", _exr(folder))]),
-        "presets": Reader(lambda path: read_presets(path.read_text("utf-8", "replace")), [("p.toml", PRESETS)]),
-        "session": Reader(_read_preview, [("s.toml", SESSION)]),
-        "script": Reader(_read_script, [("s.toml", SCRIPT)]),
+        "presets": Reader(_read_presets, [("p.toml", PRESETS), ("d.toml", DEEP)]),
+        "session": Reader(_read_preview, [("s.toml", SESSION), ("d.toml", DEEP)]),
+        "script": Reader(_read_script, [("s.toml", SCRIPT), ("d.toml", DEEP)]),
         "report": Reader(_read_report, [("report.json", report_text())]),
         "pixel": Reader(
             lambda path: pixel_color(path, 1, 1),
