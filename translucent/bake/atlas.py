@@ -25,6 +25,13 @@ ANEW = "make new ones with --unwrap (in Python, leave out the uv), or unwrap it 
 MOST_TILES = 4.0
 
 
+#: Distance, as a share of a texel, within which a texel's center is on a triangle's edge.
+ON_EDGE = 1e-7
+
+#: Number of rows whose distances are computed at a time.
+ROWS = 256
+
+
 @dataclass(frozen=True, eq=False)
 class Unwrapped:
     """A mesh with texture coordinates.
@@ -142,10 +149,6 @@ def _doubts(
     return ()
 
 
-#: Distance, as a share of a texel, within which a texel's center is on a triangle's edge.
-ON_EDGE = 1e-7
-
-
 @dataclass(frozen=True, eq=False)
 class Texels:
     """Texels of a strip of a map, and the points that they show.
@@ -225,17 +228,17 @@ class Atlas:
             rise, run = by - ay, bx - ax
             level = rise == 0
             divisor = np.where(level, 1.0, rise)
-            # Where the edge meets the upper and lower edge of the row, as a share of its length.
+            # Where the edge crosses the upper and lower edge of the row, as a fraction of its length.
             with np.errstate(over="ignore", under="ignore"):
                 upper, lower = (np.clip((row + side - ay) / divisor, 0.0, 1.0) for side in (0.0, 1.0))
                 upper = ax + np.where(level, 0.0, upper) * run
                 lower = ax + np.where(level, 1.0, lower) * run
-            meets = (np.minimum(ay, by) <= row + 1) & (np.maximum(ay, by) >= row)
-            np.minimum(low, np.minimum(upper, lower), out=low, where=meets)
-            np.maximum(high, np.maximum(upper, lower), out=high, where=meets)
-        met = low <= high
-        left, right = _cells(np.where(met, low, 0.0), np.where(met, high, 0.0))
-        return left, np.where(met, right, left)
+            crosses = (np.minimum(ay, by) <= row + 1) & (np.maximum(ay, by) >= row)
+            np.minimum(low, np.minimum(upper, lower), out=low, where=crosses)
+            np.maximum(high, np.maximum(upper, lower), out=high, where=crosses)
+        touched = low <= high
+        left, right = _cells(np.where(touched, low, 0.0), np.where(touched, high, 0.0))
+        return left, np.where(touched, right, left)
 
     def _nearest(self, face: Integers, row: Integers, column: Integers, begin: int, end: int) -> Texels:
         """Best face for each texel, of all pairs of a face and a texel of the strip that it touches."""
@@ -327,10 +330,6 @@ def _closest_on_edges(corners: Array, point: Array) -> tuple[Array, Array]:
         weights[:, i], weights[:, j] = 1.0 - share, share
         barycentric = np.where(nearer[:, None], weights, barycentric)
     return distance, barycentric
-
-
-#: Number of rows whose distances are computed at a time.
-ROWS = 256
 
 
 def pad(values: npt.NDArray[np.float32], valued: npt.NDArray[np.bool_], padding: int) -> None:

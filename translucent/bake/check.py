@@ -1,8 +1,8 @@
 """Check of thickness maps: a body shaded with its map, as in a glTF viewer, and with its true thickness.
 
-A rasterizing viewer looks the thickness up where the view ray meets the front of the surface, and takes it for the way
-of the light: t = map(uv of the first hit), whatever the direction of the view, and nothing for the bodies behind. The
-truth is the path inside along the ray. Both pass light by exp(-sigma_t t), straight on.
+A rasterizing viewer looks the thickness up where the view ray hits the front of the surface, and takes it for the path
+length of the light: t = map(uv of the first hit), whatever the direction of the view, and nothing for the bodies
+behind. The truth is the path inside along the ray. Both pass light by exp(-sigma_t t), straight on.
 
 The maps of a bake are read back from its files, after a check that their texture coordinates are those of the file
 that they are for.
@@ -59,6 +59,27 @@ if TYPE_CHECKING:
 
 #: Distance within which surfaces coincide, as a share of the diagonal.
 SAME_POINT = 1e-4
+
+
+#: Corners: positions (n, 3) in metres and texture coordinates (n, 2), v upwards, or none.
+Corners = tuple[Array, Array | None]
+
+#: Tolerances of positions, as shares of the diagonal, and of texture coordinates.
+SAME = 1e-4
+
+#: Share of the vertices that may differ: those on seams that a repair has closed.
+MOST_OTHERS = 0.01
+
+#: Colors of the error: too thin, right, too thick (sRGB 0..255).
+THIN, RIGHT, THICK = (30, 90, 200), (245, 245, 245), (200, 50, 30)
+
+#: Largest number of rows of a picture.
+MOST_ROWS = 12
+
+#: Color of pixels without the body.
+NO_BODY = (70, 70, 74)
+
+_CAPTION = 26  # pixels
 
 
 class NotSeenError(InputError):
@@ -184,7 +205,7 @@ def look_up(mesh: Mesh, values: npt.ArrayLike, uv: Array) -> Array:
 
 
 def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | None = None) -> Array:
-    """(h, w, 2): uv where the ray of each pixel first meets the mesh, v upwards; NaN where it does not.
+    """(h, w, 2): uv where the ray of each pixel first hits the mesh, v upwards; NaN where it does not.
 
     Nor where other parts of the body are in front of it.
 
@@ -236,7 +257,7 @@ def first_hits(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | N
 
 
 def _first_faces(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[Integers, Array]:
-    """(k,), (k,): the face that the ray of each pixel first meets, and the way to it in metres; -1 and inf for none."""
+    """(k,), (k,): the first face that the ray of each pixel hits, and the distance in metres; -1 and inf for none."""
     traced = EmbreeMesh(mesh)
     origins, directions = (part.reshape(-1, 3) for part in camera.rays(size))
     starts = (origins - traced.center) / traced.radius
@@ -244,15 +265,6 @@ def _first_faces(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[Int
     ahead = np.maximum(-np.einsum("ki,ki->k", starts, directions) - 1.01, 0.0)
     face, distance = traced.first_hits(starts + ahead[:, None] * directions, directions)
     return face, np.where(face >= 0, traced.radius * (ahead + distance), np.inf)
-
-
-#: Corners: positions (n, 3) in metres and texture coordinates (n, 2), v upwards, or none.
-Corners = tuple[Array, Array | None]
-
-#: Tolerances of positions, as shares of the diagonal, and of texture coordinates.
-SAME = 1e-4
-#: Share of the vertices that may differ: those on seams that a repair has closed.
-MOST_OTHERS = 0.01
 
 
 def require_uv_of(corners: Corners, mesh: Mesh, path: Path) -> None:
@@ -428,17 +440,6 @@ def _medium(material: GltfMaterial | None, metres: float) -> Medium | None:
     """Medium of an object with this material, per metre of the world; None for clear ones, which would show nothing."""
     found = None if material is None else material.medium()
     return Medium(absorption=found.extinction / metres) if found is not None and found.extinction.any() else None
-
-
-#: Colors of the error: too thin, right, too thick (sRGB 0..255).
-THIN, RIGHT, THICK = (30, 90, 200), (245, 245, 245), (200, 50, 30)
-
-#: Largest number of rows of a picture.
-MOST_ROWS = 12
-
-#: Color of pixels without the body.
-NO_BODY = (70, 70, 74)
-_CAPTION = 26  # pixels
 
 
 def write_picture(checks: list[MapCheck], path: Path) -> None:

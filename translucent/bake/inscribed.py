@@ -9,9 +9,9 @@ center less than the crease angle away from p, is the smooth surface around p, e
 otherwise end the sphere.
 
 The quotient is quasi-convex: spheres that touch at p lie within one another. So its minimum in a face is where a sphere
-touches the plane, or the edge of the cone meets it, or, if that is not in the face, on an edge, where it is the root of
-a quadratic equation, moved into the cone. Nothing is iterated, where Ma, Bae and Choi (2012) let a ball shrink until it
-is empty. A few rays give a first radius, and a tree of boxes the faces that such a sphere meets.
+touches the plane, or the edge of the cone crosses it, or, if that is not in the face, on an edge, where it is the root
+of a quadratic equation, moved into the cone. Nothing is iterated, where Ma, Bae and Choi (2012) let a ball shrink until
+it is empty. A few rays give a first radius, and a tree of boxes the faces that such a sphere may touch.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from translucent.geometry.bvh import curve_order
 #: Children of a box, and the largest number of boxes at the top of the tree.
 CHILDREN, TOP = 4, 16
 
-#: Level from which a face in each box makes spheres smaller, so that fewer boxes are met on the next one.
+#: Level from which a face in each box makes spheres smaller, so that fewer boxes are tested on the next one.
 NARROWING = 3
 
-#: Coordinate of boxes that are none, in radii: no sphere meets them.
+#: Coordinate of boxes that are none, in radii: no sphere touches them.
 FAR = 10.0
 
 #: Largest number of pairs of a point and a box that are looked at at a time.
@@ -46,7 +46,7 @@ LARGE, LARGE_SLACK = 50_000, 0.002
 #: Distance from a plane, in radii of the mesh, up to which a point is on it: rounding of float64.
 ON_PLANE = 1e-10
 
-#: Rounding of what rays meet, as a share and in radii.
+#: Rounding of the distances of hits, relative and in radii.
 LOOSE = 1e-5
 
 _CONE, _CONE_SINE = math.cos(SPHERE_CONE), math.sin(SPHERE_CONE)
@@ -113,7 +113,7 @@ class InscribedSpheres:
         height, facing = plane[:, 3] - _dot(plane, point), _dot(plane, inward)
         side = np.where(height < -ON_PLANE, -1.0, 1.0)
         touching, touch = _on_plane(side[:, None] * plane[:, :3], np.abs(height), side * facing, inward)
-        # Where the sphere that touches the plane is too large, no part of the face is met by a smaller one.
+        # Where the sphere that touches the plane is too large, a smaller one touches no part of the face.
         kept = np.flatnonzero(touching < radius[pair])
         pair, face, point, inward = pair[kept], face[kept], point[kept], inward[kept]
         found = touching[kept]
@@ -125,8 +125,8 @@ class InscribedSpheres:
         np.minimum.at(radius, pair, found)
 
     def first(self, points: Points, directions: Floats, distance: Array, face: npt.NDArray[np.int32]) -> Array:
-        """(k,): radii of spheres that no inscribed one is larger than, from what rays along `directions` (3, k, r) meet
-        at a `distance` (k, r), on faces (k, r); 1 where they meet nothing.
+        """(k,): radii that no inscribed sphere exceeds, from the hits of rays along `directions` (3, k, r)
+        at a `distance` (k, r), on faces (k, r); 1 where they hit nothing.
         """
         n = points.normal[..., None]
         along = -(n[:, 0] * directions[0] + n[:, 1] * directions[1] + n[:, 2] * directions[2])
@@ -178,7 +178,7 @@ class _Boxes:
         return int(self.offset.shape[1])
 
     def met(self, pair: Integers, parent: Integers, points: Points, radius: Array) -> tuple[Integers, Integers]:
-        """Pairs of a point and a box that the sphere of `radius` there may meet."""
+        """Pairs of a point and a box that the sphere of `radius` there may touch."""
         start, normal, reach = points.start.take(pair, axis=0), points.normal.take(pair, axis=0), radius.take(pair)
         reach = reach[:, None]
         center = start - reach * normal
@@ -238,13 +238,13 @@ def _on_plane(normal: Array, height: Array, facing: Array, inward: Array) -> tup
     The planes lie at a `height` along their normals, whose cosines to `inward` are `facing`.
     """
     across = np.sqrt(np.maximum(1.0 - facing * facing, 0.0))
-    # Of normals too far from m it is the edge of the cone that meets the plane first.
+    # Of normals too far from m it is the edge of the cone that touches the plane first.
     beside = facing < _FACING
     toward = facing * _CONE + across * _CONE_SINE
     slope = np.where(beside, 2.0 * _CONE * toward, 1.0 + facing)
-    meets = slope > 1e-9
-    radius = np.where(meets, height / np.where(meets, slope, 1.0), np.inf)
-    finite = np.where(meets, radius, 0.0)
+    touches = slope > 1e-9
+    radius = np.where(touches, height / np.where(touches, slope, 1.0), np.inf)
+    finite = np.where(touches, radius, 0.0)
     aside = (normal - facing[:, None] * inward) / np.maximum(across, 1e-12)[:, None]
     rim = 2.0 * _CONE * (_CONE * inward + _CONE_SINE * aside)
     return radius, finite[:, None] * np.where(beside[:, None], rim, inward + normal)

@@ -42,6 +42,11 @@ BLOCKS = 8
 STEPS = 24
 
 
+#: Number of rays that are traced at a time: tracing drives the planes of the faces out of the cache of a processor,
+#: which costs less where it is rare. Their arrays take 20 MB in each thread.
+CHUNK_RAYS = 1 << 19
+
+
 @dataclass(frozen=True, eq=False)
 class RayMean:
     """The mean of a mode over rays, and its standard error.
@@ -150,11 +155,6 @@ def _block_sums(values: Array, edges: Integers) -> Array:
     """(k, blocks): sums over the blocks, each over all rounds."""
     sums = np.add.reduceat(values, edges.ravel(), axis=1)
     return np.asarray(sums.reshape(len(values), *edges.shape).sum(axis=1))
-
-
-#: Number of rays that are traced at a time: tracing drives the planes of the faces out of the cache of a processor,
-#: which costs less where it is rare. Their arrays take 20 MB in each thread.
-CHUNK_RAYS = 1 << 19
 
 
 class StoppedError(Exception):

@@ -29,7 +29,7 @@ OFFSET = 5e-7
 #: The face on which a ray starts, and those beside it, may be found up to here; also the step behind a face.
 NEAR = 2e-6
 
-#: Smallest cosine at which a ray meets a face and does not run along it, in float32 directions.
+#: Smallest cosine at which a ray crosses a face and does not run along it, in float32 directions.
 GRAZING = 1e-6
 
 #: Distance behind the start within which a face is at it: rounding of float64, for all but the flattest angles.
@@ -40,6 +40,27 @@ CACHED_RAYS = 1 << 16
 
 #: Number of rays that are followed face by face at a time: each has 120 bytes and more.
 FOLLOWED_RAYS = 1 << 17
+
+
+#: Number of independently scrambled sets, and largest number of values in all of them.
+SETS, TABLE = 256, 1 << 22
+
+#: Largest multiple of the requested rays from one point, where a tolerance needs more.
+MOST_MULTIPLE, MOST_ADDED = 64, 8192
+
+#: Binary digits of the points, as in float32.
+DIGITS = 24
+
+#: A sphere that touches the surface where a ray along w has its exit is seen from its center under pi - 2 theta: beyond
+#: this theta the exit belongs to the smooth surface around the point, see `inscribed`.
+SPHERE_CONE = 0.5 * (math.pi - CREASE)
+
+#: Rays that a first sphere comes from: more take longer than the faces that they spare.
+SPHERE_RAYS = 3
+
+#: Distance, as a share of the radius, within which points have the same set: the same point of two charts, rounded
+#: twice.
+SAME_POINT = 2.0**-24
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +115,11 @@ class Rays:
         with np.errstate(all="ignore"):
             for begin in range(0, count, step):
                 some = slice(begin, begin + step)
-                self._meet(points.start[some], directions[:, some], face[some], distance[some], leaves[some])
+                self._cross_planes(points.start[some], directions[:, some], face[some], distance[some], leaves[some])
         leaves &= face >= 0
         return distance, leaves, face
 
-    def _meet(
+    def _cross_planes(
         self,
         start: Array,
         directions: Floats,
@@ -223,27 +244,6 @@ class _Walk:
         """End some of the live rays, with their lengths (live,)."""
         self.length[self.live[done]] = length[done]
         self.live = self.live[~done]
-
-
-#: Number of independently scrambled sets, and largest number of values in all of them.
-SETS, TABLE = 256, 1 << 22
-
-#: Largest multiple of the requested rays from one point, where a tolerance needs more.
-MOST_MULTIPLE, MOST_ADDED = 64, 8192
-
-#: Binary digits of the points, as in float32.
-DIGITS = 24
-
-#: A sphere that touches the surface where a ray along w has its exit is seen from its center under pi - 2 theta: beyond
-#: this theta the exit belongs to the smooth surface around the point, see `inscribed`.
-SPHERE_CONE = 0.5 * (math.pi - CREASE)
-
-#: Rays that a first sphere comes from: more take longer than the faces that they spare.
-SPHERE_RAYS = 3
-
-#: Distance, as a share of the radius, within which points have the same set: the same point of two charts, rounded
-#: twice.
-SAME_POINT = 2.0**-24
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,6 +58,28 @@ ATTRIBUTES, EXTRAS = tuple(f"_SCATTER_SH{i}" for i in range(COUNT)), "translucen
 _CHANNELS = {f"SH{i}.{color}": (i, k) for i in range(COUNT) for k, color in enumerate("RGB")}
 
 
+#: What the numbers are.
+DEFINITION = (
+    "T: mean radiance (flux / pi) that the surface gives back of light scattered inside, for a unit of each spherical "
+    "harmonic of the radiance around it; radiance = sum_i T_i L_i, times (1 - F(cos)) / entering in a direction"
+)
+
+#: What the nine coefficients are, for records and headers.
+HARMONICS: Record = {
+    "order": 2,
+    "basis": "real, orthonormal, without the sign (-1)^m",
+    "index": "i = l (l + 1) + m",
+    "polynomials": [
+        "0.282095", "0.488603 y", "0.488603 z", "0.488603 x", "1.092548 x y", "1.092548 y z",
+        "0.315392 (3 z^2 - 1)", "1.092548 x z", "0.546274 (x^2 - y^2)",
+    ],
+    "frame": "the object's own axes; directions towards the light",
+}  # fmt: skip
+
+#: Texels whose values are read at a time.
+BLOCK = 1 << 16
+
+
 def fill_scatter_exr(path: Path, values: Floats, coverage: Mask, meaning: Record) -> None:
     """Write a map (h, w, 9, 3) as an OpenEXR file with what it means; raises `OSError` if it cannot be written."""
     channels = {name: values[:, :, i, k] for name, (i, k) in _CHANNELS.items()} | {"coverage.Y": coverage}
@@ -127,25 +149,6 @@ def _attributes(file: GltfFile, key: PrimitiveKey) -> dict[str, Any]:
     return found
 
 
-#: What the numbers are.
-DEFINITION = (
-    "T: mean radiance (flux / pi) that the surface gives back of light scattered inside, for a unit of each spherical "
-    "harmonic of the radiance around it; radiance = sum_i T_i L_i, times (1 - F(cos)) / entering in a direction"
-)
-
-#: What the nine coefficients are, for records and headers.
-HARMONICS: Record = {
-    "order": 2,
-    "basis": "real, orthonormal, without the sign (-1)^m",
-    "index": "i = l (l + 1) + m",
-    "polynomials": [
-        "0.282095", "0.488603 y", "0.488603 z", "0.488603 x", "1.092548 x y", "1.092548 y z",
-        "0.315392 (3 z^2 - 1)", "1.092548 x z", "0.546274 (x^2 - y^2)",
-    ],
-    "frame": "the object's own axes; directions towards the light",
-}  # fmt: skip
-
-
 @dataclass(frozen=True, eq=False)
 class BakedScatter:
     """Common part of maps and of values at vertices.
@@ -153,7 +156,7 @@ class BakedScatter:
     Attributes
     ----------
     values : (..., 9, 3) float32
-        T_i for each channel, in sr^-1/2: radiance that is given back, over coefficients of the radiance that arrives.
+        T_i for each channel, in sr^-1/2: subsurface exitance over pi, per coefficient of the radiance that arrives.
     mesh : Mesh
         In metres.
     medium : Medium
@@ -178,7 +181,7 @@ class BakedScatter:
         return diffuse_interface(self.medium.ior).entering
 
     def radiance(self, light: npt.ArrayLike) -> Array:
-        """Mean radiance (..., 3) that is given back in light with these coefficients (9, 3), in the frame of the mesh.
+        """Mean subsurface radiance (..., 3) in light with these coefficients (9, 3), in the frame of the mesh.
 
         Those of an environment are `Environment.harmonics`.
         """
@@ -319,10 +322,6 @@ def save_scatter_map(result: ScatterMap, path: str | Path, about: Record | None,
         return add_record(files, path, {**fingerprint(path, filled), **about, **size, **result.summary()})
 
 
-#: Texels whose values are read at a time.
-BLOCK = 1 << 16
-
-
 @checked
 def bake_scatter(
     mesh: Mesh,
@@ -334,10 +333,10 @@ def bake_scatter(
     padding: int = 16,
     body: Mesh | None = None,
 ) -> ScatterMap:
-    """Bake what a body gives back of the light around it after scattering, for each texel of its UVs.
+    """Bake the subsurface radiance of a body in the light around it, for each texel of its UVs.
 
     Light diffuses in the body as `translucent.Diffusion` has it in pictures, the shadows that it casts on itself
-    included. It is linear in the light around, which nine spherical harmonics stand for: radiance that is given back =
+    included. It is linear in the light around, which nine spherical harmonics represent: subsurface radiance =
     sum_i T_i L_i. Mirror reflection, and light that passes unscattered, are not in it.
 
     Parameters
@@ -407,7 +406,7 @@ def bake_scatter(
 def bake_vertex_scatter(
     mesh: Mesh, medium: Medium, *, resolution: int = 32, roughness: float = 0.0, body: Mesh | None = None
 ) -> VertexScatter:
-    """Bake what a body gives back of the light around it after scattering, for each vertex.
+    """Bake the subsurface radiance of a body in the light around it, for each vertex.
 
     As `bake_scatter`, with the same parameters, without texture coordinates.
 

@@ -3,9 +3,9 @@
 Each body is baked alone, in the size in which the first node of a glTF file shows it and in its own axes: the linear
 part of a node's matrix is M = R S (polar decomposition), S is applied before, and light is to be turned by R^-1.
 
-A check shows subsurface radiance alone, where each view ray first meets the surface; mirror reflection and light that
-passes unscattered are not part of a bake. nRMSE is the root of the mean square of the difference, over the mean of the
-diffused light.
+A check shows subsurface radiance alone, at the first hit of each view ray on the surface; mirror reflection and light
+that passes unscattered are not part of a bake. nRMSE is the root of the mean square of the difference, over the mean
+of the diffused light.
 """
 
 from __future__ import annotations
@@ -58,6 +58,10 @@ from translucent.units import metres_per_unit
 
 if TYPE_CHECKING:
     from PIL import Image
+
+
+#: Factor of the difference.
+MAGNIFIED = 10.0
 
 
 @dataclass(frozen=True)
@@ -325,10 +329,6 @@ def _picture(hit: Mask, values: Array, size: tuple[int, int]) -> Array:
 
 def _nrmse(found: Array, true: Array) -> float:
     return float(np.sqrt(((found - true) ** 2).mean()) / max(float(true.mean()), np.finfo(np.float64).tiny))
-
-
-#: Factor of the difference.
-MAGNIFIED = 10.0
 
 
 def write_scatter_picture(checks: Collection[ScatterCheck], path: Path) -> None:

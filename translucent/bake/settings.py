@@ -71,7 +71,7 @@ class BakeSettings:
     max_distance : float, optional
         In metres: d is at most this. Mode "local" takes a tenth of the diagonal where it is not given.
     ignore_back_faces : bool
-        Seen from inside, as the rays do, the back of a face is its outer side: rays that meet one go on, where meshes
+        Seen from inside, as the rays do, the back of a face is its outer side: rays that hit one go on, where meshes
         of overlapping parts would otherwise end them. "total" counts such parts once in any case.
     medium : Medium, optional
         Of mode "transmittance".

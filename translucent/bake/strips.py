@@ -37,6 +37,26 @@ from translucent.version import VERSION
 SEARCH = 0.02
 
 
+#: Texels (before supersampling) in a strip, about: one strip is what a thread takes at a time.
+STRIP_TEXELS = 1 << 14
+
+#: Names of the counts of a strip.
+COUNTS = ("traced", "cast", "escaped", "above", "samples", "missed", "overlapping")
+
+#: Seconds between writes of a checkpoint, and how many times longer than the last write they are at least.
+EVERY, REST = 5.0, 20.0
+
+Item = TypeVar("Item")
+
+Result = TypeVar("Result")
+
+#: Callback with the number of texels or corners done, their total, and the number of rays traced.
+Progress = Callable[[int, int, int], None]
+
+#: Number of queued pieces of work for each thread; their results wait for their turn.
+AHEAD = 4
+
+
 @dataclass(frozen=True, eq=False)
 class Projection:
     """Projection of points of a low-poly mesh to a high-poly one, along its smooth normals or from a cage.
@@ -98,9 +118,9 @@ class Projection:
             length = np.sqrt((along**2).sum(axis=1))
             along = along / np.where(length > 0, length, 1.0)[:, None]
             reach = 2.0 * length
-        return self._meet(begin, along, reach)
+        return self._first_points(begin, along, reach)
 
-    def _meet(self, begin: Array, along: Array, reach: Array) -> tuple[Points, npt.NDArray[np.bool_]]:
+    def _first_points(self, begin: Array, along: Array, reach: Array) -> tuple[Points, npt.NDArray[np.bool_]]:
         """First points of the high mesh on rays in metres, from outside and within `reach`."""
         high = self.high
         origin = (begin - high.embree.center) / high.radius
@@ -113,13 +133,6 @@ class Projection:
         found = facing & (distance >= 0) & (distance * high.radius <= reach)
         face, point = face[found], (origin + distance[:, None] * along)[found]
         return high.points(face, barycentric(high.corners[face], point)), found
-
-
-#: Texels (before supersampling) in a strip, about: one strip is what a thread takes at a time.
-STRIP_TEXELS = 1 << 14
-
-#: Names of the counts of a strip.
-COUNTS = ("traced", "cast", "escaped", "above", "samples", "missed", "overlapping")
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,10 +229,6 @@ def _gathered(
         mean = np.bincount(texel, weights=values, minlength=count) / divisor
         error = np.sqrt(np.bincount(texel, weights=errors * errors, minlength=count)) / divisor
         return mean.astype(np.float32), error.astype(np.float32), samples > 0
-
-
-#: Seconds between writes of a checkpoint, and how many times longer than the last write they are at least.
-EVERY, REST = 5.0, 20.0
 
 
 class Canvas:
@@ -320,16 +329,6 @@ def bake_key(settings: BakeSettings, *meshes: Mesh | None) -> str:
             digest.update(b"|")
         digest.update(b"#")
     return digest.hexdigest()
-
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
-
-#: Callback with the number of texels or corners done, their total, and the number of rays traced.
-Progress = Callable[[int, int, int], None]
-
-#: Number of queued pieces of work for each thread; their results wait for their turn.
-AHEAD = 4
 
 
 def in_order(

@@ -20,6 +20,10 @@ from translucent.errors import RenderError, printable
 _KEPT = re.compile(r"(\n|\t|\x1b\[48;2;\d{1,3};\d{1,3};\d{1,3}m {2,8}\x1b\[0m)")
 
 
+#: Seconds before anything is told, and between two tellings: in a terminal, and in a file.
+TERMINAL, FILE = (1.0, 0.5), (10.0, 30.0)
+
+
 def echo(text: str, *, err: bool = False, nl: bool = True, color: bool | None = None) -> None:
     """Print text; what is not printable in it is escaped, but for line ends, tabs and swatches.
 
@@ -64,10 +68,6 @@ def takes_colors(stream: TextIO | None) -> bool:
 def overwrite(text: str) -> None:
     """Print text over the last line on stderr, which has no end."""
     click.echo(f"\r{printable(text)}", nl=False, err=True)
-
-
-#: Seconds before anything is told, and between two tellings: in a terminal, and in a file.
-TERMINAL, FILE = (1.0, 0.5), (10.0, 30.0)
 
 
 class Progress:

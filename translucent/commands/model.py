@@ -250,7 +250,7 @@ def read_vector(option: str, text: str) -> list[float]:
 
 
 def medium_lines(scene: Scene, reach: Callable[[Object], float] | None = None) -> list[str]:
-    """Lines about the media of a scene's translucent objects, one per medium, with a color after some way through it.
+    """Lines about the media of a scene's translucent objects, one per medium, with a color after some length in it.
 
     Layers, which nothing fills, are not among them.
 
@@ -258,7 +258,7 @@ def medium_lines(scene: Scene, reach: Callable[[Object], float] | None = None) -
     ----------
     scene : Scene
     reach : callable, optional
-        Gives that way in metres for an object. Default: a tenth of its diagonal.
+        That length in metres for an object. Default: a tenth of its diagonal.
     """
     from translucent.formulas.color import to_hex
 
@@ -273,10 +273,10 @@ def medium_lines(scene: Scene, reach: Callable[[Object], float] | None = None) -
         if (sheet := first.sheet_thickness) is not None:
             lines.append(f"{whose}thin, white light is {to_hex(medium.transmittance(sheet))} behind it")
             continue
-        way = reach(first) if reach is not None else 0.1 * float(np.linalg.norm(first.bounds[1] - first.bounds[0]))
+        length = reach(first) if reach is not None else 0.1 * float(np.linalg.norm(first.bounds[1] - first.bounds[0]))
         sigma = ", ".join(f"{value:.4g}" for value in medium.extinction)
-        color = to_hex(medium.transmittance(way))
-        lines.append(f"{whose}extinction {sigma} 1/m: white light is {color} after {way:.3g} m")
+        color = to_hex(medium.transmittance(length))
+        lines.append(f"{whose}extinction {sigma} 1/m: white light is {color} after {length:.3g} m")
     return lines
 
 

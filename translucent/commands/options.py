@@ -54,6 +54,10 @@ Verb = Callable[..., Any]
 Value = TypeVar("Value")
 
 
+#: Key under which a verb finds whether it may replace a file that it reads.
+_OVERWRITE = "translucent.overwrite"
+
+
 def option(default: Any = None, *, names: tuple[str, ...] = (), help: str | Callable[[], str], **more: Any) -> Any:
     """Field of a group that is an option.
 
@@ -507,10 +511,6 @@ def read_size(text: str) -> tuple[int, int]:
 def triple_text(values: Any) -> str:
     """Three numbers, aligned."""
     return " ".join(f"{value:10.5g}" for value in values)
-
-
-#: Key under which a verb finds whether it may replace a file that it reads.
-_OVERWRITE = "translucent.overwrite"
 
 
 def overwrite_option() -> Any:

@@ -30,6 +30,62 @@ if TYPE_CHECKING:
     from translucent.gpu.std140 import UniformBlock
 
 
+_NAME, _TYPE_POINTER, _VARIABLE = 5, 32, 59
+
+_HEADER = 5  # words
+
+#: Languages that are not GLSL.
+Language = Literal["hlsl", "msl", "wgsl"]
+
+#: The npm package that has naga: its major version is naga's.
+NAGA = "naga-wasm@30.1.0"
+
+#: What engines call the inputs of vertex shaders in HLSL.
+_SEMANTICS = {
+    "offset": "POSITION",
+    "normal": "NORMAL",
+    "corner_normal": "NORMAL",
+    "uv": "TEXCOORD0",
+    "corner_color": "COLOR0",
+}
+
+_LANGUAGES: Mapping[Language, str] = {"hlsl": "HLSL", "msl": "Metal's language", "wgsl": "WGSL"}
+
+_SPIRV_CROSS: Mapping[Language, Sequence[str]] = {
+    "hlsl": [
+        *("--hlsl", "--shader-model", "50", "--hlsl-auto-binding", "all"),
+        *(word for pair in _SEMANTICS.items() for word in ("--set-hlsl-named-vertex-input-semantic", *pair)),
+    ],
+    "msl": ["--msl", "--msl-version", "20100"],
+}
+
+_MADE_BY: Mapping[Language, str] = {
+    "hlsl": "shader model 5.0, by glslang and SPIRV-Cross",
+    "msl": "Metal 2.1, by glslang and SPIRV-Cross",
+    "wgsl": "by naga",
+}
+
+#: What a library's own main begins with in the translation.
+_MAIN = {"hlsl": "\nvoid frag_main()", "msl": "\nfragment void main0(", "wgsl": "\nfn main_1("}
+
+_FUNCTION = re.compile(r"^[\w\[\]]+ (\w+)\(([^)]*)\) \{", re.MULTILINE)
+
+#: Reads {source, stage}; writes {text} or {error}. Modules are looked for as CommonJS does, also in NODE_PATH.
+_NAGA = """
+import { createRequire } from "node:module";
+import { pathToFileURL } from "node:url";
+import { readFileSync } from "node:fs";
+let found;
+try { found = createRequire(process.cwd() + "/").resolve("naga-wasm"); } catch { process.exit(3); }
+const naga = await import(pathToFileURL(found).href);
+const { source, stage } = JSON.parse(readFileSync(0, "utf8"));
+let answer;
+try { answer = { text: naga.translate({ from: "glsl", to: "wgsl", source, parse: { stage } }) }; }
+catch (error) { answer = { error: String(error.formatted ?? error.message) }; }
+process.stdout.write(JSON.stringify(answer));
+"""
+
+
 @click.command(epilog="Example: translucent shader signed_depth --define OPAQUE=0 --define SPECTRAL=0 --target webgl2")
 @click.argument("name", required=False)
 @click.option("--define", "defines", multiple=True, metavar="X=1", help="Value of a switch, once for each that it has.")
@@ -110,10 +166,6 @@ def _define(text: str) -> tuple[str, int]:
     return key, int(value) if equals else 1
 
 
-_NAME, _TYPE_POINTER, _VARIABLE = 5, 32, 59
-_HEADER = 5  # words
-
-
 def with_block_names(module: bytes) -> bytes:
     """Module whose uniform blocks without a name of their own are called as their types, in small letters.
 
@@ -153,53 +205,6 @@ def _text(text: str) -> np.ndarray:
     """Words of a string, which ends with a zero."""
     data = text.encode()
     return np.frombuffer(data + b"\0" * (4 - len(data) % 4), "<u4")
-
-
-#: Languages that are not GLSL.
-Language = Literal["hlsl", "msl", "wgsl"]
-
-#: The npm package that has naga: its major version is naga's.
-NAGA = "naga-wasm@30.1.0"
-
-#: What engines call the inputs of vertex shaders in HLSL.
-_SEMANTICS = {
-    "offset": "POSITION",
-    "normal": "NORMAL",
-    "corner_normal": "NORMAL",
-    "uv": "TEXCOORD0",
-    "corner_color": "COLOR0",
-}
-_LANGUAGES: Mapping[Language, str] = {"hlsl": "HLSL", "msl": "Metal's language", "wgsl": "WGSL"}
-_SPIRV_CROSS: Mapping[Language, Sequence[str]] = {
-    "hlsl": [
-        *("--hlsl", "--shader-model", "50", "--hlsl-auto-binding", "all"),
-        *(word for pair in _SEMANTICS.items() for word in ("--set-hlsl-named-vertex-input-semantic", *pair)),
-    ],
-    "msl": ["--msl", "--msl-version", "20100"],
-}
-_MADE_BY: Mapping[Language, str] = {
-    "hlsl": "shader model 5.0, by glslang and SPIRV-Cross",
-    "msl": "Metal 2.1, by glslang and SPIRV-Cross",
-    "wgsl": "by naga",
-}
-#: What a library's own main begins with in the translation.
-_MAIN = {"hlsl": "\nvoid frag_main()", "msl": "\nfragment void main0(", "wgsl": "\nfn main_1("}
-_FUNCTION = re.compile(r"^[\w\[\]]+ (\w+)\(([^)]*)\) \{", re.MULTILINE)
-
-#: Reads {source, stage}; writes {text} or {error}. Modules are looked for as CommonJS does, also in NODE_PATH.
-_NAGA = """
-import { createRequire } from "node:module";
-import { pathToFileURL } from "node:url";
-import { readFileSync } from "node:fs";
-let found;
-try { found = createRequire(process.cwd() + "/").resolve("naga-wasm"); } catch { process.exit(3); }
-const naga = await import(pathToFileURL(found).href);
-const { source, stage } = JSON.parse(readFileSync(0, "utf8"));
-let answer;
-try { answer = { text: naga.translate({ from: "glsl", to: "wgsl", source, parse: { stage } }) }; }
-catch (error) { answer = { error: String(error.formatted ?? error.message) }; }
-process.stdout.write(JSON.stringify(answer));
-"""
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,13 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _MADE_UP = 512
 
 
+AnyIndices = npt.NDArray[np.integer]
+
+_POINTS_AND_LINES = (0, 1, 2, 3)
+
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+
+
 class Accessors:
     """Arrays of a file, by the index of their accessor; the memory that they take is limited by `require_room`."""
 
@@ -117,12 +124,6 @@ class Accessors:
         if count < 1 or stride < element or end > length or start + length > len(data):
             raise self.file.refused(f"{entry.where} leaves its buffer", "copy or export the file again")
         return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
-
-
-AnyIndices = npt.NDArray[np.integer]
-
-_POINTS_AND_LINES = (0, 1, 2, 3)
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
 def primitive_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:

@@ -43,6 +43,16 @@ COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_me
 MAX_JSON = 1 << 28
 
 
+_ALIGNMENT = 4  # bytes: the size of the largest component of an accessor
+
+#: Magic numbers of the image formats of glTF and its extensions; nothing else is copied into a file.
+_PICTURES = {b"\x89PNG\r\n": "image/png", b"\xff\xd8\xff": "image/jpeg", b"\xabKTX 20\xbb": "image/ktx2"}
+
+_LONGEST = 2**32 - 1  # bytes: the header states the length with 32 bits
+
+_DATA_URI = "data:application/octet-stream;base64,"
+
+
 @dataclass(frozen=True)
 class GltfFile:
     """Contents of a glTF file: its JSON as `tree`, and for .glb the chunks after it as `chunks`, headers included.
@@ -193,12 +203,6 @@ def _require_short(asked: str, size: int) -> None:
     require_memory(asked, f"its {size_text(size)} of JSON", 3 * size, do)
 
 
-_ALIGNMENT = 4  # bytes: the size of the largest component of an accessor
-
-#: Magic numbers of the image formats of glTF and its extensions; nothing else is copied into a file.
-_PICTURES = {b"\x89PNG\r\n": "image/png", b"\xff\xd8\xff": "image/jpeg", b"\xabKTX 20\xbb": "image/ktx2"}
-
-
 def gather(file: GltfFile, tree: Json) -> tuple[Json, bytes]:
     """Gather buffers: JSON whose first buffer is the binary chunk, and its bytes; without any, the JSON as it is.
 
@@ -318,10 +322,6 @@ def _move(file: GltfFile, old: Json, new: Json, places: dict[int, tuple[int, int
     new["buffer"], start = places[index]
     if start:
         new["byteOffset"] = start + offset
-
-
-_LONGEST = 2**32 - 1  # bytes: the header states the length with 32 bits
-_DATA_URI = "data:application/octet-stream;base64,"
 
 
 def write_gltf(file: GltfFile, path: str | Path) -> None:

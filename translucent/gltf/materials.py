@@ -384,7 +384,7 @@ def _thickness_texture(volume: JsonFields, count: int) -> tuple[int | None, Text
 
 
 def _lets_light_in(extensions: Json) -> bool:
-    """True if light may enter by another way than transmission: diffusely, or by an extension that is not known."""
+    """True if light may enter other than by transmission: diffusely, or by an extension that is not known."""
     return any(
         key == DIFFUSE_TRANSMISSION or (not key.startswith("KHR_") and key not in EXCLUDED) for key in extensions
     )

@@ -7,11 +7,11 @@ transmissionFactor > 0 and thicknessFactor > 0     body: the medium of attenuati
                                                    the ior; its thickness is the true one of the mesh, along each
                                                    ray, and thicknessFactor and thicknessTexture are not needed. Its
                                                    surface is tinted by baseColorFactor, once
-diffuseTransmissionFactor > 0 and a volume         body, too: what is not transmitted is paint that light passes
-transmissionFactor > 0, no volume or thickness 0   thin wall: a sheet without an inside, which light crosses once per
+diffuseTransmissionFactor > 0 and a volume         body, too: the rest is diffuse reflection and transmission
+transmissionFactor > 0, no volume or thickness 0   thin wall without an inside, which light crosses once per
                                                    face, tinted by baseColorFactor. It is infinitely thin by the
                                                    specification; here a pane that hardly adds to the thickness
-everything else                                    opaque: metal, or a coat over paint, that may glow, may have holes,
+everything else                                    opaque: metal, or a coat over a diffuse base, may emit, have holes,
                                                    and may let light of the other side through. A volume alone, or
                                                    with transmissionFactor 0, lets no light in
 KHR_materials_unlit                                opaque: has its base color everywhere, and mirrors nothing
@@ -24,7 +24,7 @@ alphaMode BLEND, with an alpha below 1 somewhere   layer: a sheet that shows wha
 
 The tint of a wall is that of a straight view. A slanted view has it deeper, as in a pane with the wall's ior: at most
 by the 1.34th power with the ior of 1.5 that materials have by default. A wall that transmits only a share of the light
-has its tint whatever the view, like its paint.
+has its tint whatever the view, like its diffuse reflection.
 
 alphaMode MASK makes holes in opaque objects and walls; a body with holes would have no inside, and is drawn closed.
 Colors of vertices multiply the base color, and a mesh with them and without a material is matt. Emission adds its
@@ -82,6 +82,22 @@ UNREAD_TEXTURES = {
 }
 
 
+#: Thickness of a thin wall as a share of the scene's diagonal: too little to see, enough to count as covered.
+WALL_SHARE = 1e-5
+
+#: Medium of a partly transparent layer: empty.
+_CLEAR = Medium()
+
+#: Message about alphaMode BLEND.
+BLENDED = (
+    "alphaMode BLEND, drawn as thin sheets that cover a share of what is behind, sorted by object as in viewers; they "
+    "cast no shadows, and rays that bend do not meet them"
+)
+
+#: Smallest share of metal in a texture that is not taken for noise.
+_METAL = 0.1
+
+
 @dataclass(frozen=True, eq=False)
 class SceneMaterial:
     """Material of objects in a scene: surface, medium, and whether it makes a thin wall.
@@ -99,7 +115,7 @@ class SceneMaterial:
     hidden : bool
         Whether its alpha makes it one hole.
     blends : bool
-        Whether alpha is a share that is painted over what is behind.
+        Whether alpha is the opacity of a layer over what is behind.
     opacity : float
         That of baseColorFactor.
     unlit : bool
@@ -124,7 +140,7 @@ class SceneMaterial:
         return self.medium is not None or self.wall_ior is not None
 
     def wall_medium(self, thickness: float) -> Medium:
-        """Medium that gives a sheet of this thickness in metres the tint of the wall."""
+        """Medium with the tint of the wall in a sheet of this thickness in metres."""
         tints = self.surface is None or (np.asarray(self.surface.color) == 1).all()
         color = self.color if tints else np.ones(3)
         return Medium(absorption=extinction_at(color, thickness), ior=self.wall_ior or DEFAULT_IOR)
@@ -268,22 +284,6 @@ class _Reader:
     def _texture_cutoff(self) -> float:
         """Alpha of texture and vertices below which there is a hole: the rest of alpha is a factor."""
         return min(self.alpha_cutoff / max(self.opacity, 1e-9), 1.0)
-
-
-#: Thickness of a thin wall as a share of the scene's diagonal: too little to see, enough to count as covered.
-WALL_SHARE = 1e-5
-
-#: Medium of a partly transparent layer: empty.
-_CLEAR = Medium()
-
-#: Message about alphaMode BLEND.
-BLENDED = (
-    "alphaMode BLEND, drawn as thin sheets that cover a share of what is behind, sorted by object as in viewers; they "
-    "cast no shadows, and rays that bend do not meet them"
-)
-
-#: Smallest share of metal in a texture that is not taken for noise.
-_METAL = 0.1
 
 
 def scene_objects(

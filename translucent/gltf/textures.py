@@ -33,6 +33,19 @@ TEXTURE_TRANSFORM = "KHR_texture_transform"
 NEAREST, _REPEAT, _CLAMP, _MIRROR = 9728, 10497, 33071, 33648
 
 
+Bytes = npt.NDArray[np.uint8]
+
+Pixels = npt.NDArray[np.float32]
+
+#: Largest side of a picture in pixels; larger ones are made smaller.
+MAX_SIDE = 4096
+
+#: Largest number of characters of a link in a message; a longer one is named by its index.
+_LONGEST_NAME = 60
+
+_WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
+
+
 @dataclass(frozen=True)
 class TextureTransform:
     """Transform from the UVs of a mesh to a texture's own coordinates.
@@ -91,18 +104,6 @@ def _wrapped(index: Array, size: int, mode: object) -> npt.NDArray[np.intp]:
         folded = index % (2 * size)
         return np.where(folded < size, folded, 2 * size - 1 - folded).astype(np.intp)
     return (index % size).astype(np.intp)
-
-
-Bytes = npt.NDArray[np.uint8]
-Pixels = npt.NDArray[np.float32]
-
-#: Largest side of a picture in pixels; larger ones are made smaller.
-MAX_SIDE = 4096
-
-#: Largest number of characters of a link in a message; a longer one is named by its index.
-_LONGEST_NAME = 60
-
-_WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 
 
 class Textures:

@@ -59,6 +59,9 @@ CENTIMETERS_PER_METRE = 100.0
 _STOPS = 9
 
 
+_GODOT_ROUGHNESS = roughness_behind("uniform float roughness : hint_range(0.0, 1.0) =")
+
+
 def threejs_text(medium: Medium, distance: float, roughness: float) -> str:
     """JavaScript that makes the material; the color is stated at `distance` in metres, see `color_at`."""
     color, metres = color_at(medium, distance)
@@ -128,7 +131,6 @@ def read_godot(text: str, _: str = "m") -> Medium:
     return Medium(absorption=stated(what, text, "extinction = vec3(", 3), ior=ior)
 
 
-_GODOT_ROUGHNESS = roughness_behind("uniform float roughness : hint_range(0.0, 1.0) =")
 GODOT = ExportTarget("Godot", godot_text, ".gdshader", read_godot, _GODOT_ROUGHNESS)
 
 

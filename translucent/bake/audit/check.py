@@ -42,6 +42,22 @@ from translucent.gltf.file import GltfFile, read_gltf, write_gltf
 from translucent.gltf.materials import materials_of
 from translucent.gltf.nodes import node_transforms
 
+#: Findings that a bake mends, and those that a change of the material does.
+BAKED = frozenset(
+    {
+        "thickness-too-large",
+        "thickness-too-small",
+        "thickness-zero",
+        "thickness-map-empty",
+        "thickness-map-inverted",
+        "thickness-map-off",
+        "thickness-texture-unreadable",
+        "shell-as-solid",
+    }
+)
+
+WRITTEN = frozenset({"metal", "double-sided"})
+
 
 @checked
 def check_materials(path: str | Path, *, allow_outside: bool = False) -> MaterialCheck:
@@ -156,22 +172,6 @@ def _statistics(lengths: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, flo
     if not finite.size:
         return None
     return {"median": float(np.median(finite)), "p95": float(np.percentile(finite, 95))}
-
-
-#: Findings that a bake mends, and those that a change of the material does.
-BAKED = frozenset(
-    {
-        "thickness-too-large",
-        "thickness-too-small",
-        "thickness-zero",
-        "thickness-map-empty",
-        "thickness-map-inverted",
-        "thickness-map-off",
-        "thickness-texture-unreadable",
-        "shell-as-solid",
-    }
-)
-WRITTEN = frozenset({"metal", "double-sided"})
 
 
 @checked

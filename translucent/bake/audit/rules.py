@@ -45,13 +45,13 @@ SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note")
 #: Largest index of refraction of what is clear: rutile and moissanite have 2.6 to 2.9.
 LARGEST_IOR = 3.0
 
-#: Error of a length, by the way in which viewers scale it, that is told.
+#: Smallest reported error of a length as viewers scale it.
 SCALE_ERROR = 0.05
 
 #: Share of rays without an exit from which on a hole is an error.
 LEAKS = 0.02
 
-#: Points of each of two bodies whose boxes meet, and most winding numbers, times triangles, that are worked out.
+#: Points of each of two bodies whose boxes overlap, and the most winding numbers, times triangles, to work out.
 POINTS, MOST_WORK = 48, 5e7
 
 #: Winding numbers between these are those of points on a surface; shares of points that make bodies cross.
@@ -528,4 +528,4 @@ def viewer_colors(body: Body) -> dict[str, Array]:
         "Blender (Cycles)": (absorbed, body.chords[finite] * world),
     }
     with np.errstate(under="ignore"):
-        return {name: Medium(absorption=s).transmittance(way).mean(axis=0) for name, (s, way) in lengths.items()}
+        return {name: Medium(absorption=s).transmittance(length).mean(axis=0) for name, (s, length) in lengths.items()}
