@@ -6,6 +6,7 @@ meaning for a mesh. Archives are no meshes, though trimesh unpacks them.
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import warnings
@@ -22,6 +23,9 @@ from translucent.files.reading import open_file, require_memory, require_room, s
 from translucent.geometry.mesh import PER_TRIANGLE, Mesh, Triangles, adopted, joined, mended
 from translucent.gltf.load import read_whole
 from translucent.units import metres_per_unit
+
+# Without a handler of its own, what trimesh logs of a damaged file is printed.
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 #: Bytes of memory that loading and diagnosing take at most for each byte of a text file, and for each triangle of a
 #: binary file that brings its own corners (measured by tools/measure_loading.py; see geometry/mesh.py for the others).

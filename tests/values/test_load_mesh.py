@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import subprocess
+import sys
 import tracemalloc
 import warnings
 from pathlib import Path
@@ -204,6 +206,19 @@ def test_such_a_file_is_refused(tmp_path: Path, name: str, content: bytes | None
     with pytest.raises(tl.InputError, match=re.escape(message)) as caught:
         load_mesh(path)
     assert name in str(caught.value)
+
+
+def test_what_trimesh_logs_of_a_damaged_file_is_not_printed(tmp_path: Path) -> None:
+    """In a process of its own, since pytest has handlers for what is logged."""
+    text = (
+        "solid a\nfacet normal 0 0 x\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid"
+    )
+    (tmp_path / "a.stl").write_text(text)
+    script = "import sys, translucent as tl; print(len(tl.load_mesh(sys.argv[1]).faces))"
+    done = subprocess.run(
+        [sys.executable, "-c", script, tmp_path / "a.stl"], capture_output=True, text=True, check=True
+    )
+    assert (done.stdout, done.stderr) == ("1\n", "")
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
