@@ -111,7 +111,7 @@ def read_reference(a: Artist) -> Waiting:
     measured = a.state.work
     yield from a.until(lambda: measured.measured is not None and measured.measured.errors, "it is measured")
     require(measured.measured.errors[0].median < 1e-5, "the median error of thickness")  # type: ignore[union-attr]
-    yield from a.until(lambda: a.state._inset is not None, "the inset is on show")
+    yield from a.until(lambda: "inset" in a.state._textures, "the inset is on show")
 
 
 def bake(a: Artist) -> Waiting:
