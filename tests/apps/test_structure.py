@@ -55,7 +55,6 @@ SHARED = {
     "Picture",
     "Progress",
     "Rays",
-    "SceneView",
     "Steps",
     "Surface",
     "SurfaceLight",

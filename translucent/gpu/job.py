@@ -21,7 +21,7 @@ from translucent.gpu.layout import DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER,
 from translucent.gpu.light_cameras import media_sphere
 from translucent.gpu.placement import PlacedScene, SampleView, depth_range
 from translucent.gpu.resources import Resources
-from translucent.gpu.scene_view import SceneView
+from translucent.gpu.scene_view import CameraView
 from translucent.gpu.std140 import UniformBlock
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import (
@@ -41,7 +41,7 @@ from translucent.scene.backdrop import Backdrop
 from translucent.scene.scene import Scene
 
 
-class FrameJob(SceneView):
+class FrameJob(CameraView):
     """Input of a pass: the features of the frame, its bodies placed before the camera, its targets.
 
     Parameters

@@ -12,13 +12,13 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import MEDIA
 from translucent.gpu.light_cameras import media_sphere
 from translucent.gpu.placement import PlacedScene, SampleView
-from translucent.gpu.scene_view import SceneView
+from translucent.gpu.scene_view import CameraView
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import LightLookup, media_uniforms
 from translucent.scene.camera import Camera
 
 
-class LightView(SceneView):
+class LightView(CameraView):
     """View of the scene from a light in one direction.
 
     It has uniforms of its own for what depends on the camera only, and leaves bound what the frame has bound else.

@@ -14,7 +14,7 @@ from translucent.gpu.targets import Targets
 from translucent.gpu.uniform_buffers import UniformBuffers
 
 
-class SceneView:
+class CameraView:
     """Bodies before a camera, with their uniforms, and targets of the size of a picture.
 
     Parameters

@@ -10,7 +10,7 @@ from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.resources import Resources
-from translucent.gpu.scene_view import SceneView
+from translucent.gpu.scene_view import CameraView
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table, texture_units
 from translucent.planning.passes import PassSpec
@@ -74,7 +74,7 @@ class OpaquePass:
         job.gl.depth_func = "<"
 
     def draw_depth(
-        self, view: SceneView, objects: tuple[int, ...], framebuffer: moderngl.Framebuffer, *, projected: bool = False
+        self, view: CameraView, objects: tuple[int, ...], framebuffer: moderngl.Framebuffer, *, projected: bool = False
     ) -> None:
         """Draw no more than where opaque objects are, into a cleared framebuffer (R32F) with a depth buffer.
 
@@ -113,7 +113,7 @@ class FinishMaps:
         self._gl = gl
         self._reflectance: moderngl.Texture | None = None
 
-    def bind(self, view: SceneView) -> None:
+    def bind(self, view: CameraView) -> None:
         """Bind the environment's maps to the texture units of `FINISH_UNITS`."""
         if self._reflectance is None:
             self._reflectance = reflectance_table(self._gl)
@@ -123,7 +123,7 @@ class FinishMaps:
         for unit, texture in enumerate(textures):
             texture.use(unit)
 
-    def set_finish(self, view: SceneView, program: moderngl.Program, surface: Surface, hole_below: float) -> None:
+    def set_finish(self, view: CameraView, program: moderngl.Program, surface: Surface, hole_below: float) -> None:
         """Set the uniforms of an object's surface; there is a hole where alpha is less than `hole_below`."""
         view.resources.textures.bind(surface, program, _FIRST_TEXTURE)
         passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)

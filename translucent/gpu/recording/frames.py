@@ -14,7 +14,7 @@ from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.recording.context import BODY_STRIDE, RecordingContext
 from translucent.gpu.recording.objects import RecordedBuffer, RecordedMeshes
 from translucent.gpu.resources import Resources
-from translucent.gpu.scene_view import SceneView
+from translucent.gpu.scene_view import CameraView
 from translucent.gpu.targets import Targets
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
@@ -37,7 +37,7 @@ class RecordedJob(FrameJob):
 
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
         """Draw objects with the current state."""
-        SceneView.draw(self, program, objects)
+        CameraView.draw(self, program, objects)
 
 
 @dataclass(eq=False)
