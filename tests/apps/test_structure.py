@@ -119,11 +119,18 @@ assert not found, found
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_the_window_opens_without_scipy_and_the_reference() -> None:
-    code = """
+@pytest.mark.parametrize(
+    ("module", "unneeded"),
+    [
+        ("translucent.preview.app", {"scipy", "trimesh", "translucent.reference", "translucent.diffusion.cache"}),
+        ("translucent.cli", {"scipy", "trimesh", "moderngl", "translucent.geometry", "translucent.gpu"}),
+    ],
+)
+def test_windows_and_the_command_line_start_without(module: str, unneeded: set[str]) -> None:
+    code = f"""
 import sys
-import translucent.preview.app
-found = {"scipy", "trimesh", "translucent.reference", "translucent.diffusion.cache"} & set(sys.modules)
+import {module}
+found = {unneeded!r} & set(sys.modules)
 assert not found, found
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -22,11 +22,10 @@ import numpy as np
 from translucent.commands.console import echo
 from translucent.commands.options import common_options
 from translucent.errors import InputError
-from translucent.gpu.dialects import Dialect
-from translucent.gpu.lifting import Lifted, lift
 
 if TYPE_CHECKING:
     from translucent.gpu.dialects import Dialect
+    from translucent.gpu.lifting import Lifted
     from translucent.gpu.std140 import UniformBlock
 
 
@@ -240,6 +239,8 @@ def translate(name: str, defines: Mapping[str, int], language: Language) -> Tran
     InputError
         If a translator is not installed or refuses the shader, or the file is a part of shaders that is not whole.
     """
+    from translucent.gpu.lifting import lift
+
     is_library = name.startswith("lib/")
     if name.endswith(".glsl") and not is_library:
         raise InputError(
