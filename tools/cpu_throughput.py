@@ -56,7 +56,7 @@ def throughput(
     work: dict[str, Callable[[], object]] = {
         "first_hit": _first_hits(tracer, bands, threads),
         "all_hits": lambda: in_threads(tracer.hits, bands, threads),
-        "frame": lambda: renderer.render(scene, size, chosen, 1),
+        "frame": lambda: renderer.render(chosen, size),
     }
     seconds: dict[str, list[float]] = {name: [] for name in work}
     for _ in range(rounds + 1):

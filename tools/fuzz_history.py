@@ -202,7 +202,7 @@ def compare(pairs: int, seed: int, backend: str | None) -> int:
                 again = scene if random.random() < 0.3 else copied(scene)
                 after = draw(renderer, again, options)
                 said = difference(before, after)
-                diffuses = isinstance(before, tl.Frame) and before.plan.given_back.solved
+                diffuses = isinstance(before, tl.Frame) and before.plan.diffuses
                 refused, solved = refused + isinstance(before, str), solved + diffuses
                 if not said and (diffuses or run % COMPARED_WITH_NEW == 0):
                     with tl.Renderer(backend) as new:

@@ -6,7 +6,6 @@ import dataclasses
 import sys
 import warnings
 from collections.abc import Callable
-from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, get_args
 from weakref import WeakKeyDictionary
@@ -20,18 +19,15 @@ from translucent.frames.frame import Frame, check_exposure
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
-from translucent.planning.caustics import Caustics, check_caustics
-from translucent.planning.choices import RenderChoices
-from translucent.planning.interface_choice import check_interfaces
+from translucent.planning.caustics import Caustics
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
-from translucent.planning.methods.base import check_method
 from translucent.planning.notes import NoteKind
-from translucent.planning.plan import plan, plan_over_backdrop
+from translucent.planning.plan import plan_scene
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Scattering
-from translucent.planning.scattering.choice import check_scattering
-from translucent.planning.shadow_maps import ShadowMaps, check_shadows
+from translucent.planning.shadow_maps import ShadowMaps
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene, check_scene
@@ -45,9 +41,6 @@ if TYPE_CHECKING:
 
 #: Backends that a user may ask for.
 BACKENDS = (*get_args(Backend), "cpu")
-
-#: More samples per pixel change nothing that 8 bits could show.
-MAX_SAMPLES = 4096
 
 
 @checked
@@ -75,7 +68,7 @@ class Renderer:
             raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(BACKENDS)}")
         if context is not None and backend is not None:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
-        self._plans: WeakKeyDictionary[Scene, dict[tuple[RenderChoices, bool], RenderPlan]] = WeakKeyDictionary()
+        self._plans: WeakKeyDictionary[Scene, dict[RenderRequest, RenderPlan]] = WeakKeyDictionary()
         self._closed = False
         self._asked = backend, context
         self._made: GpuRenderer | CpuRenderer = _engine(backend, context)
@@ -129,28 +122,16 @@ class Renderer:
         shadows: ShadowMaps | None = None,
     ) -> RenderPlan:
         """Plan that `render` would run with this renderer, with or without a backdrop."""
+        request = RenderRequest(method, 1, interfaces, scattering, caustics, shadows, over_backdrop=over_backdrop)
+        return self.plan_requested(scene, request)
+
+    def plan_requested(self, scene: Scene, request: RenderRequest) -> RenderPlan:
+        """Plan of what is requested of a scene, as `plan` makes it."""
         check_scene(scene)
-        check_method(method)
-        check_interfaces(interfaces)
-        check_scattering(scattering)
-        check_caustics(caustics)
-        check_shadows(shadows)
-        if over_backdrop and caustics is not None:
-            found = "what is drawn elsewhere has no mesh that light could land on"
-            raise InputError("caustics before a backdrop", found, "leave out one of the two")
         plans = self._plans.setdefault(scene, {})
-        asked = RenderChoices(method, interfaces, scattering, caustics, shadows)
-        if (key := (asked, over_backdrop)) not in plans:
-            make = plan_over_backdrop if over_backdrop else partial(plan, caustics=caustics)
-            plans[key] = make(
-                scene,
-                method,
-                self._engine.capabilities,
-                interfaces=interfaces,
-                scattering=scattering,
-                shadows=shadows,
-            )
-        return plans[key]
+        if request not in plans:
+            plans[request] = plan_scene(scene, request, self._engine.capabilities)
+        return plans[request]
 
     @checked_but("scene", "size", "samples", "backdrop", "method", "interfaces", "scattering", "caustics", "shadows")
     def render(
@@ -221,70 +202,65 @@ class Renderer:
         RenderError
             If the frame is larger than this OpenGL allows, or a backdrop is given to a renderer without OpenGL.
         """
-        if not isinstance(samples, int) or not 1 <= samples <= MAX_SAMPLES:
-            raise InputError(
-                f"samples {brief(samples)}", f"not a whole number in 1 to {MAX_SAMPLES}", "give for example 16"
-            )
+        over_backdrop = backdrop is not None and not transparent
+        request = RenderRequest(
+            method,
+            samples,
+            interfaces,
+            scattering,
+            caustics,
+            shadows,
+            transparent=transparent,
+            adaptive=adaptive,
+            over_backdrop=over_backdrop,
+        )
+        return self.render_requested(scene, size, request, backdrop, progress)
+
+    def render_requested(
+        self,
+        scene: Scene,
+        size: tuple[int, int],
+        request: RenderRequest,
+        backdrop: Backdrop | TextureBackdrop | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Frame:
+        """Render what is requested of a scene; see `render`."""
         self._require_open()
         size = check_size(size)
-        over_backdrop = backdrop is not None and not transparent
-        if over_backdrop:
+        if request.over_backdrop:
             _check_backdrop(backdrop, size)
-        chosen = self.plan(
-            scene,
-            method,
-            over_backdrop=over_backdrop,
-            interfaces=interfaces,
-            scattering=scattering,
-            caustics=caustics,
-            shadows=shadows,
-        )
+        elif backdrop is not None:
+            raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
+        plan = self.plan_requested(scene, request)
         try:
-            if transparent:
-                frame = self._render_transparent(scene, size, chosen, samples, backdrop, progress)
+            if request.transparent:
+                frame = self._render_transparent(plan, size, progress)
             elif backdrop is not None:
-                frame = self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop, adaptive=adaptive)
+                frame = self._gpu("a backdrop").render(plan, size, backdrop)
             else:
-                frame = self._run(scene, size, chosen, samples, progress, adaptive=adaptive)
+                frame = self._run(plan, size, progress)
         except BaseException as error:
             self._note_interruption(error)
             raise
         frame.provenance.update(self.provenance)
-        if not over_backdrop:  # such a scene is not all that is seen
-            asked = RenderChoices(method, interfaces, scattering, caustics, shadows)
-            frame = frame.rendered_from(scene, asked)
+        if not request.over_backdrop:  # such a scene is not all that is seen
+            frame = frame.rendered_from(scene, plan)
         _warn(frame)
         return frame
 
-    def _run(
-        self,
-        scene: Scene,
-        size: tuple[int, int],
-        chosen: RenderPlan,
-        samples: int,
-        progress: Callable[[float], None] | None,
-        *,
-        adaptive: bool,
-    ) -> Frame:
+    def _run(self, plan: RenderPlan, size: tuple[int, int], progress: Callable[[float], None] | None) -> Frame:
         engine = self._engine
-        if isinstance(engine, GpuRenderer):
-            return engine.render(scene, size, chosen, samples, report=progress, adaptive=adaptive)
-        return engine.render(scene, size, chosen, samples)
+        return (
+            engine.render(plan, size, report=progress) if isinstance(engine, GpuRenderer) else engine.render(plan, size)
+        )
 
     def _render_transparent(
-        self,
-        scene: Scene,
-        size: tuple[int, int],
-        chosen: RenderPlan,
-        samples: int,
-        backdrop: object,
-        progress: Callable[[float], None] | None,
+        self, plan: RenderPlan, size: tuple[int, int], progress: Callable[[float], None] | None
     ) -> Frame:
-        if backdrop is not None:
-            raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
-        white = page_radiance(scene)
+        white = page_radiance(plan.scene)
+        request = dataclasses.replace(plan.request, adaptive=False)
         before_black, before_white = (
-            self._run(before_page(scene, level), size, chosen, samples, progress, adaptive=False)
+            self._run(dataclasses.replace(plan, scene=before_page(plan.scene, level), request=request), size, progress)
             for level in (0.0, white)
         )
         passed = np.clip((before_white.radiance.astype(np.float64) - before_black.radiance) / white, 0.0, 1.0)
@@ -328,12 +304,24 @@ class Renderer:
         RenderError
             If the framebuffer is larger than this OpenGL allows, or the renderer has none.
         """
+        request = RenderRequest(method, interfaces=interfaces, scattering=scattering, shadows=shadows)
+        return self.draw_requested(scene, framebuffer, request, exposure, tone)
+
+    def draw_requested(
+        self,
+        scene: Scene,
+        framebuffer: moderngl.Framebuffer,
+        request: RenderRequest,
+        exposure: float = 0.0,
+        tone: str = "none",
+    ) -> RenderPlan:
+        """Render what is requested of a scene into a framebuffer; see `draw`."""
         self._require_open()
         tone_curve(tone)
         check_exposure(exposure)
-        chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows)
+        chosen = self.plan_requested(scene, request)
         try:
-            self.gpu.draw(scene, framebuffer, chosen, exposure, tone)
+            self.gpu.draw(chosen, framebuffer, exposure, tone)
         except BaseException as error:
             self._note_interruption(error)
             raise

@@ -18,6 +18,7 @@ from translucent.frames.frame import Frame
 from translucent.frames.tiled import Tile
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.request import RenderRequest
 from translucent.renderer import Renderer
 from translucent.scene.camera import Window, check_size
 from translucent.scene.scene import Scene
@@ -74,6 +75,21 @@ def render_tiles(
         If the sizes are not positive, or the plan needs the whole picture at once: interfaces in screen space, photons,
         or a backdrop.
     """
+    if options.pop("backdrop", None) is not None:
+        raise InputError("a picture in tiles", "a backdrop is given, too", "render it at once")
+    yield from tiles_requested(renderer, scene, size, RenderRequest(**options), tile, progress=progress)
+
+
+def tiles_requested(
+    renderer: Renderer,
+    scene: Scene,
+    size: tuple[int, int],
+    request: RenderRequest,
+    tile: tuple[int, int] = TILE,
+    *,
+    progress: Callable[[float], None] | None = None,
+) -> Iterator[Tile]:
+    """Render what is requested of a scene tile by tile; see `render_tiles`."""
     width, height = check_size(size)
     across, down = check_size(tile)
     windows = [(x, y) for y in range(0, height, down) for x in range(0, width, across)]
@@ -84,7 +100,7 @@ def render_tiles(
         share = _part(progress, number, len(windows))
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", TranslucentWarning)
-            frame = _rendered(renderer, scene, (width, height), (left, top), extent, {**options, "progress": share})
+            frame = _rendered(renderer, scene, (width, height), (left, top), extent, request, share)
         covered += int(np.count_nonzero(frame.coverage))
         invalid += int(np.count_nonzero(~frame.valid))
         for one in caught:
@@ -168,22 +184,18 @@ def _rendered(
     whole: tuple[int, int],
     corner: tuple[int, int],
     extent: tuple[int, int],
-    options: dict[str, Any],
+    request: RenderRequest,
+    progress: Callable[[float], None] | None,
 ) -> Frame:
     """The frame of a tile, rendered with what is around it if need be."""
-    if options.get("backdrop") is not None:
-        raise InputError("a picture in tiles", "a backdrop is given, too", "render it at once")
-    asked = {
-        name: options[name] for name in ("method", "interfaces", "scattering", "caustics", "shadows") if name in options
-    }
-    plan = renderer.plan(scene, **asked)
+    plan = renderer.plan_requested(scene, request)
     check_tiles(plan)
     margin = MARGIN if plan.has(PassName.TRACED, PassName.SURFACES) and plan.has(PassName.OPAQUE) else 0
     low = [max(at - margin, 0) for at in corner]
     high = [min(at + length + margin, most) for at, length, most in zip(corner, extent, whole, strict=True)]
     window = Window(low[0], low[1], whole)
     part = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, window=window))
-    frame = renderer.render(part, (high[0] - low[0], high[1] - low[1]), **options)
+    frame = renderer.render_requested(part, (high[0] - low[0], high[1] - low[1]), request, progress=progress)
     if frame.size == extent:
         return frame
     rows, columns = (slice(corner[i] - low[i], corner[i] - low[i] + extent[i]) for i in (1, 0))

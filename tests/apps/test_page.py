@@ -23,8 +23,8 @@ from tests.command_line import Run, one_error_line, strict_json
 from translucent.gpu.recording.frames import FrameRecorder
 from translucent.page.payload import MAGIC, Container
 from translucent.page.plans import TEXTURE_UNITS, plan_page, simplified, triangles
-from translucent.planning.choices import RenderChoices
 from translucent.planning.notes import NoteKind
+from translucent.planning.request import RenderRequest
 from translucent.scene.showcase import showcase
 
 _SAMPLER = re.compile(r"^uniform [iu]?sampler\w+ (\w+)", re.MULTILINE)
@@ -155,7 +155,7 @@ def test_peeled_pages_tell_one_number_of_surfaces(method: tl.DepthPeeling | None
     made = trimesh.creation.torus(0.02, 0.008, major_sections=8, minor_sections=6)
     bodies += [ball(medium=bodies[0].medium)]
     bodies = [dataclasses.replace(body, mesh=tl.Mesh(made.vertices, made.faces)) for body in bodies]
-    planned = plan_page(scene_of(*bodies), method)
+    planned = plan_page(scene_of(*bodies), RenderRequest(method))
     most = 16 if method is None else min(method.max_layers, 16)
     (told,) = [str(note) for note in planned.notes if note.kind is NoteKind.LAYER_LIMIT]
     assert str(most) in told
@@ -189,9 +189,9 @@ def test_no_shader_reads_more_textures_than_webgl2_promises(overlap: str) -> Non
     scene = showcase(ball().mesh, milk, (64, 40))
     bodies = [*scene.objects, ball(transform=np.diag([0.4, 0.4, 0.4, 1.0]), priority=1)]
     scene = dataclasses.replace(scene, objects=bodies, overlap=overlap)
-    planned = plan_page(scene, scattering=tl.Diffusion(resolution=8), shadows=tl.ShadowMaps(64))
+    planned = plan_page(scene, RenderRequest(scattering=tl.Diffusion(resolution=8), shadows=tl.ShadowMaps(64)))
     recorder = FrameRecorder(4, planned.most_layers, planned.texture_units)
-    frame = recorder.record(planned.scene, planned.plan)
+    frame = recorder.record(planned.plan)
     assert planned.plan.traced is False
     assert frame.single
     assert frame.averaged
@@ -202,9 +202,9 @@ def test_no_shader_reads_more_textures_than_webgl2_promises(overlap: str) -> Non
 def test_queries_are_not_drawn() -> None:
     """WebGL2 refuses draws by shaders without outputs, as those of the query that ends depth peeling."""
     scene = scene_of(ball(), ball(medium=None, color=(0.5, 0.5, 0.5)))
-    planned = plan_page(scene, tl.DepthPeeling(8))
+    planned = plan_page(scene, RenderRequest(tl.DepthPeeling(8)))
     recorder = FrameRecorder(4, planned.most_layers, planned.texture_units)
-    recorder.record(planned.scene, planned.plan)
+    recorder.record(planned.plan)
     fragments = [fragment for _, fragment in recorder.gl.programs]
     assert any("previous" in text for text in fragments)
     assert not any("found" in text and "discard" in text and not re.search(r"\bout vec", text) for text in fragments)
@@ -264,7 +264,9 @@ def test_what_has_no_page_says_what_to_do(renderer: tl.Renderer) -> None:
     with pytest.raises(tl.InputError, match=r"to_html exposure 'Wine'; it is of type str"):
         frame.to_html("Wine")  # type: ignore[arg-type]
     with pytest.raises(tl.InputError, match=r"caustics.*render without"):
-        dataclasses.replace(frame, choices=RenderChoices(caustics=tl.Caustics(100))).to_html()
+        dataclasses.replace(
+            frame, plan=dataclasses.replace(frame.plan, request=RenderRequest(caustics=tl.Caustics(100)))
+        ).to_html()
     behind = tl.Backdrop(np.zeros((3, 4, 3)), np.full((3, 4), np.inf))
     with pytest.raises(tl.InputError, match=r"holds no scene.*tl.write_page"):
         renderer.render(scene, (4, 3), backdrop=behind).to_html()

@@ -19,6 +19,7 @@ from translucent.gpu.layout import BLOCKS, BODY
 from translucent.gpu.recording.frames import SIZE, FrameRecorder
 from translucent.page.payload import payload
 from translucent.page.plans import plan_page
+from translucent.planning.request import RenderRequest
 
 _SCRIPT = Path(__file__).with_name("blocks.mjs")
 
@@ -66,7 +67,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     if (node := shutil.which("node")) is None:
         pytest.skip("node is not here")
     file = tmp_path_factory.mktemp("blocks") / "page.bin"
-    planned = plan_page(_scene(), interfaces=tl.ScreenInterfaces(), shadows=tl.ShadowMaps(64))
+    planned = plan_page(_scene(), RenderRequest(interfaces=tl.ScreenInterfaces(), shadows=tl.ShadowMaps(64)))
     file.write_bytes(payload(planned, "blocks", SIZE, 2, 0.0, "none"))
     asked = {"file": str(file), "size": SIZE, "cameras": [_told(camera) for camera in _CAMERAS]}
     done = subprocess.run([node, str(_SCRIPT)], input=json.dumps(asked), capture_output=True, text=True, check=True)
@@ -77,8 +78,8 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
 @pytest.mark.parametrize("number", range(len(_CAMERAS)))
 def test_blocks_are_the_renderers(answers: list[dict[str, Any]], number: int) -> None:
     scene = dataclasses.replace(_scene(), camera=_CAMERAS[number])
-    planned = plan_page(scene, interfaces=tl.ScreenInterfaces(), shadows=tl.ShadowMaps(64))
-    frame = FrameRecorder(2, planned.most_layers, planned.texture_units).record(scene, planned.plan)
+    planned = plan_page(scene, RenderRequest(interfaces=tl.ScreenInterfaces(), shadows=tl.ShadowMaps(64)))
+    frame = FrameRecorder(2, planned.most_layers, planned.texture_units).record(planned.plan)
     for block in BLOCKS.values():
         if (expected := frame.blocks.get(block.binding)) is not None:
             _assert_same(answers[number]["blocks"][block.name], expected, block.dtype)

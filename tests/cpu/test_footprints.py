@@ -72,7 +72,7 @@ def test_both_renderers_average_alike(renderer: tl.Renderer) -> None:
     knot = tl.Object(tl.load_mesh(mesh_path("knot")), tl.Medium(absorption=(2.0, 1.0, 1.5), ior=1.5))
     scene = tl.Scene([knot], framing([knot], (32, 24)), environment=tl.Environment.studio())
     drawn = renderer.render(scene, (32, 24), samples=1, interfaces=tl.TracedInterfaces())
-    found = CpuRenderer().render(scene, (32, 24), drawn.plan, samples=1)
+    found = CpuRenderer().render(drawn.plan, (32, 24))
     apart = np.abs(found.radiance - drawn.radiance)[drawn.coverage & found.coverage]
     assert np.median(apart) < 2e-3
     assert np.quantile(apart, 0.9) < 0.02

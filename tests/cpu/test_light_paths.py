@@ -79,7 +79,7 @@ def test_frames_have_the_shadows_of_the_reference(directions: int) -> None:
         environment_shadows=directions,
     )
     renderer = CpuRenderer(2)
-    frame = renderer.render(scene, (40, 30), tl.plan(scene, None, renderer.capabilities), 1)
+    frame = renderer.render(tl.plan(scene, None, renderer.capabilities), (40, 30))
     truth = tl.reference.render(scene, (40, 30))
     # Float32 holds 24 bits.
     np.testing.assert_allclose(frame.radiance, truth.radiance, rtol=1e-7)

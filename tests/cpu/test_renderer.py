@@ -22,6 +22,8 @@ from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import ARRAYS
 from translucent.geometry.solids import Box, Solid, Sphere, Torus
 from translucent.planning.assembly import FALLBACK_SHEET
+from translucent.planning.plan import plan_scene
+from translucent.planning.request import RenderRequest
 
 SIZE = (48, 36)
 EPS = float(np.finfo(np.float32).eps)
@@ -33,7 +35,7 @@ BOX = Box((-0.4, -0.3, -0.6), (0.5, 0.7, 0.2))
 
 
 def frame_of(scene: tl.Scene, size: tuple[int, int] = SIZE, samples: int = 1, threads: int | None = None) -> tl.Frame:
-    return CpuRenderer(threads).render(scene, size, tl.plan(scene), samples)
+    return CpuRenderer(threads).render(plan_scene(scene, RenderRequest(samples=samples)), size)
 
 
 def moved(x: float) -> np.ndarray:
@@ -210,15 +212,15 @@ def test_sizes_and_densities_beyond_float32(scale: float, absorption: float) -> 
 def test_meshes_are_kept_until_the_renderer_is_closed() -> None:
     scene = SCENES["one body"]
     renderer = CpuRenderer()
-    first = renderer.render(scene, SIZE, tl.plan(scene), 1)
+    first = renderer.render(tl.plan(scene), SIZE)
     elsewhere = replace(scene, camera=tl.Camera.look_at((3.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
-    again = renderer.render(elsewhere, SIZE, tl.plan(elsewhere), 1)
+    again = renderer.render(tl.plan(elsewhere), SIZE)
     assert not np.array_equal(first.thickness, again.thickness)
-    np.testing.assert_array_equal(renderer.render(scene, SIZE, tl.plan(scene), 1).thickness, first.thickness)
+    np.testing.assert_array_equal(renderer.render(tl.plan(scene), SIZE).thickness, first.thickness)
     renderer.close()
     renderer.close()
     with pytest.raises(tl.RenderError, match="the renderer is closed; make a new one"):
-        renderer.render(scene, SIZE, tl.plan(scene), 1)
+        renderer.render(tl.plan(scene), SIZE)
 
 
 def test_bad_size() -> None:

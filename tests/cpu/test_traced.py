@@ -20,6 +20,9 @@ from translucent.cpu.renderer import CpuRenderer
 from translucent.formulas.interface import slab_reflectance, slab_transmittance
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.notes import NoteKind
+from translucent.planning.plan import plan_scene
+from translucent.planning.rendered import Treatment
+from translucent.planning.request import RenderRequest
 from translucent.reference import pixel_rays
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.render import scene_hits
@@ -224,9 +227,9 @@ def test_rough_bodies_are_as_the_reference_has_them() -> None:
 
 def test_frames_show_the_tree_where_interfaces_are() -> None:
     scene = scene_of(glass(), glass(medium=DYE, x=-1.5), environment=tl.Environment.studio())
-    frames = [CpuRenderer(threads).render(scene, (32, 24), tl.plan(scene), samples=2) for threads in (1, 3)]
+    frames = [CpuRenderer(threads).render(plan_scene(scene, RenderRequest(samples=2)), (32, 24)) for threads in (1, 3)]
     straight = replace(scene, objects=[replace(scene.objects[0], medium=replace(GLASS, ior=1.0)), scene.objects[1]])
-    without = CpuRenderer().render(straight, (32, 24), tl.plan(straight), samples=2)
+    without = CpuRenderer().render(plan_scene(straight, RenderRequest(samples=2)), (32, 24))
     for name in ("radiance", "transmittance", "thickness", "valid", "coverage"):
         np.testing.assert_array_equal(getattr(frames[0], name), getattr(frames[1], name))
         assert np.array_equal(getattr(frames[0], name), getattr(without, name)) == (name != "radiance"), name
@@ -240,7 +243,7 @@ def test_frames_show_the_tree_where_interfaces_are() -> None:
 )
 def test_pictures_are_near_full_light_transport(name: str, most: float, transport: ModuleType) -> None:
     scene, side = transport.make(name)
-    frame = CpuRenderer().render(scene, (side, side), tl.plan(scene), samples=8)
+    frame = CpuRenderer().render(plan_scene(scene, RenderRequest(samples=8)), (side, side))
     assert transport.errors(frame.radiance, transport.load(name))["nrmse"] < most
 
 
@@ -252,7 +255,7 @@ def test_light_that_diffuses_is_that_of_opengl(renderer: tl.Renderer) -> None:
     scene = tl.Scene([ball], camera, environment=tl.Environment.gradient((0, 0, 0), (1, 1, 1)))
     with tl.Renderer("cpu") as other:
         found, expected = (one.render(scene, (24, 24), scattering=tl.Diffusion(16)) for one in (other, renderer))
-    assert found.plan.given_back.diffused == (0,)
+    assert found.plan.treated(Treatment.DIFFUSION) == (0,)
     seen = found.coverage & expected.coverage & (expected.thickness > 0.5)
     assert seen.sum() > 100
     np.testing.assert_allclose(found.radiance[seen], expected.radiance[seen], rtol=0.01, atol=2e-3)

@@ -176,7 +176,7 @@ def photons_in(renderer: tl.Renderer, one: tl.Scene, size: tuple[int, int], caus
     """(h, w, 3): irradiance of photons on the opaque objects that a picture shows."""
     gpu, plan = renderer.gpu, renderer.plan(one, caustics=caustics)
     with gpu.context.current():
-        job = gpu.prepare(one, size, plan)
+        job = gpu.prepare(plan, size)
         gpu.run(job)
         data = job.targets.photons().read(components=4, dtype="f4")
         job.release()
@@ -331,7 +331,7 @@ def test_a_frame_that_is_run_again_shows_the_same(renderer: tl.Renderer) -> None
     gpu, one = renderer.gpu, scene()
     plan, pictures = renderer.plan(one, caustics=tl.Caustics(500)), []
     with gpu.context.current():
-        job = gpu.prepare(one, (16, 12), plan)
+        job = gpu.prepare(plan, (16, 12))
         for _ in range(2):
             gpu.run(job)
             pictures.append(job.targets.opaque().read(components=4, attachment=1, dtype="f4"))

@@ -63,7 +63,7 @@ def test_it_is_the_frame_of_whole_targets(renderer: tl.Renderer, name: str) -> N
     renderer.render(balls(1, environment=tl.Environment.checkerboard()), SIZE)  # into the same targets
     gpu = renderer.gpu
     with gpu.context.current():
-        job = gpu.prepare(scene, SIZE, renderer.plan(scene, method))
+        job = gpu.prepare(renderer.plan(scene, method), SIZE)
         gpu.run(job)
         whole = gpu.read(job)
         job.release()
@@ -84,7 +84,7 @@ def test_media_have_an_accumulator_each_up_to_three(renderer: tl.Renderer) -> No
     for count in range(1, 5):
         scene = balls(count)
         with renderer.gpu.context.current():
-            job = renderer.gpu.prepare(scene, SIZE, renderer.plan(scene), compact=True)
+            job = renderer.gpu.prepare(renderer.plan(scene), SIZE, compact=True)
             apart.append(None if job.media_apart is None else job.media_apart.tolist())
             job.release()
     assert apart[0] is None

@@ -16,6 +16,7 @@ from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.formulas.diffuse_interface import half_space_reflectance
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.planning.notes import NoteKind
+from translucent.planning.rendered import Treatment
 from translucent.planning.scattering import diffusion
 
 BALL = Sphere().tessellate(48)
@@ -59,7 +60,7 @@ def test_pictures_are_near_full_light_transport(
     """
     scene, size = transport.make(name)
     frame = renderer.render(scene, (size, size), samples=samples)
-    assert frame.plan.given_back.diffused == (0,)
+    assert frame.plan.treated(Treatment.DIFFUSION) == (0,)
     assert frame.valid.all()
     found = transport.errors(frame.radiance, transport.load(name))
     assert found[measure] < most, found
@@ -190,7 +191,7 @@ def test_bodies_of_uneven_density_vanish_in_white_light(renderer: tl.Renderer) -
     with tl.Renderer(backend="cpu") as other:
         for one in (renderer, other):
             frame = one.render(tl.Scene([ball], CAMERA, (), WHITE), (10, 10), scattering=tl.Diffusion(16))
-            assert frame.plan.given_back.diffused == (0,)
+            assert frame.plan.treated(Treatment.DIFFUSION) == (0,)
             covered = frame.radiance[frame.coverage]
             assert covered.mean() == pytest.approx(1.0, abs=0.03)
             assert np.abs(covered - 1.0).max() < 0.2
@@ -202,7 +203,7 @@ def test_bodies_without_an_interface_are_seen_by_their_angle(renderer: tl.Render
     scene = lit_ball(tl.Medium(absorption=60.0, scattering=240.0), lights=[], camera=camera)
     with tl.Renderer(backend="cpu") as other:
         frames = [one.render(scene, (24, 24)) for one in (renderer, other)]
-    assert all(frame.plan.given_back.diffused == (0,) for frame in frames)
+    assert all(frame.plan.treated(Treatment.DIFFUSION) == (0,) for frame in frames)
     disk = frames[0].thickness > 0.0
     for frame in frames:
         assert frame.radiance[disk].mean() == pytest.approx(half_space_reflectance(0.8, 1.0), rel=0.03)

@@ -42,7 +42,7 @@ def features(
     capabilities: Capabilities | None = None,
     interfaces: Interfaces | None = None,
 ) -> FrameFeatures:
-    return FrameFeatures(found, plan(found, method, capabilities or Capabilities(), interfaces=interfaces))
+    return FrameFeatures(plan(found, method, capabilities or Capabilities(), interfaces=interfaces))
 
 
 def flags(found: FrameFeatures) -> set[str]:

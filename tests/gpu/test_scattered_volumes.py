@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter
 import translucent as tl
 from translucent.diffusion.volume import DiffusingVolume, VolumeField, VolumeGrid
 from translucent.geometry.solids import Box, Sphere
+from translucent.planning.rendered import Treatment
 
 SIZE = (12, 12)
 SKY = tl.Environment.gradient((0.2, 0.1, 0.05), (1, 1, 1))
@@ -73,7 +74,7 @@ def test_clouds_are_near_full_light_transport(renderer: tl.Renderer, scene: tl.S
         return float(np.sqrt(max(square, 0.0)) / one.radiance[inside].mean())
 
     print(f"{error(frame.radiance):.3f}, scattered once {error(once.radiance):.3f}")
-    assert frame.plan.given_back.volumes == (0,)
+    assert frame.plan.treated(Treatment.VOLUME) == (0,)
     assert frame.valid.all()
     assert error(frame.radiance) < most
     assert error(once.radiance) > 0.25
@@ -147,7 +148,7 @@ def test_several_clouds_have_their_own_light(renderer: tl.Renderer) -> None:
     coarse = tl.Diffusion(16)
     together = renderer.render(replace(scene, objects=[body, other, drop]), SIZE, scattering=coarse)
     alone = renderer.render(scene, SIZE, scattering=coarse)
-    assert together.plan.given_back.volumes == (0, 1)
+    assert together.plan.treated(Treatment.VOLUME) == (0, 1)
     clear = renderer.render(replace(scene, objects=[other]), SIZE, scattering=coarse).thickness == 0.0
     both = clear & (alone.thickness > 0.0)
     assert both.any()

@@ -12,6 +12,7 @@ import translucent as tl
 from tests import references
 from translucent.formulas.light import cone_attenuation
 from translucent.geometry.solids import Box, Sphere
+from translucent.planning.rendered import Treatment
 from translucent.reference import path_trace
 
 BLACK = tl.Environment.constant((0, 0, 0))
@@ -199,7 +200,7 @@ def test_fog_shows_a_beam_as_random_paths_do(renderer: tl.Renderer, follows: Non
     scene = tl.Scene([fog], near_camera(), [tl.SpotLight((2.5, 1, 2), (-2.5, -1, -2), 9.0, 4, 10)], BLACK)
     frame = renderer.render(scene, (12, 12), scattering=tl.Diffusion(20))
     truth = renderer.render(scene, (12, 12), tl.PathTraced(300))
-    assert frame.plan.given_back.volumes == (0,)
+    assert frame.plan.treated(Treatment.VOLUME) == (0,)
     assert frame.radiance.mean() == pytest.approx(truth.radiance.mean(), rel=0.08)
 
 

@@ -38,7 +38,7 @@ def recorded(scene: tl.Scene, plan: tl.RenderPlan, monkeypatch: pytest.MonkeyPat
     """Bytes of each pass, counted from the draws, clears and textures that it asks for."""
     monkeypatch.setattr(frames, "RecordedJob", partial(frames.RecordedJob, compact=True))
     recorder = frames.FrameRecorder(1, 4, 32)
-    steps = recorder.record(scene, plan).single
+    steps = recorder.record(plan).single
     gl, units = recorder.gl, {"f4": 4, "f1": 1, "u4": 4}
 
     def size(number: int) -> int:
@@ -73,7 +73,7 @@ def recorded(scene: tl.Scene, plan: tl.RenderPlan, monkeypatch: pytest.MonkeyPat
 def test_it_is_what_passes_ask_for(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     scene, method, more = PLANS[name]
     plan = tl.plan(scene, method, **more)
-    told = {step.name.value: step for step in frame_traffic(scene, plan).passes if step.pixel is not None}
+    told = {step.name.value: step for step in frame_traffic(plan).passes if step.pixel is not None}
     found = recorded(scene, plan, monkeypatch)
     special = {"screen space": PassName.SURFACES, "traced": PassName.TRACED, "back faces": PassName.BACK_FACE_DEPTH}
     assert {PassName.TRANSMITTANCE, special.get(name, PassName.TRANSMITTANCE)} <= told.keys()
@@ -96,10 +96,10 @@ def test_what_is_read_back_is_what_a_renderer_reads(monkeypatch: pytest.MonkeyPa
         for scene, method in scenes.values():
             taken.clear()
             frame = renderer.render(scene, SIZE, method)
-            assert sum(taken) == frame_traffic(scene, frame.plan).read_back * SIZE[0] * SIZE[1]
+            assert sum(taken) == frame_traffic(frame.plan).read_back * SIZE[0] * SIZE[1]
         taken.clear()
         frame = renderer.render(screen[0], SIZE, **screen[2])
-        assert sum(taken) == frame_traffic(screen[0], frame.plan).read_back * SIZE[0] * SIZE[1]
+        assert sum(taken) == frame_traffic(frame.plan).read_back * SIZE[0] * SIZE[1]
 
 
 def test_formats_are_those_of_the_textures() -> None:
@@ -117,7 +117,7 @@ def test_formats_are_those_of_the_textures() -> None:
 
 def test_it_is_told_in_words_and_as_json() -> None:
     scene = balls(1)
-    told = frame_traffic(scene, tl.plan(scene))
+    told = frame_traffic(tl.plan(scene))
     assert str(told).splitlines() == [
         "bytes in targets at most, of one sample:",
         "  signed_depth: 0 read, 8 written per pixel and 8 read, 8 written for each face over it",

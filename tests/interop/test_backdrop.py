@@ -10,11 +10,11 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
+from tests.values.plan_scenes import plan_over_backdrop
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.placement import AxialRange
-from translucent.planning.plan import plan_over_backdrop
 
 Array = npt.NDArray[Any]
 
@@ -51,7 +51,7 @@ def bodies_of(scene: tl.Scene) -> tl.Scene:
 def opaque_picture(renderer: tl.Renderer, scene: tl.Scene, method: Any = None) -> tuple[Array, Array]:
     """Radiance, and metres along the forward axis, of what the pass of opaque objects draws."""
     with renderer.gpu.context.current():
-        job = renderer.gpu.prepare(scene, SIZE, renderer.plan(scene, method))
+        job = renderer.gpu.prepare(renderer.plan(scene, method), SIZE)
         renderer.gpu.run(job)
         target = job.targets.opaque()
         axial_depth, radiance = (
@@ -139,7 +139,7 @@ def test_depth_of_textures_becomes_metres(renderer: tl.Renderer, far: float, ort
         color, z = gl.texture(SIZE, 4, encoded.tobytes()), gl.depth_texture(SIZE, depth.tobytes())
         z.compare_func = ""
         backdrop = TextureBackdrop(color, z, near, far, orthographic, gamma)
-        job = renderer.gpu.prepare(scene, SIZE, renderer.plan(scene, over_backdrop=True), backdrop)
+        job = renderer.gpu.prepare(renderer.plan(scene, over_backdrop=True), SIZE, backdrop)
         renderer.gpu.run(job)
         target = job.targets.opaque()
         axial_depth = np.frombuffer(target.read(components=1, attachment=0, dtype="f4"), np.float32).reshape(SIZE[::-1])

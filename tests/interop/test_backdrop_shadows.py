@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
+from tests.values.plan_scenes import plan_over_backdrop
 from translucent.geometry.solids import Box, Sphere
-from translucent.planning.plan import plan_over_backdrop
 
 Array = npt.NDArray[Any]
 

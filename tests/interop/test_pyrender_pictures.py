@@ -123,7 +123,7 @@ def test_the_floor_ends_the_path_through_the_ball(renderer: tl.Renderer, studio:
 def _ahead(renderer: tl.Renderer, scene: tl.Scene) -> Array:
     """Metres along the forward axis of the nearest opaque surface, as our own pass draws it."""
     with renderer.gpu.context.current():
-        job = renderer.gpu.prepare(scene, SIZE, renderer.plan(scene))
+        job = renderer.gpu.prepare(renderer.plan(scene), SIZE)
         renderer.gpu.run(job)
         texels = job.targets.opaque().read(components=1, attachment=0, dtype="f4")
         axial_depth = np.frombuffer(texels, np.float32).reshape(SIZE[::-1])[::-1].astype(np.float64)

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -106,15 +107,15 @@ def scenes() -> dict[str, tl.Scene]:
     }
 
 
-def needed(*frames: tuple[tl.Scene, tl.RenderPlan]) -> list[set[ProgramName]]:
-    """Programs that a new renderer has made, after each of some scenes that it draws by their plans."""
+def needed(*plans: tl.RenderPlan) -> list[set[ProgramName]]:
+    """Programs that a new renderer has made, after each of some plans that it draws."""
     found = []
     with tl.Renderer() as renderer:
         gl = renderer.gpu.context.gl
         gl.extra = budget = CompileBudget()
         with renderer.gpu.context.current():
-            for scene, plan in frames:
-                renderer.gpu.draw(scene, gl.simple_framebuffer(SIZE), plan, 0.0, "none")
+            for plan in plans:
+                renderer.gpu.draw(plan, gl.simple_framebuffer(SIZE), 0.0, "none")
                 found.append(set(budget.needed))
     return found
 
@@ -130,7 +131,8 @@ def test_what_stands_in_for_a_scene_is_drawn_with_its_programs(name: str) -> Non
                 continue
             # Cells take time, and are those of all methods: the picture in full is drawn by the planner's own alone.
             quick = preparation._quick(plan)
-            before, after = needed((stand_in(scene), quick), (scene, plan if method is None else quick))
+            own = plan if method is None else replace(quick, scene=plan.scene)
+            before, after = needed(quick, own)
             assert after == before, method
 
 
@@ -163,7 +165,7 @@ def test_programs_are_compiled_elsewhere_for_each_kind_of_texture() -> None:
             scene = painted(side)
             plan = renderer.plan(scene, interfaces=tl.ScreenInterfaces())
             budget.begin_frame(60.0)
-            renderer.gpu.draw(scene, gl.simple_framebuffer(SIZE), plan, 0.0, "none")
+            renderer.gpu.draw(plan, gl.simple_framebuffer(SIZE), 0.0, "none")
 
         with renderer.gpu.context.current():
             draw(60)
@@ -185,7 +187,7 @@ def test_what_adds_samples_is_made_in_frames_of_its_own() -> None:
         viewport.resize(SIZE)
         budget.begin_frame(60.0)
         for _ in range(2):
-            viewport.step(0, scene, plan, 1)
+            viewport.step(0, plan, 1)
         wanted = viewport.mean_radiance()
         viewport.restart()
         viewport._added.clear()  # all else is there
@@ -195,7 +197,7 @@ def test_what_adds_samples_is_made_in_frames_of_its_own() -> None:
             budget.begin_frame(-1.0)
             before = viewport.steps(0)
             with suppress(PostponedError):
-                viewport.step(0, scene, plan, 1)
+                viewport.step(0, plan, 1)
             steps.append(viewport.steps(0) > before)
         assert viewport.mean_radiance() == pytest.approx(wanted, rel=1e-6)
         viewport.release()
@@ -225,19 +227,19 @@ def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
     with tl.Renderer() as renderer:
         plans = [renderer.plan(scene), renderer.plan(scene, tl.DepthPeeling())]
         compiler.device = renderer.gpu.context.renderer
-    compiler.request("", scene, plans, found.append)
+    compiler.request("", plans, found.append)
     while not found:
         compiler.lane.poll(pytest.fail)
         time.sleep(0.002)
     compiler.lane.close()
-    assert found == [Compiled(frozenset().union(*(needed((scene, plan))[0] for plan in plans)))]
+    assert found == [Compiled(frozenset().union(*(needed(plan)[0] for plan in plans)))]
 
 
 def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> None:
     near.set()
-    scene, compiler, found = stand_in(showcase(BALL, GLASS, stage="none")), Compiler(work.pool), list[Compiled]()
+    compiler, found = Compiler(work.pool), list[Compiled]()
     compiler.device = "a card from the future"
-    compiler.request("", scene, [], found.append)
+    compiler.request("", [], found.append)
     while not found:
         compiler.lane.poll(pytest.fail)
         time.sleep(0.002)
@@ -375,11 +377,11 @@ def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierar
     work.do(ChoosePreset("merlot"))
     view.draw(work, SIZE)
     assert "until rays can be traced" in view.quality.notes[0]
-    assert isinstance(view.quality.interfaces, tl.ScreenInterfaces)
+    assert isinstance(view.quality.request.interfaces, tl.ScreenInterfaces)
     assert not has_packed(mesh)
     near.set()
     finish(view, work)
-    assert (view.quality.notes[0], view.quality.interfaces) == ("", None)
+    assert (view.quality.notes[0], view.quality.request.interfaces) == ("", None)
     assert has_packed(mesh)
     assert view.plans[0] is not None
     assert view.plans[0].has(PassName.TRACED)

@@ -14,6 +14,7 @@ import translucent as tl
 from tests.preview.waiting import wait
 from translucent.files.paths import write_atomically
 from translucent.geometry.solids import Box
+from translucent.planning.request import RenderRequest
 from translucent.preview import exports, worker
 from translucent.preview.document import Document, Model
 from translucent.preview.exports import write_picture, write_turntable
@@ -27,7 +28,7 @@ SCENE = showcase(Box((-0.01, -0.01, -0.01), (0.01, 0.01, 0.01)).tessellate(), si
 
 @pytest.mark.parametrize("transparent", [False, True])
 def test_a_picture_is_the_one_that_render_makes(tmp_path: Path, transparent: bool) -> None:
-    write_picture(str(tmp_path / "a.png"), SCENE, None, SIZE, (0.5, "neutral"), transparent)
+    write_picture(str(tmp_path / "a.png"), SCENE, SIZE, (0.5, "neutral"), RenderRequest(transparent=transparent))
     with tl.Renderer() as renderer:
         renderer.render(SCENE, SIZE, samples=16, transparent=transparent).save(tmp_path / "b.png", 0.5, "neutral")
     written, expected = (np.asarray(Image.open(tmp_path / name)) for name in ("a.png", "b.png"))
@@ -38,7 +39,7 @@ def test_a_picture_is_the_one_that_render_makes(tmp_path: Path, transparent: boo
 def test_a_turntable_shows_the_model_from_all_around(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     at: list[str] = []
     monkeypatch.setattr(exports, "report", lambda _, detail: at.append(detail))
-    write_turntable(str(tmp_path / "a.gif"), SCENE, None, SIZE, count=3)
+    write_turntable(str(tmp_path / "a.gif"), SCENE, SIZE, count=3)
     assert at == ["picture 1 of 3", "picture 2 of 3", "picture 3 of 3"]
     with Image.open(tmp_path / "a.gif") as moving:
         assert (moving.n_frames, moving.size) == (3, SIZE)
@@ -46,9 +47,9 @@ def test_a_turntable_shows_the_model_from_all_around(tmp_path: Path, monkeypatch
 
 def test_the_window_has_another_process_write(work: Workspace, tmp_path: Path) -> None:
     path = tmp_path / "a.png"
-    work.export(str(path), write_picture, SCENE, None, SIZE)
+    work.export(str(path), write_picture, SCENE, SIZE)
     assert [task.name for task in work.busy if task.name.startswith("writing")] == ["writing a.png"]
-    work.export(str(tmp_path / "b.png"), write_picture, SCENE, None, SIZE)
+    work.export(str(tmp_path / "b.png"), write_picture, SCENE, SIZE)
     assert "b.png' is not written; writing a.png is under way" in work.messages[-1].text
     wait(work, lambda: work.lanes["write"].task is None)
     assert work.messages[-1].text == f"wrote {path}"
@@ -59,7 +60,7 @@ def test_the_window_has_another_process_write(work: Workspace, tmp_path: Path) -
 
 def test_what_cannot_be_written_is_told_at_once(work: Workspace, tmp_path: Path) -> None:
     for name, reason in (("a.tiff", "suffix '.tiff'"), ("none/a.png", "none")):
-        work.export(str(tmp_path / name), write_picture, SCENE, None, SIZE)
+        work.export(str(tmp_path / name), write_picture, SCENE, SIZE)
         assert work.lanes["write"].task is None
         assert work.messages[-1].kind == "error"
         assert reason in work.messages[-1].text

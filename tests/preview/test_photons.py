@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,8 @@ from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.photon_light import PhotonLight
 from translucent.gpu.viewport import Viewport
 from translucent.planning import caustics
+from translucent.planning.rendered import Treatment
+from translucent.planning.request import RenderRequest
 from translucent.preview import refining
 from translucent.preview.actions import SetField, Turn
 from translucent.preview.document import Document, Model
@@ -45,7 +46,7 @@ def test_rounds_add_up_to_the_photons_of_one_frame(view: ViewportRenderer) -> No
     with view.current():
         viewport = Viewport(view.renderer.gpu)
         viewport.resize(SIZE)
-        light = PhotonLight(view.renderer.gpu, LIT, viewport.size, plan)
+        light = PhotonLight(view.renderer.gpu, plan, viewport.size)
         errors, lights = [], []
         for rounds in (4, 8, 16):
             while light.rounds < rounds:
@@ -56,7 +57,7 @@ def test_rounds_add_up_to_the_photons_of_one_frame(view: ViewportRenderer) -> No
             lights.append(light._shown[1])
         assert light.photons == 16 * ROUND
         for _ in range(4):
-            viewport.step(0, LIT, plan, 2, photons=light.texture)
+            viewport.step(0, plan, 2, photons=light.texture)
         side = viewport._side(0, SIZE)
         kept = np.frombuffer(side.light.read(components=4, dtype="f4"), np.float32).reshape(SIZE[1], SIZE[0], 4)
         place = [side.kept(x, y) for y in range(SIZE[1]) for x in range(SIZE[0])]
@@ -123,7 +124,7 @@ def test_what_has_no_caustics_says_why_and_keeps_its_picture(view: ViewportRende
 
 def test_files_have_the_photons(tmp_path: Path) -> None:
     photons = tl.Caustics(ROUND)
-    write_picture(str(tmp_path / "a.png"), LIT, None, (32, 24), caustics=photons)
+    write_picture(str(tmp_path / "a.png"), LIT, (32, 24), request=RenderRequest(caustics=photons))
     with tl.Renderer() as renderer:
         frame = renderer.render(LIT, (32, 24), samples=16, caustics=photons)
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "a.png")), frame.to_srgb8())
@@ -154,8 +155,8 @@ def test_photons_in_media_are_followed_aside(
     found, lane = refining.PhotonRefinement(), work.lanes["diffuse"]
 
     def ready() -> bool:
-        plan = partial(view.renderer.plan, scene, scattering=tl.Diffusion(8))
-        return found.ready(work, scene, view.renderer, view.viewport, plan, 0.1, 0.0)
+        request = RenderRequest(scattering=tl.Diffusion(8))
+        return found.ready(work, scene, view.renderer, view.viewport, request, 0.1, 0.0)
 
     with view.current():
         assert not ready()
@@ -166,7 +167,7 @@ def test_photons_in_media_are_followed_aside(
         assert found.note == "caustics: 1,024 photons in media"
         shown = found.show_media(view.viewport)
         assert shown is not None
-        assert shown.given_back.volumes == (1,)
+        assert shown.treated(Treatment.VOLUME) == (1,)
         assert found.show_media(view.viewport) is None
         assert found.stop(view.viewport)
     assert found.note == ""

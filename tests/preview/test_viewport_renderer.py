@@ -17,6 +17,7 @@ import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.rendered import Treatment
 from translucent.preview import quality, viewport_renderer
 from translucent.preview.actions import ChoosePreset, SetField, Turn
 from translucent.preview.document import Model
@@ -72,13 +73,13 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     monkeypatch.setattr(viewport_renderer, "BUDGET", 0.0 if slow else 1e9)
     monkeypatch.setattr(StepTimes, "stride", lambda *_: 4 if slow else 1)  # not 256 steps for a picture
     drawn: list[RenderPlan] = []
-    draw = view.renderer.draw
+    draw = view.renderer.draw_requested
 
     def spied(*given: Any, **options: Any) -> RenderPlan:
         drawn.append(draw(*given, **options))
         return drawn[-1]
 
-    monkeypatch.setattr(view.renderer, "draw", spied)
+    monkeypatch.setattr(view.renderer, "draw_requested", spied)
     for _ in range(2):
         work.do(Turn(20.0, 10.0))
         assert view.draw(work, SIZE)
@@ -121,10 +122,10 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(
     assert view.draw(work, SIZE)
     assert "until its diffusion is solved for" in view.quality.notes[1]
     assert view.plans[0] is not None
-    assert view.plans[0].given_back.layered == (0,)
+    assert view.plans[0].treated(Treatment.LAYER) == (0,)
     finish(view, work)
     assert view.quality.notes[1] == ""
-    assert view.plans[0].given_back.diffused == (0,)
+    assert view.plans[0].treated(Treatment.DIFFUSION) == (0,)
     scene = work.scene()
     assert scene is not None
     with view.current():
@@ -136,13 +137,13 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(
         work.do(action)
         view.draw(work, SIZE)
         assert (told in view.quality.notes[1]) if told else not view.quality.notes[1]
-        assert view.plans[0].given_back.diffusion == (SMALL if told else tl.Diffusion())
+        assert view.plans[0].diffusion == (SMALL if told else tl.Diffusion())
         assert work.lanes["diffuse"].task is None  # while the light moves, nothing is looked for that nobody will see
     finish(view, work)
-    assert view.plans[0].given_back.diffusion == tl.Diffusion()
+    assert view.plans[0].diffusion == tl.Diffusion()
     work.do(SetField("display.scattering", "single"))
     finish(view, work)
-    assert not view.plans[0].given_back
+    assert not view.plans[0].diffuses
 
 
 def test_light_that_takes_long_to_solve_for_is_drawn_in_the_next_frame(
@@ -155,8 +156,10 @@ def test_light_that_takes_long_to_solve_for_is_drawn_in_the_next_frame(
     monkeypatch.setattr(viewport_renderer, "PREPARING", 0.0)
     monkeypatch.setattr(quality, "LONGEST", 1e9)
     drawn: list[tl.Scene] = []
-    draw = view.renderer.draw
-    monkeypatch.setattr(view.renderer, "draw", lambda scene, *a, **k: (drawn.append(scene), draw(scene, *a, **k))[1])
+    draw = view.renderer.draw_requested
+    monkeypatch.setattr(
+        view.renderer, "draw_requested", lambda scene, *a, **k: (drawn.append(scene), draw(scene, *a, **k))[1]
+    )
     scenes = []
     for yaw in range(1, 7):
         work.do(SetField("look.light_yaw", float(yaw)))
@@ -210,7 +213,7 @@ def test_light_that_cannot_be_solved_for_is_told_once(
     assert "since it could not be solved for" in view.quality.notes[1]
     assert [message.kind for message in work.messages] == ["error"]
     assert view.plans[0] is not None
-    assert view.plans[0].given_back.layered == (0,)
+    assert view.plans[0].treated(Treatment.LAYER) == (0,)
 
 
 def test_smooth_edges_are_those_of_many_samples(view: ViewportRenderer, work: Workspace) -> None:

@@ -7,7 +7,10 @@ from typing import Any
 import trimesh
 
 import translucent as tl
+from translucent.planning.plan import plan_scene
 from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.planning.rendered import Treatment
+from translucent.planning.request import RenderRequest
 
 _BOX = trimesh.creation.box((1, 1, 1))
 BOX = tl.Mesh(_BOX.vertices, _BOX.faces, name="box")
@@ -62,3 +65,14 @@ SCENES = {
 
 #: Methods that do not order what a ray meets, and the planner's choice.
 COLUMNS = (None, tl.SignedDepth(), tl.BackFaceDepth(), tl.ThinLayer())
+
+
+def plan_over_backdrop(
+    given: tl.Scene, method: Any = None, capabilities: Capabilities | None = None, **choices: Any
+) -> RenderPlan:
+    return plan_scene(given, RenderRequest(method, over_backdrop=True, **choices), capabilities)
+
+
+def many_times(found: RenderPlan) -> bool:
+    """Whether a plan shows light that is scattered many times."""
+    return bool(found.treated(Treatment.LAYER, Treatment.DIFFUSION, Treatment.VOLUME))

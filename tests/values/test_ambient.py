@@ -13,6 +13,7 @@ from translucent.planning.plan import plan
 
 CUBE = Box().tessellate()
 CAMERA = tl.Camera.look_at((1, 2, 4), (0, 0, 0))
+ONCE = tl.SingleScattering()
 MILK = tl.Medium(absorption=1.0, scattering=(1, 2, 3), emission=(0.5, 0, 0))
 
 
@@ -24,14 +25,14 @@ def test_it_is_none_unless_asked_for() -> None:
     plain = tl.Scene([tl.Object(CUBE, MILK)], CAMERA)
     np.testing.assert_array_equal(plain.ambient, 0.0)
     assert not plain.scatters_ambient
-    assert plain.with_ambient_emitted is plain
+    assert plan(plain, scattering=ONCE).scene.objects == plain.objects
 
 
 @pytest.mark.parametrize("medium", [tl.Medium(absorption=1.0), tl.Medium(scattering=(0, 0, 1)), None])
 def test_without_a_medium_that_scatters_it_nothing_changes(medium: tl.Medium | None) -> None:
     lit = scene(tl.Medium(absorption=2.0), medium)
     assert not lit.scatters_ambient
-    assert lit.with_ambient_emitted is lit
+    assert plan(lit, scattering=ONCE).scene.objects == lit.objects
     assert plan(lit) == plan(scene(tl.Medium(absorption=2.0), medium, ambient=0.0))
 
 
@@ -39,11 +40,11 @@ def test_media_emit_what_they_scatter() -> None:
     lit = scene(MILK, None)
     np.testing.assert_array_equal(lit.source(lit.objects[0]), (1.0, 2.0, 0.0))
     np.testing.assert_array_equal(lit.source(lit.objects[1]), 0.0)
-    shown = lit.with_ambient_emitted
-    assert not shown.scatters_ambient
-    assert shown.objects[0].mesh is CUBE
-    assert shown.objects[0].medium == tl.Medium(MILK.absorption, MILK.scattering, (1.0, 2.0, 0.0))
-    assert shown.objects[1] is lit.objects[1]
+    rendered = plan(lit).scene
+    assert not rendered.scatters_ambient
+    assert rendered.objects[0].mesh is CUBE
+    assert rendered.objects[0].medium == tl.Medium(MILK.absorption, MILK.scattering, (1.0, 2.0, 0.0))
+    assert rendered.objects[1] is lit.objects[1]
 
 
 def test_the_planner_adds_it_and_says_so() -> None:

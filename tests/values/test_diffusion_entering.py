@@ -31,6 +31,7 @@ from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.diffusion import HAZE_MIRRORED, haze_shares
 from translucent.geometry.solids import Box, Sphere
+from translucent.planning.plan import plan
 from translucent.planning.scattering import Diffusion
 from translucent.reference import slabs
 
@@ -192,8 +193,7 @@ def test_nothing_of_the_environment_passes_what_is_black() -> None:
     assert body.medium is not None
     assert DiffusingBody(geometry, body.medium, 0.0).field(scene, 0).entering.max() < 1e-9
     keys = {
-        diffusion_key(replace(scene, objects=[body, lid]), Diffusion())
-        for lid in (black, replace(black, sheet_thickness=0.1))
+        diffusion_key(plan(replace(scene, objects=[body, lid]))) for lid in (black, replace(black, sheet_thickness=0.1))
     }
     assert len(keys) == 2  # sheets take nothing on the way
 

@@ -18,10 +18,12 @@ from translucent.files.paths import write_atomically
 from translucent.frames.frame import ARRAYS, Frame
 from translucent.frames.metrics import interior
 from translucent.frames.writing import check_output
+from translucent.geometry.solids import Box
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
 
-PLAN = RenderPlan(tl.SignedDepth(), (PassSpec(PassName.SIGNED_DEPTH, "a test", (0,), 1),))
+SCENE = tl.Scene([tl.Object(Box().tessellate())], tl.Camera.look_at((0, 0, 5), (0, 0, 0)))
+PLAN = RenderPlan(SCENE, tl.SignedDepth(), (PassSpec(PassName.SIGNED_DEPTH, "a test", (0,), 1),))
 #: 2 rows of 3 pixels, all numbers different.
 RADIANCE = np.linspace(0, 1.7, 18, dtype=np.float32).reshape(2, 3, 3)
 

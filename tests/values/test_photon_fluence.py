@@ -18,7 +18,6 @@ from translucent.diffusion.photon_fluence import FineCells, bent_light
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning import caustics
 from translucent.planning.plan import plan
-from translucent.planning.scattering.choice import shown
 
 SEGMENTS = 64
 BALL = Sphere().tessellate(SEGMENTS)
@@ -156,6 +155,5 @@ def test_photons_are_followed_again_where_something_moves_them(monkeypatch: pyte
         (scene(replace(GLASS, medium=tl.Medium(1.0)), fog), asked, 0),  # which bends nothing
     ):
         followed.clear()
-        found = plan(changed).given_back
-        fields.of(shown(changed, found), coarse, photons)
+        fields.of(replace(plan(changed), diffusion=coarse, caustics=photons))
         assert len(followed) == times

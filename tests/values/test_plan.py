@@ -22,12 +22,13 @@ from tests.values.plan_scenes import (
     WINE,
     body,
     names,
+    plan_over_backdrop,
     scene,
     sheet,
 )
 from translucent.planning.assembly import COSTS
 from translucent.planning.methods import METHODS
-from translucent.planning.plan import plan, plan_over_backdrop
+from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
 
 ONCE = tl.SingleScattering()

@@ -13,6 +13,7 @@ from translucent.planning.notes import NoteKind
 from translucent.planning.passes import PassName
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
+from translucent.planning.rendered import Treatment
 
 CLEAR = tl.Medium(1.0, ior=1.5)
 SUN = tl.DirectionalLight((0, -1, 0), 1.0)
@@ -45,7 +46,7 @@ def test_photons_light_fog() -> None:
     """In place of straight light, from the views of lights on; on what is opaque, too, if anything is."""
     fog = body(tl.Medium(scattering=2.0), 1.0)
     found = plan(scene(body(), fog), caustics=tl.Caustics(1_000_000))
-    assert (found.given_back.volumes, found.opaque_to_shadows) == ((1,), {0})
+    assert (found.treated(Treatment.VOLUME), found.opaque_to_shadows) == ((1,), {0})
     assert found.method == tl.RayMarched(64)
     assert not found.has(PassName.CAUSTICS)
     (views,) = (step for step in found.passes if step.name is PassName.LIGHT_VIEWS)
@@ -62,7 +63,7 @@ def test_photons_light_bodies_that_scatter_behind_interfaces() -> None:
     """From other bodies: what has bent light itself has had it by then."""
     milk = body(tl.Medium(1.0, 50.0, ior=1.4), 1.0)
     found = plan(scene(body(), milk), caustics=tl.Caustics(1_000_000))
-    assert (found.given_back.diffused, found.opaque_to_shadows) == ((1,), {0, 1})
+    assert (found.treated(Treatment.DIFFUSION), found.opaque_to_shadows) == ((1,), {0, 1})
     (traced,) = (step for step in found.passes if step.name is PassName.TRACED)
     assert "250,000 photons" in traced.reason
     assert "caustics in media that scatter" not in str(found)
@@ -84,7 +85,7 @@ def test_fog_that_photons_do_not_light_is_told() -> None:
     assert "caustics in media that scatter: 'box'" in str(once)
     # Without steps that gather it, light leaves through the surface of fog, where photons come in.
     old = plan(scene(body(), fog, ground), capabilities=Capabilities(shader_storage=False), caustics=FEW)
-    assert old.given_back.diffused == (1,)
+    assert old.treated(Treatment.DIFFUSION) == (1,)
     assert "bends into 'box'" in str(old)
     ahead = plan(scene(body(), body(tl.Medium(scattering=2.0, anisotropy=0.5), 1.0)), caustics=FEW)
     assert "directions in which 'box' scatters caustics: alike in all" in str(ahead)

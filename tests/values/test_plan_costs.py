@@ -205,8 +205,8 @@ def test_the_cost_of_a_plan_is_the_sum_of_its_passes() -> None:
         PassSpec(PassName.OPAQUE, "first", (0,), 2, cost=1.25),
         PassSpec(PassName.K_BUFFER, "second", (0, 1), 3, cost=2.5),
     )
-    found = RenderPlan(tl.SignedDepth(), passes)
+    found = RenderPlan(scene(body()), tl.SignedDepth(), passes)
     assert (found.cost, found.geometry_passes) == (3.75, 5)
     assert found.exact
-    assert not RenderPlan(tl.SignedDepth(), passes, limits=(Note(NoteKind.OPEN_MESH, "a hole"),)).exact
-    assert RenderPlan(tl.SignedDepth(), passes, unmodelled=(Note(NoteKind.SHADOWS, "shadows"),)).exact
+    assert not RenderPlan(scene(body()), tl.SignedDepth(), passes, limits=(Note(NoteKind.OPEN_MESH, "a hole"),)).exact
+    assert RenderPlan(scene(body()), tl.SignedDepth(), passes, unmodelled=(Note(NoteKind.SHADOWS, "shadows"),)).exact

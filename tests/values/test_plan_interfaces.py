@@ -9,13 +9,25 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from tests.values.plan_scenes import DIAMOND, NO_STORAGE, OPEN, ORDERED, SCENES, TORUS, WINE, body, scene, sheet
+from tests.values.plan_scenes import (
+    DIAMOND,
+    NO_STORAGE,
+    OPEN,
+    ORDERED,
+    SCENES,
+    TORUS,
+    WINE,
+    body,
+    plan_over_backdrop,
+    scene,
+    sheet,
+)
 from translucent.planning.interfaces import INTERFACES, Interfaces
 from translucent.planning.interfaces.front import ONE_INTERFACE
 from translucent.planning.interfaces.traced import TRACE_COST
 from translucent.planning.notes import NoteKind
 from translucent.planning.passes import PassName
-from translucent.planning.plan import plan, plan_over_backdrop
+from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
 
 TRACED, SCREEN, FRONT = tl.TracedInterfaces(), tl.ScreenInterfaces(), tl.FrontInterface()

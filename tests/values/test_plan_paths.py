@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests.values.plan_scenes import plan_over_backdrop
 from translucent.geometry.solids import Box
 from translucent.planning.notes import NoteKind
 from translucent.planning.passes import PassName
-from translucent.planning.plan import plan, plan_over_backdrop
+from translucent.planning.plan import plan
 from translucent.scene.surface import Surface
 
 METHOD = tl.PathTraced(paths=16)

@@ -6,19 +6,19 @@ import re
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
 import translucent as tl
-from tests.values.plan_scenes import BOX, GLASS, MILK, NO_STORAGE, OPEN, body, names, scene, sheet
+from tests.values.plan_scenes import BOX, GLASS, MILK, NO_STORAGE, OPEN, body, many_times, names, scene, sheet
 from translucent.bench.shapes import joined
+from translucent.diffusion.keys import diffusion_key
 from translucent.geometry.solids import Box, Sphere
-from translucent.media.given_back import DiffusedMedium, DiffusedVolume, LayeredMedium
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
-from translucent.planning.scattering.choice import LEAST_DEPTH, MOST_CELL_DEPTH, MOST_DIFFUSED, shown
+from translucent.planning.rendered import Treatment, scatterer_of, treatment_of
 from translucent.planning.slots import MAX_SLOTS
+from translucent.planning.treatments import LEAST_DEPTH, MOST_CELL_DEPTH, MOST_DIFFUSED, choose_treatments
 
 WAX = tl.Medium(absorption=0.1, scattering=5.0, ior=1.4)
 LIT = [tl.PointLight((0, 0, 5), (1, 1, 1))]
@@ -33,8 +33,8 @@ VARYING = tl.LinearDensity(0.0, 0.5, 1.0)
 @pytest.mark.parametrize("lights", [[], LIT])
 def test_light_diffuses_in_closed_bodies_with_an_interface(lights: list[tl.PointLight]) -> None:
     found = plan(scene(body(WAX), lights=lights))
-    assert (found.given_back.diffused, found.given_back.layered) == ((0,), ())
-    assert found.given_back.diffusion == tl.Diffusion()
+    assert (found.treated(Treatment.DIFFUSION), found.treated(Treatment.LAYER)) == ((0,), ())
+    assert found.diffusion == tl.Diffusion()
     assert found.says(NoteKind.DIFFUSED_LIGHT)
     assert not found.says(NoteKind.SPREAD_INSIDE)
     assert not found.says(NoteKind.LAYER_INSTEAD)
@@ -54,7 +54,7 @@ def test_bodies_in_which_light_cannot_diffuse_are_layers(what: tl.Object, why: s
     """And the plan tells why."""
     for asked in (None, tl.Diffusion()):
         found = plan(scene(what), scattering=asked)
-        assert (found.given_back.diffused, found.given_back.layered) == ((), (0,))
+        assert (found.treated(Treatment.DIFFUSION), found.treated(Treatment.LAYER)) == ((), (0,))
         (note,) = (note for note in found.unmodelled if note.kind is NoteKind.LAYER_INSTEAD)
         assert str(note).startswith(f"diffusion in {what.mesh.name!r}: {why}")
         assert str(note).endswith("; shown as layers")
@@ -71,7 +71,7 @@ def test_smaller_cells_let_light_diffuse_in_thinner_bodies() -> None:
     assert body(medium, slab).mean_thickness == pytest.approx(0.032 / 2.064)
     for resolution, diffused in ((20, ()), (40, (0,))):
         found = plan(scene(body(medium, slab)), scattering=tl.Diffusion(resolution))
-        assert found.given_back.diffused == diffused
+        assert found.treated(Treatment.DIFFUSION) == diffused
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_smaller_cells_let_light_diffuse_in_thinner_bodies() -> None:
 )
 def test_other_bodies_show_what_they_scatter_once(what: tl.Object) -> None:
     found = plan(scene(what, lights=LIT))
-    assert not found.given_back
+    assert not many_times(found)
     assert not found.says(NoteKind.DIFFUSED_LIGHT)
     assert not found.says(NoteKind.SPREAD_INSIDE)
 
@@ -99,49 +99,57 @@ def test_little_scattering_is_shown_once() -> None:
         depth = 3 * LEAST_DEPTH * share
         for anisotropy in (0.0, 0.8):
             medium = tl.Medium(scattering=(0, 0, depth / (1 - anisotropy)), anisotropy=anisotropy, ior=1.4)
-            assert plan(scene(body(medium))).given_back.diffused == diffused
+            assert plan(scene(body(medium))).treated(Treatment.DIFFUSION) == diffused
 
 
 @pytest.mark.parametrize("medium", [DENSE, tl.Medium(scattering=0.01, ior=1.4)], ids=["matched", "shallow"])
 def test_what_is_asked_for_is_done_where_it_can_be(medium: tl.Medium) -> None:
     diffused = plan(scene(body(medium)), scattering=tl.Diffusion(16))
-    assert (diffused.given_back.diffused, diffused.given_back.layered) == ((0,), ())
-    assert diffused.given_back.diffusion.resolution == 16
+    assert (diffused.treated(Treatment.DIFFUSION), diffused.treated(Treatment.LAYER)) == ((0,), ())
+    assert diffused.diffusion.resolution == 16
     layered = plan(scene(body(medium)), scattering=tl.ScatteringLayer())
-    assert (layered.given_back.diffused, layered.given_back.layered) == ((), (0,))
+    assert (layered.treated(Treatment.DIFFUSION), layered.treated(Treatment.LAYER)) == ((), (0,))
     assert layered.says(NoteKind.SPREAD_INSIDE)
     assert not layered.says(NoteKind.LAYER_INSTEAD)
 
 
 @pytest.mark.parametrize("asked", [tl.Diffusion(), tl.ScatteringLayer()])
 def test_sheets_are_layers_if_asked_for_and_partly_transparent_layers_nothing(asked: Any) -> None:
-    found = plan(scene(sheet(WAX)), scattering=asked).given_back
-    assert (found.diffused, found.layered) == ((), (0,))
+    found = choose_treatments(scene(sheet(WAX)), asked)
+    assert found.of == {0: Treatment.LAYER}
     assert found.refusals == (((0, "it is a sheet"),) if asked == tl.Diffusion() else ())
     lacquer = body(WAX, surface=tl.Surface(opacity=0.5), sheet_thickness=1e-3)
     assert lacquer.covers
-    assert not plan(scene(lacquer), scattering=asked).given_back
+    assert not many_times(plan(scene(lacquer), scattering=asked))
 
 
 def test_each_body_has_its_own_way() -> None:
     """And a plan tells of all of them."""
     asked = scene(body(WAX), body(WAX, OPEN, x=3), body(MILK, x=6), body(GLASS, x=9), body(None, x=12))
     found = plan(asked)
-    back = found.given_back
-    assert (back.diffused, back.layered, back.volumes) == ((0,), (1,), (2,))
-    assert found.given_back.refusals == ((1, "its mesh is not closed"),)
+    treatments = Treatment.DIFFUSION, Treatment.LAYER, Treatment.VOLUME
+    assert [found.treated(one) for one in treatments] == [(0,), (1,), (2,)]
+    assert choose_treatments(asked, None).refusals == ((1, "its mesh is not closed"),)
     kinds = NoteKind.DIFFUSED_LIGHT, NoteKind.SPREAD_INSIDE, NoteKind.LAYER_INSTEAD
     for kind in kinds:
         assert found.says(kind)
-    marked = shown(asked, found.given_back)
-    assert [type(item.medium) for item in marked.objects[:3]] == [DiffusedMedium, LayeredMedium, DiffusedVolume]
-    assert marked.objects[3:] == asked.objects[3:]
-    # Along rays, what scatters in them only removes light.
-    seen = marked.objects[0].medium
-    assert seen is not None
-    np.testing.assert_allclose(seen.absorption, 5.1)
-    assert not seen.scatters
-    assert shown(asked, found.given_back) is marked
+    rendered = found.scene.objects
+    assert [treatment_of(item) for item in rendered] == [*treatments, Treatment.SINGLE, Treatment.SINGLE]
+    assert [item.has_interface for item in rendered] == [True, True, False, False, False]
+    assert rendered[3:] == asked.objects[3:]
+    # Along rays, what scatters in them only removes light; elsewhere, media are as they were.
+    assert rendered[0].medium == tl.Medium(absorption=5.1, ior=1.4)
+    assert [scatterer_of(item) for item in rendered] == [item.medium for item in asked.objects]
+    assert [item.medium for item in rendered[1:]] == [item.medium for item in asked.objects[1:]]
+
+
+def test_two_media_of_one_extinction_are_told_apart() -> None:
+    """In which light diffuses: what rays see of both is the same."""
+    bright, dark = tl.Medium(0.1, 5.0, ior=1.4), tl.Medium(1.1, 4.0, ior=1.4)
+    plans = [plan(scene(body(medium))) for medium in (bright, dark)]
+    assert plans[0].scene.objects[0].medium == plans[1].scene.objects[0].medium
+    assert diffusion_key(plans[0]) != diffusion_key(plans[1])
+    assert diffusion_key(plans[0]) == diffusion_key(plan(scene(body(replace(bright)))))
 
 
 @pytest.mark.parametrize("capabilities", [Capabilities(), NO_STORAGE])
@@ -151,14 +159,14 @@ def test_diffused_light_needs_no_views_from_lights(capabilities: Capabilities) -
     assert "light_views" not in names(found)
     assert not found.says(NoteKind.UNLIT)
     asked = plan(scene(body(WAX), lights=LIT), tl.SignedDepth(), capabilities)
-    assert asked.given_back.diffused == (0,)
+    assert asked.treated(Treatment.DIFFUSION) == (0,)
 
 
 @pytest.mark.parametrize("points", [1, 4])
 def test_single_scattering_reaches_the_method(points: int) -> None:
     found = plan(scene(body(WAX), lights=LIT), scattering=tl.SingleScattering(points))
     assert found.method == tl.FragmentLists(light_points=points)
-    assert not found.given_back
+    assert not many_times(found)
     assert found.says(NoteKind.SCATTERED_AGAIN)
     own = plan(scene(body(WAX), lights=LIT), tl.FragmentLists(light_points=2), scattering=tl.SingleScattering(points))
     assert own.method == tl.FragmentLists(light_points=2)
@@ -197,7 +205,7 @@ def test_layers_of_varying_density_are_refused() -> None:
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
         plan(scene(cloud), scattering=tl.ScatteringLayer())
     # Beside another body, which can be a layer, it is what it is.
-    assert plan(scene(cloud, body(WAX, x=3)), scattering=tl.ScatteringLayer()).given_back.layered == (1,)
+    assert plan(scene(cloud, body(WAX, x=3)), scattering=tl.ScatteringLayer()).treated(Treatment.LAYER) == (1,)
 
 
 def test_resolutions_at_the_bounds() -> None:
@@ -208,14 +216,14 @@ def test_many_bodies_are_layers_unless_asked_for() -> None:
     """A scene of hundreds of scattering bodies would take minutes."""
     crowd = scene(*(body(WAX, x=3.0 * i) for i in range(MOST_DIFFUSED + 1)))
     found = plan(crowd)
-    assert found.given_back.diffused == ()
-    assert len(found.given_back.layered) == MOST_DIFFUSED + 1
+    assert found.treated(Treatment.DIFFUSION) == ()
+    assert len(found.treated(Treatment.LAYER)) == MOST_DIFFUSED + 1
     notes = [note for note in found.unmodelled if note.kind is NoteKind.LAYER_INSTEAD]
     assert len(notes) == 1
     assert "more than 32 bodies" in notes[0]
-    assert len(plan(crowd, scattering=tl.Diffusion()).given_back.diffused) == MOST_DIFFUSED + 1
+    assert len(plan(crowd, scattering=tl.Diffusion()).treated(Treatment.DIFFUSION)) == MOST_DIFFUSED + 1
     few = scene(*(body(WAX, x=3.0 * i) for i in range(MOST_DIFFUSED)))
-    assert len(plan(few).given_back.diffused) == MOST_DIFFUSED
+    assert len(plan(few).treated(Treatment.DIFFUSION)) == MOST_DIFFUSED
 
 
 def test_a_body_whose_bounds_are_nearly_empty_is_a_layer() -> None:
@@ -223,8 +231,8 @@ def test_a_body_whose_bounds_are_nearly_empty_is_a_layer() -> None:
     ball = Sphere().tessellate(16)
     pair = joined([(ball.vertices, ball.faces), (ball.vertices + [2000, 2000, 2000], ball.faces)], "pair")
     found = plan(scene(body(WAX, pair)))
-    assert found.given_back.layered == (0,)
-    assert "nearly empty" in found.given_back.refusals[0][1]
+    assert found.treated(Treatment.LAYER) == (0,)
+    assert any("nearly empty" in note for note in found.unmodelled if note.kind is NoteKind.LAYER_INSTEAD)
 
 
 CLOUD = body(MILK, density=VARYING)
@@ -233,17 +241,14 @@ CLOUD = body(MILK, density=VARYING)
 @pytest.mark.parametrize("lights", [[], LIT])
 def test_light_is_scattered_on_where_density_varies(lights: list[tl.PointLight]) -> None:
     found = plan(scene(CLOUD, lights=lights))
-    back = found.given_back
-    assert (back.diffused, back.layered, back.volumes) == ((), (), (0,))
-    assert back.solved
+    assert treatment_of(found.scene.objects[0]) is Treatment.VOLUME
+    assert found.diffuses
     assert isinstance(found.method, tl.RayMarched)
     assert "is scattered on (Diffusion(resolution=32)) in 1 body" in str(found)
     assert found.says(NoteKind.DIFFUSED_LIGHT)
     assert not found.says(NoteKind.SCATTERED_AGAIN)
     assert not found.says(NoteKind.ONLY_REMOVES)
-    marked = shown(scene(CLOUD), back)
-    assert isinstance(marked.objects[0].medium, DiffusedVolume)
-    assert not marked.objects[0].has_interface
+    assert not found.scene.objects[0].has_interface
 
 
 def test_light_is_scattered_on_in_fog_and_leaves_dense_bodies_through_their_surface() -> None:
@@ -251,34 +256,33 @@ def test_light_is_scattered_on_in_fog_and_leaves_dense_bodies_through_their_surf
     cell = tl.Diffusion().cell_size(body())
     for share, anisotropy in ((0.9, 0.0), (1.1, 0.0), (0.9, 0.5), (1.1, 0.5)):
         medium = tl.Medium(scattering=share * MOST_CELL_DEPTH / cell / (1.0 - anisotropy), anisotropy=anisotropy)
-        back = plan(scene(body(medium))).given_back
-        assert (back.volumes, back.diffused) == (((0,), ()) if share < 1.0 else ((), (0,)))
+        found = plan(scene(body(medium)))
+        assert found.treated(Treatment.VOLUME if share < 1.0 else Treatment.DIFFUSION) == (0,)
     fog, dense = scene(body(MILK), lights=LIT), scene(body(DENSE), lights=LIT)
     for machine in (NO_STORAGE, Capabilities(opengl=False)):
-        assert plan(fog, capabilities=machine).given_back.diffused == (0,)
-        assert plan(dense, capabilities=machine).given_back.diffused == (0,)
-        assert not plan(scene(CLOUD, lights=LIT), capabilities=replace(machine, opengl=False)).given_back
-    assert plan(fog, tl.SignedDepth(), scattering=tl.Diffusion()).given_back.diffused == (0,)
-    assert not plan(scene(body(MILK), ambient=(1, 1, 1))).given_back
+        assert plan(fog, capabilities=machine).treated(Treatment.DIFFUSION) == (0,)
+        assert plan(dense, capabilities=machine).treated(Treatment.DIFFUSION) == (0,)
+        assert not many_times(plan(scene(CLOUD, lights=LIT), capabilities=replace(machine, opengl=False)))
+    assert plan(fog, tl.SignedDepth(), scattering=tl.Diffusion()).treated(Treatment.DIFFUSION) == (0,)
+    assert not many_times(plan(scene(body(MILK), ambient=(1, 1, 1))))
     assert isinstance(plan(fog).method, tl.RayMarched)
-    assert not plan(fog, tl.FragmentLists()).given_back
-    assert not plan(dense, tl.FragmentLists()).given_back
+    assert not many_times(plan(fog, tl.FragmentLists()))
+    assert not many_times(plan(dense, tl.FragmentLists()))
 
 
 def test_a_march_that_is_asked_for_has_light_scattered_once() -> None:
     """As `tl.reference.march` does; unless diffusion is asked for, too."""
     march = tl.RayMarched(steps=8)
-    assert not plan(scene(CLOUD, lights=LIT), march).given_back
-    assert plan(scene(CLOUD, lights=LIT), march, scattering=tl.Diffusion(8)).given_back.volumes == (0,)
-    assert not plan(scene(CLOUD), scattering=tl.SingleScattering()).given_back
+    assert not many_times(plan(scene(CLOUD, lights=LIT), march))
+    assert plan(scene(CLOUD, lights=LIT), march, scattering=tl.Diffusion(8)).treated(Treatment.VOLUME) == (0,)
+    assert not many_times(plan(scene(CLOUD), scattering=tl.SingleScattering()))
 
 
 def test_light_of_a_density_behind_an_interface_leaves_through_it() -> None:
     """On machines that take no steps, too."""
     marbled = scene(body(WAX, density=VARYING))
     for machine in (None, Capabilities(opengl=False)):
-        found = plan(marbled, capabilities=machine).given_back
-        assert (found.diffused, found.volumes) == ((0,), ())
+        assert plan(marbled, capabilities=machine).treated(Treatment.DIFFUSION) == (0,)
 
 
 def test_more_fogs_than_winding_numbers_give_back_light_through_their_surfaces() -> None:
@@ -286,8 +290,9 @@ def test_more_fogs_than_winding_numbers_give_back_light_through_their_surfaces()
     for others, most in ((0, MAX_SLOTS), (3, MAX_SLOTS - 3)):
         rest = [body(tl.Medium(absorption=i + 1.0), x=-3.0 * i - 3) for i in range(others)]
         for count in (most, most + 1):
-            found = plan(scene(*(body(MILK, x=3.0 * i) for i in range(count)), *rest)).given_back
-            assert (len(found.volumes), len(found.diffused)) == ((count, 0) if count == most else (0, count))
+            found = plan(scene(*(body(MILK, x=3.0 * i) for i in range(count)), *rest))
+            numbers = [len(found.treated(one)) for one in (Treatment.VOLUME, Treatment.DIFFUSION)]
+            assert numbers == ([count, 0] if count == most else [0, count])
 
 
 @pytest.mark.parametrize(

@@ -180,9 +180,9 @@ def test_beams_thinner_than_cells_keep_their_power(outer: float) -> None:
 def test_light_is_solved_for_anew_where_a_cone_changes() -> None:
     spot = tl.SpotLight((0, 0, 3), DOWN, 1, 10, 20)
     others = [spot, replace(spot, inner_cone=11), replace(spot, outer_cone=21), replace(spot, direction=(0, 0.1, -1))]
-    keys = {diffusion_key(scene(light), tl.Diffusion()) for light in (*others, tl.PointLight((0, 0, 3), 1))}
+    keys = {diffusion_key(tl.plan(scene(light))) for light in (*others, tl.PointLight((0, 0, 3), 1))}
     assert len(keys) == 5
-    assert diffusion_key(scene(replace(spot)), tl.Diffusion()) in keys
+    assert diffusion_key(tl.plan(scene(replace(spot)))) in keys
 
 
 def test_fog_is_marched_by_equal_angles_from_spots() -> None:

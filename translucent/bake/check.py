@@ -166,7 +166,7 @@ def check_map(
     """
     scene = showcase(body or mesh, medium, size, camera, stage="none")
     renderer = CpuRenderer()
-    true = renderer.render(scene, size, plan(scene, None, renderer.capabilities), 1)
+    true = renderer.render(plan(scene, None, renderer.capabilities), size)
     renderer.close()
     directions = scene.camera.rays(size)[1]
     # Positions of pixel centers in the picture, in units of its height.

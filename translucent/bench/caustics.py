@@ -321,7 +321,7 @@ class GroundCaustics(Experiment[LightScene]):
         gpu, plan, (width, height) = renderer.gpu, renderer.plan(scene, caustics=caustics), self.size
         radiance = []
         with gpu.context.current():
-            job = gpu.prepare(scene, self.size, plan)
+            job = gpu.prepare(plan, self.size)
             try:
                 for leave_out in ((PassName.CAUSTICS,), ()):
                     gpu.run(job, leave_out=leave_out)

@@ -199,7 +199,7 @@ class Contender:
             return FrameDrawing(bench, partial(reference.march, scene, targets.size, self.method))
         if self.kind == "cpu":
             return FrameDrawing(bench, partial(self.sampled, bench, scene, targets.size, 1))
-        return PlanDrawing(bench, scene, targets, plan)
+        return PlanDrawing(bench, plan, targets)
 
     def sampled(self, bench: BenchContext, scene: Scene, size: Size, samples: int) -> Frame:
         """Frame with several samples of each pixel."""

@@ -32,7 +32,6 @@ from translucent.planning.methods import SignedDepth
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Diffusion
-from translucent.planning.scattering.choice import shown
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
@@ -215,19 +214,18 @@ class Drawing(Protocol):
 class PlanDrawing:
     """Drawing of a plan, pass by pass as the renderer runs it, into shared targets."""
 
-    def __init__(self, bench: BenchContext, scene: Scene, targets: Targets, plan: RenderPlan) -> None:
+    def __init__(self, bench: BenchContext, plan: RenderPlan, targets: Targets) -> None:
         self._bench = bench
         self._geometry = [spec for spec in plan.passes if spec.geometry_passes]
         self._shading = [spec for spec in plan.passes if not spec.geometry_passes]
-        scene = shown(scene, plan.given_back)
         resources = copy.copy(bench.resources)
         self.solve_seconds: float | None = None
-        if plan.given_back.solved:
-            resources.diffusion = bench.light(plan.given_back.diffusion)
+        if plan.diffuses:
+            resources.diffusion = bench.light(plan.diffusion)
             began = time.perf_counter()
-            resources.diffusion.solve(scene, plan.given_back.diffusion)
+            resources.diffusion.solve(plan)
             self.solve_seconds = time.perf_counter() - began
-        self._job = FrameJob(bench.gl, scene, plan, targets, resources, compact=self._compact)
+        self._job = FrameJob(bench.gl, plan, targets, resources, compact=self._compact)
 
     _compact = True
 
@@ -272,8 +270,8 @@ class ShortcutDrawing(PlanDrawing):
         self, bench: BenchContext, scene: Scene, targets: Targets, plan: RenderPlan, shortcut: Shortcut
     ) -> None:
         after = tuple(spec for spec in plan.passes if spec.name in _AFTER_SHORTCUTS)
-        short = RenderPlan(SignedDepth(), after, plan.spectral, interfaces=plan.interfaces)
-        super().__init__(bench, scene, targets, short)
+        short = RenderPlan(scene, SignedDepth(), after, plan.spectral, interfaces=plan.interfaces)
+        super().__init__(bench, short, targets)
         self._shading, self._shortcut = list(after), shortcut
 
     def draw(self) -> Sample:
@@ -329,7 +327,7 @@ class FloorDrawing:
         opaque = tuple(i for i, item in enumerate(scene.objects) if item.medium is None)
         self._staging = (PassSpec(PassName.OPAQUE, "staging", opaque, 1),) if opaque else ()
         self._bench = bench
-        self._job = FrameJob(bench.gl, scene, RenderPlan(SignedDepth(), self._staging), targets, bench.resources)
+        self._job = FrameJob(bench.gl, RenderPlan(scene, SignedDepth(), self._staging), targets, bench.resources)
         self._pass = bench.own(DepthOnlyPass)
 
     def draw(self) -> Sample:

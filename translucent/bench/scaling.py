@@ -101,7 +101,7 @@ class CostScaling(Experiment[ScalingStep]):
             scene, size = step.make()
 
             def maker(method: Method) -> Callable[[Targets], Drawing]:
-                return lambda targets: PlanDrawing(bench, scene, targets, bench.renderer.plan(scene, method))
+                return lambda targets: PlanDrawing(bench, bench.renderer.plan(scene, method), targets)
 
             makers = {name: maker(method) for name, method in self.methods.items()}
             found, failures = timed_beside_floor(bench, scene, size, makers, bench.effort.step_seconds)

@@ -32,14 +32,23 @@ from translucent.formulas.two_stream import (
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box
 from translucent.media.medium import Medium
+from translucent.planning.rendered import Treatment
 from translucent.planning.scattering import Diffusion
-from translucent.planning.scattering.choice import given_back
+from translucent.planning.treatments import choose_treatments
 from translucent.reference import slabs
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 
 #: Half of the width of the slab, and of the part in its middle that is looked at, in thicknesses.
 HALF_WIDTH, MIDDLE = 4.0, 1.0
+
+#: Names of what the planner chooses.
+PLANNED: dict[Treatment, Literal["diffusion", "layer", "volume", "none"]] = {
+    Treatment.DIFFUSION: "diffusion",
+    Treatment.LAYER: "layer",
+    Treatment.VOLUME: "volume",
+    Treatment.SINGLE: "none",
+}
 
 
 @dataclass(frozen=True)
@@ -85,12 +94,10 @@ def _measured(albedo: float, depths: Array, anisotropy: float, ior: float) -> li
             for model, more in ((diffused, hazy), (layer, (0.0, 0.0)))
         )
         body = Object(_mesh(), Medium((1.0 - albedo) * depth, albedo * depth, anisotropy=anisotropy, ior=ior))
-        back = given_back(Scene([body], Camera.look_at((0.0, 5.0, 5.0), (0.0, 0.0, 0.0))), None)
+        scene = Scene([body], Camera.look_at((0.0, 5.0, 5.0), (0.0, 0.0, 0.0)))
+        treatment = choose_treatments(scene, None).of.get(0, Treatment.SINGLE)
         whole = slabs.whole_shares(albedo, depth, ior, anisotropy)
-        planned: Literal["diffusion", "layer", "volume", "none"] = (
-            "diffusion" if back.diffused else "layer" if back.layered else "volume" if back.volumes else "none"
-        )
-        found.append(Slab(albedo, depth, anisotropy, ior, *whole, passing, by_diffusion, by_layer, planned))
+        found.append(Slab(albedo, depth, anisotropy, ior, *whole, passing, by_diffusion, by_layer, PLANNED[treatment]))
     return found
 
 

@@ -50,7 +50,7 @@ def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
 
     Of a .glb or .gltf file, the scene that it is, with the media of its materials.
     """
-    from translucent.planning.plan import plan
+    from translucent.planning.plan import plan_scene
 
     asked = SceneRequest(
         medium=given.medium.read(),
@@ -59,8 +59,8 @@ def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
         roughness=given.medium.surface_roughness(),
         stage=given.stage,
     )
-    scene, choices = read_scene(model, asked), given.choices.read()
-    chosen = plan(scene, **vars(choices)) if scene.bodies else None
+    scene, request = read_scene(model, asked), given.choices.read()
+    chosen = plan_scene(scene, request) if scene.bodies else None
     if as_json:
         found = None if chosen is None else {**chosen.summary(), "traffic": _traffic(scene, chosen).summary()}
         echo(json.dumps({**_summary(model, scene), "plan": found}))
@@ -132,6 +132,5 @@ def _tell_scene(model: str, scene: Scene) -> None:
 
 def _traffic(scene: Scene, chosen: RenderPlan) -> FrameTraffic:
     from translucent.gpu.traffic import frame_traffic
-    from translucent.planning.scattering.choice import shown
 
-    return frame_traffic(shown(scene, chosen.given_back).with_ambient_emitted, chosen)
+    return frame_traffic(chosen)

@@ -38,9 +38,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from translucent.media.medium import Medium
-    from translucent.planning.choices import RenderChoices
     from translucent.planning.interfaces import Interfaces
     from translucent.planning.methods import Method
+    from translucent.planning.request import RenderRequest
     from translucent.planning.scattering import Scattering
     from translucent.scene.environment import Environment
 
@@ -442,13 +442,13 @@ class ChoiceOptions:
     )
     thickness: str | None = option(metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 
-    def read(self) -> RenderChoices:
-        """Choices for the planner; None of each that no option makes."""
+    def read(self) -> RenderRequest:
+        """Request for a picture; None of each choice that no option makes."""
         from translucent.planning.caustics import Caustics
-        from translucent.planning.choices import RenderChoices
+        from translucent.planning.request import RenderRequest
         from translucent.planning.shadow_maps import ShadowMaps
 
-        return RenderChoices(
+        return RenderRequest(
             interfaces=self._interfaces(),
             scattering=self._scattering(),
             caustics=None if self.caustics is None else Caustics(self.caustics),

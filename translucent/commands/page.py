@@ -89,14 +89,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
     if given.simplify is not None:
         scene = simplified(scene, given.simplify)
     tone = look.tone or (STAGED_TONE if len(scene.shown) < len(scene.objects) else "none")
-    choices = given.choices.read()
-    planned = plan_page(
-        scene,
-        choices.method,
-        interfaces=choices.interfaces,
-        scattering=choices.scattering,
-        shadows=choices.shadows,
-    )
+    planned = plan_page(scene, given.choices.read())
     if given.medium.distance is not None:
         planned = dataclasses.replace(planned, distance=parse_length(given.medium.distance))
     if given.poster == RENDERED:

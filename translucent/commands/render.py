@@ -9,7 +9,7 @@ import json
 import math
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
     from translucent.frames.frame import Frame
     from translucent.frames.tiled import Tile
-    from translucent.planning.choices import RenderChoices
+    from translucent.planning.request import RenderRequest
     from translucent.renderer import Renderer
     from translucent.scene.scene import Scene
 
@@ -164,9 +164,12 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     from translucent.scene.stages import NO_STAGE, STAGED_TONE
     from translucent.scene.turntable import framed_all_around
 
-    pixels, choices = read_size(given.size), given.choices.read()
+    pixels = read_size(given.size)
+    request = replace(
+        given.choices.read(), samples=given.samples, transparent=given.transparent, adaptive=given.adaptive
+    )
     pictures = Pictures(given, given.look.tone or "none", pixels)
-    _check_together(given, choices, pictures)
+    _check_together(given, request, pictures)
     pictures.check()
     refuse_overwriting(given.output, model, given.look.environment, given.look.background)
     asked = SceneRequest(
@@ -189,20 +192,24 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     if given.turntable is not None and given.camera.camera is None and given.camera.eye is None:
         scene = framed_all_around(scene, pixels)
     few = pixels[0] * pixels[1] * given.samples * (given.turntable or 1) <= FEW_SAMPLES
-    with quick_compiles(few and choices.method is None and choices.caustics is None):
+    with quick_compiles(few and request.method is None and request.caustics is None):
         opened = tl.Renderer(given.backend)
     with opened as renderer:
-        options = {**vars(choices), "size": pixels, "samples": given.samples, "adaptive": given.adaptive}
-        options |= {"transparent": given.transparent}
-        options |= {"progress": Progress(f"rendering on {renderer.provenance.get('renderer', 'the CPU')}")}
-        draw = partial(renderer.render, **options)
+        progress = Progress(f"rendering on {renderer.provenance.get('renderer', 'the CPU')}")
+        draw = partial(renderer.render_requested, size=pixels, request=request, progress=progress)
         if given.opaque_with is not None:
             from translucent.interop.pyrender import render_scene
 
-            kept = {key: options[key] for key in ("size", "method", "samples", "scattering")}
-            draw = partial(render_scene, renderer=renderer, **kept)
+            draw = partial(
+                render_scene,
+                size=pixels,
+                method=request.method,
+                samples=request.samples,
+                renderer=renderer,
+                scattering=request.scattering,
+            )
         if pictures.tiled:
-            frame, summary = pictures.write_tiles(scene, renderer, options)
+            frame, summary = pictures.write_tiles(scene, renderer, request, progress)
         else:
             frame = pictures.write(scene, draw)
             summary = frame.summary()
@@ -224,7 +231,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in summary["seconds"].items()))
 
 
-def _check_together(given: RenderOptions, choices: RenderChoices, pictures: Pictures) -> None:
+def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pictures) -> None:
     """Raise `InputError` if options are given together of which one does not allow the other."""
     from translucent.scene.stages import NO_STAGE
 
@@ -232,7 +239,7 @@ def _check_together(given: RenderOptions, choices: RenderChoices, pictures: Pict
         raise InputError("--transparent", "a film, which holds no alpha", "leave out one of the two")
     if given.opaque_with is None:
         return
-    interfaces = choices.interfaces
+    interfaces = request.interfaces
     clashes = {
         "--transparent": (given.transparent, "which draws what is behind"),
         f"--interfaces {interfaces and interfaces.name}": (
@@ -240,7 +247,7 @@ def _check_together(given: RenderOptions, choices: RenderChoices, pictures: Pict
             "whose interfaces are those of the screen",
         ),
         f"--stage {given.stage}": (given.stage not in (None, NO_STAGE), "which throws no such shadows"),
-        "--caustics": (choices.caustics is not None, "which draws what light lands on"),
+        "--caustics": (request.caustics is not None, "which draws what light lands on"),
         f"--size {given.size}": (pictures.tiled, "which draws all of it at once"),
     }
     for asked, (clash, why) in clashes.items():
@@ -312,15 +319,17 @@ class Pictures:
             frame.save_aovs(self.aov)
         return frame
 
-    def write_tiles(self, scene: Scene, renderer: Renderer, options: dict[str, Any]) -> tuple[Frame, dict[str, Any]]:
+    def write_tiles(
+        self, scene: Scene, renderer: Renderer, request: RenderRequest, progress: Callable[[float], None]
+    ) -> tuple[Frame, dict[str, Any]]:
         """Draw and write a large picture; returns a small frame of it, and the statistics of all its pixels."""
         from translucent.frames.tiled import write_tiles
-        from translucent.tiles import Totals, render_tiles
+        from translucent.tiles import Totals, tiles_requested
 
         totals, (width, height) = Totals(), self.size
 
         def counted() -> Iterator[Tile]:
-            for tile in render_tiles(renderer, scene, **options):
+            for tile in tiles_requested(renderer, scene, self.size, request, progress=progress):
                 totals.add(tile.frame)
                 yield tile
 
@@ -329,7 +338,7 @@ class Pictures:
         small = max(round(scale * width), 1), max(round(scale * height), 1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # they have been told
-            frame = renderer.render(scene, **{**options, "size": small, "samples": 1})
+            frame = renderer.render_requested(scene, small, replace(request, samples=1), progress=progress)
         return frame, totals.summary((width, height))
 
     def _write_turntable(self, scene: Scene, draw: Callable[[Scene], Frame], count: int) -> Frame:

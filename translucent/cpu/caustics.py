@@ -15,8 +15,8 @@ from translucent.diffusion.photon_flights import photon_flights
 from translucent.formulas import optics
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
-from translucent.planning.caustic_plan import darkened
 from translucent.planning.caustics import Caustics
+from translucent.planning.rendered import darkened
 from translucent.reference.surface_light import SurfaceLight
 from translucent.scene.scene import Light, Scene
 

@@ -27,9 +27,7 @@ from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
 from translucent.geometry.embree import EmbreeMesh, embree_versions
 from translucent.geometry.mesh import Mesh
-from translucent.planning.choices import RenderChoices
 from translucent.planning.render_plan import Capabilities, RenderPlan
-from translucent.planning.scattering.choice import shown
 from translucent.reference.hits import Hits
 from translucent.reference.rays import Rays
 from translucent.reference.refraction import bends
@@ -133,19 +131,17 @@ class CpuRenderer:
         """Capabilities of this renderer for the planner."""
         return Capabilities(shader_storage=False, opengl=False, scattering=False)
 
-    def render(self, scene: Scene, size: tuple[int, int], plan: RenderPlan, samples: int) -> Frame:
-        """Render a scene.
+    def render(self, plan: RenderPlan, size: tuple[int, int]) -> Frame:
+        """Run a plan.
 
         Parameters
         ----------
-        scene : Scene
+        plan : RenderPlan
+            For a renderer without OpenGL. Whatever its method, solids show their true thickness. Radiance and
+            transmittance are averaged over the sub-pixel samples that its request has; the other arrays belong to the
+            ray through the pixel center, as all do with 1.
         size : (width, height)
             In pixels.
-        plan : RenderPlan
-            Of this scene, for a renderer without OpenGL. Whatever its method, solids show their true thickness.
-        samples : int
-            Sub-pixel samples over which radiance and transmittance are averaged. The other arrays belong to the ray
-            through the pixel center, as all do with 1.
 
         Returns
         -------
@@ -162,7 +158,7 @@ class CpuRenderer:
         if self._closed:
             raise RenderError("rendering", "the renderer is closed", "make a new one")
         started = time.perf_counter()
-        given, scene = scene, shown(scene, plan.given_back)
+        scene, samples = plan.scene, plan.request.samples
         shader = Shader.of(scene, plan, self._embree_meshes(scene))
         picture = Picture.of(scene.camera, size)
         arrays = _empty(picture.size)
@@ -182,8 +178,7 @@ class CpuRenderer:
             plan=plan,
             seconds=seconds,
             provenance=self.provenance,
-            scene=given,
-            choices=RenderChoices(),
+            scene=None,
         )
 
     def close(self) -> None:
@@ -208,7 +203,7 @@ class CpuRenderer:
         shapes = tuple((body.mesh, body.matrix.tobytes()) for body in scene.objects)
         if self._caster is None or self._caster[0] != shapes:
             self._caster = shapes, Caster(scene.objects, scene.bounds)
-        diffused = DiffusedLight(self._fields.of(scene, plan.given_back.diffusion, plan.caustics).surfaces)
+        diffused = DiffusedLight(self._fields.of(plan).surfaces)
         return BentLight.of(shader, self._caster[1], picture.size, plan.interfaces.tree, diffused)
 
     def _draw(

@@ -12,8 +12,8 @@ from translucent.diffusion.entering import opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
 from translucent.diffusion.keys import (
     coefficients_of,
+    diffusing_media,
     diffusion_key,
-    marked_media,
     media_lit_by_photons,
     place_of,
     roughness_of,
@@ -21,12 +21,12 @@ from translucent.diffusion.keys import (
 from translucent.diffusion.photon_fluence import EnteringPhotons, FineCells, bent_light
 from translucent.diffusion.volume import DiffusingVolume, PhotonLight, VolumeField, VolumeGrid
 from translucent.geometry.embree import EmbreeMesh
-from translucent.media.given_back import DiffusedMedium, DiffusedVolume
 from translucent.media.medium import Medium
 from translucent.planning.caustic_plan import opaque_to_shadows
-from translucent.planning.caustics import Caustics
+from translucent.planning.render_plan import RenderPlan
+from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.scattering import Diffusion
-from translucent.scene.scene import Object, Scene
+from translucent.scene.scene import Object
 
 #: Bodies, and lit scenes, that are kept.
 KEPT_BODIES, KEPT_SCENES = 16, 4
@@ -56,7 +56,7 @@ NO_FIELDS = Fields({}, {})
 
 
 class FieldCache:
-    """Light of scenes whose media are marked (`DiffusedMedium`, `DiffusedVolume`). Threads may share it.
+    """Light of the bodies of plans in which it diffuses. Threads may share it.
 
     Parameters
     ----------
@@ -75,14 +75,14 @@ class FieldCache:
         self._volumes: OrderedDict[Hashable, DiffusingVolume] = OrderedDict()
         self._scenes: OrderedDict[Hashable, Fields] = OrderedDict()
 
-    def of(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> Fields:
+    def of(self, plan: RenderPlan) -> Fields:
         """Light of each such body by its number; the same object until something changes it.
 
-        With `caustics`, photons carry what interfaces of other bodies bend into them.
+        With caustics, photons carry what interfaces of other bodies bend into them.
         """
-        if not marked_media(scene):
+        if not plan.diffuses:
             return NO_FIELDS
-        key = diffusion_key(scene, diffusion, caustics)
+        scene, diffusion, key = plan.scene, plan.diffusion, diffusion_key(plan)
         if (known := self._scenes.get(key)) is not None:
             return known  # nobody waits for other light that a thread looks for
 
@@ -90,23 +90,23 @@ class FieldCache:
             places = tuple(place_of(item) for item in scene.opaque)
             opaque = _kept(self._opaque, places, lambda: opaque_surfaces(scene.opaque), 1)
             surfaces, volumes = {}, {}
-            bent = self._bent(scene, diffusion, caustics)
-            for i, body in enumerate(scene.objects):
-                if isinstance(body.medium, DiffusedMedium):
-                    medium = body.medium.original
+            bent = self._bent(plan)
+            for i, medium in diffusing_media(scene).items():
+                body = scene.objects[i]
+                if treatment_of(body) is Treatment.DIFFUSION:
                     own = self._body(body, medium, places, opaque, diffusion)
                     surfaces[i] = own.field(scene, i, bent.entering.get(i), bent.stops.get(i))
-                elif isinstance(body.medium, DiffusedVolume):
-                    volumes[i] = self._volume(body, body.medium, diffusion).field(scene, bent.volumes.get(i))
+                else:
+                    volumes[i] = self._volume(body, medium, diffusion).field(scene, bent.volumes.get(i))
             return Fields(surfaces, volumes)
 
         with self._lock:
             return _kept(self._scenes, key, make, KEPT_SCENES)
 
-    def keep(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None, fields: Fields) -> None:
-        """Keep the light of a scene that another solver has found."""
+    def keep(self, plan: RenderPlan, fields: Fields) -> None:
+        """Keep the light of a plan that another solver has found."""
         with self._lock:
-            _kept(self._scenes, diffusion_key(scene, diffusion, caustics), lambda: fields, KEPT_SCENES)
+            _kept(self._scenes, diffusion_key(plan), lambda: fields, KEPT_SCENES)
 
     def has(self, key: Hashable) -> bool:
         """True if the light of this `diffusion_key` is known."""
@@ -150,12 +150,13 @@ class FieldCache:
         place = _density_place(body, diffusion)
         return _kept(self._grids, place, lambda: VolumeGrid(body, diffusion.cell_size(body)), KEPT_BODIES)
 
-    def _bent(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None) -> _Bent:
+    def _bent(self, plan: RenderPlan) -> _Bent:
         """Light that photons carry into bodies."""
+        scene, caustics = plan.scene, plan.caustics
         if caustics is None or not (lit := media_lit_by_photons(scene)):
             return _Bent({}, {}, {})
-        fogs = [i for i in lit if isinstance(scene.objects[i].medium, DiffusedVolume)]
-        grids = {i: self._grid(scene.objects[i], diffusion).grid for i in fogs}
+        fogs = [i for i in lit if treatment_of(scene.objects[i]) is Treatment.VOLUME]
+        grids = {i: self._grid(scene.objects[i], plan.diffusion).grid for i in fogs}
         cells = {i: FineCells.of(own.cells.low, own.cells.step, own.number.shape) for i, own in grids.items()}
         found = bent_light(scene, caustics, cells, [i for i in lit if i not in fogs])
         bending = opaque_to_shadows(scene)

@@ -8,28 +8,28 @@ from dataclasses import astuple
 import numpy as np
 import numpy.typing as npt
 
-from translucent.media.given_back import DiffusedMedium, DiffusedVolume
 from translucent.media.medium import Medium
 from translucent.planning.caustic_plan import lit_by_photons
-from translucent.planning.caustics import Caustics
-from translucent.planning.scattering import Diffusion
+from translucent.planning.render_plan import RenderPlan
+from translucent.planning.rendered import Treatment, scatterer_of, treatment_of
 from translucent.scene.scene import Object, Scene
 
 
-def diffusion_key(scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> Hashable:
-    """Everything that the diffused light of a scene depends on; the camera is no part of it."""
+def diffusion_key(plan: RenderPlan) -> Hashable:
+    """Everything that the diffused light of a plan depends on; the camera is no part of it."""
+    scene, caustics = plan.scene, plan.caustics
     followed = caustics is not None and media_lit_by_photons(scene)
     bending = (caustics.in_media, caustics.seed, _bending(scene)) if caustics is not None and followed else ()
     bodies = tuple(
         (
             i,
-            type(scene.objects[i].medium),
-            place_of(body := scene.objects[i]),
+            treatment_of(body := scene.objects[i]),
+            place_of(body),
             body.density,
             coefficients_of(medium),
             roughness_of(body),
         )
-        for i, medium in marked_media(scene).items()
+        for i, medium in diffusing_media(scene).items()
     )
     opaque = tuple(place_of(item) for item in scene.opaque)
     around = scene.environment  # what is seen behind everything lights nothing
@@ -47,7 +47,7 @@ def diffusion_key(scene: Scene, diffusion: Diffusion, caustics: Caustics | None 
         for i, item in enumerate(scene.objects)
         if item.medium is not None and may_dim(item)
     )
-    return (diffusion, bodies, opaque, lighting, lights, dimming, bending)
+    return (plan.diffusion, bodies, opaque, lighting, lights, dimming, bending)
 
 
 def may_dim(item: Object) -> bool:
@@ -58,15 +58,15 @@ def may_dim(item: Object) -> bool:
 
 def media_lit_by_photons(scene: Scene) -> tuple[int, ...]:
     """Numbers of the bodies into which photons carry light."""
-    return lit_by_photons(scene, sorted(marked_media(scene)))
+    return lit_by_photons(scene, sorted(diffusing_media(scene)))
 
 
-def marked_media(scene: Scene) -> dict[int, Medium]:
-    """Media, by the number of the object, whose diffused light is looked for."""
+def diffusing_media(scene: Scene) -> dict[int, Medium]:
+    """Media, by the number of the object, in which light diffuses."""
     return {
-        i: body.medium.original if isinstance(body.medium, DiffusedMedium) else body.medium
-        for i, body in enumerate(scene.objects)
-        if isinstance(body.medium, DiffusedMedium | DiffusedVolume)
+        i: medium
+        for i, item in enumerate(scene.objects)
+        if treatment_of(item) in (Treatment.DIFFUSION, Treatment.VOLUME) and (medium := scatterer_of(item)) is not None
     }
 
 
@@ -95,6 +95,7 @@ def _bending(scene: Scene) -> Hashable:
             item.sheet_thickness,
             item.surface,
             item.medium,
+            scatterer_of(item),
         )
         for item in scene.objects
     )

@@ -21,8 +21,8 @@ from translucent.formulas.interface import (
 )
 from translucent.geometry.embree import STEP, starts
 from translucent.geometry.normals import drawn_normals
-from translucent.media.given_back import DiffusedMedium
 from translucent.media.medium import Medium
+from translucent.planning.rendered import scatterer_of
 from translucent.planning.slots import same_medium
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
@@ -339,7 +339,7 @@ class _Shape:
 
 def _reduced(item: Object) -> Array:
     """(3,): extinction in 1/m of an object's medium, without what it scatters ahead."""
-    medium = item.medium.original if isinstance(item.medium, DiffusedMedium) else item.medium
+    medium = scatterer_of(item)
     if medium is None or item.sheet_thickness is not None:
         return np.zeros(3)
     assert isinstance(medium, Medium)

@@ -18,7 +18,6 @@ from translucent.errors import InputError
 from translucent.formulas.color import exposure_scale, linear_to_srgb
 from translucent.formulas.tone import tone_curve
 from translucent.frames.writing import Bundle, frame_bundle, png, write_frame, write_pictures
-from translucent.planning.choices import RenderChoices
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.scene import Scene
 
@@ -151,8 +150,6 @@ class Frame:
         Of the radiance, where it is a mean over random paths; None where it has no noise to be told.
     scene : Scene, optional
         Scene that was rendered, for `to_html`. None of frames before a backdrop, which is no part of it.
-    choices : RenderChoices
-        How the renderer was asked to render it.
     """
 
     radiance: npt.NDArray[Any]
@@ -171,7 +168,6 @@ class Frame:
     normals: npt.NDArray[Any] | None = None
     standard_error: npt.NDArray[Any] | None = None
     scene: Scene | None = None
-    choices: RenderChoices = field(default_factory=RenderChoices)
 
     def __post_init__(self) -> None:
         # Without their attribute, `__getattr__` is asked for them.
@@ -192,10 +188,10 @@ class Frame:
         """Names, those of arrays that nobody has asked for yet included."""
         return sorted({*super().__dir__(), *self.__dict__.get(_DEFERRED, {})})
 
-    def rendered_from(self, scene: Scene, choices: RenderChoices) -> Frame:
-        """The frame, as one of that scene, rendered with these choices."""
+    def rendered_from(self, scene: Scene, plan: RenderPlan) -> Frame:
+        """The frame, as one of that scene, by this plan."""
         frame = copy.copy(self)
-        frame.__dict__.update(scene=scene, choices=choices)
+        frame.__dict__.update(scene=scene, plan=plan)
         return frame
 
     def __repr__(self) -> str:

@@ -12,7 +12,6 @@ from translucent.gpu.passes.path_trace import TILE, Progress
 from translucent.gpu.renderer import GpuRenderer
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.scene.scene import Scene
 
 #: Paths of each pixel after which a picture is done, and most of them between two pictures.
 MOST_PATHS, MOST_AT_ONCE = 4096, 16
@@ -31,10 +30,9 @@ class Convergence:
     ----------
     engine : GpuRenderer
         Draws nothing else meanwhile.
-    scene : Scene
-    size : (width, height)
     plan : RenderPlan
         With random paths.
+    size : (width, height)
 
     Attributes
     ----------
@@ -46,13 +44,13 @@ class Convergence:
         Root mean square of its standard error, divided by its mean radiance.
     """
 
-    def __init__(self, engine: GpuRenderer, scene: Scene, size: tuple[int, int], plan: RenderPlan) -> None:
+    def __init__(self, engine: GpuRenderer, plan: RenderPlan, size: tuple[int, int]) -> None:
         self._engine = engine
         self.plan = plan
         self.paths, self.error = 0, np.inf
         self._tile = SOFTWARE_TILE if "software" in engine.context.renderer else TILE
         self._round: Generator[Progress, None, None] | None = None
-        self.job: FrameJob = engine.prepare(scene, size, plan)
+        self.job: FrameJob = engine.prepare(plan, size)
         try:
             engine.run(self.job, leave_out=(PassName.PATH_TRACE,))
         except BaseException:

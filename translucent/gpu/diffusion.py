@@ -12,12 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.diffusion.keys import marked_media
 from translucent.gpu.textures import unlike_powers
-from translucent.planning.caustics import Caustics
+from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Diffusion
 from translucent.planning.slots import MAX_SLOTS, Slot
-from translucent.scene.scene import Scene
 
 if TYPE_CHECKING:
     from translucent.diffusion.cache import FieldCache, Fields
@@ -108,9 +106,9 @@ class DiffusionCache:
         self._lock = Lock()
         self._last: DiffusedLight | None = None
 
-    def of(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> DiffusedLight | None:
-        """Diffused light of a scene whose media are marked, None where there is none."""
-        if not marked_media(scene) or not (fields := self._solver(diffusion).of(scene, diffusion, caustics)):
+    def of(self, plan: RenderPlan) -> DiffusedLight | None:
+        """Diffused light of the bodies of a plan, None where there is none."""
+        if not plan.diffuses or not (fields := self._solver(plan.diffusion).of(plan)):
             return None
         if self._last is None or self._last.fields is not fields:
             self._release_last()
@@ -121,13 +119,13 @@ class DiffusionCache:
         """True if the light of this `diffusion_key` is known."""
         return any(solver.has(key) for solver in tuple(self._solvers.values()))
 
-    def solve(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> None:
-        """Find the light of a scene whose media are marked, to be drawn later. Needs no context: a thread may do it."""
-        self._solver(diffusion).of(scene, diffusion, caustics)
+    def solve(self, plan: RenderPlan) -> None:
+        """Find the light of a plan, to be drawn later. Needs no context: a thread may do it."""
+        self._solver(plan.diffusion).of(plan)
 
-    def keep(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None, fields: Fields) -> None:
-        """Keep the light of such a scene that was found elsewhere. Needs no context, either."""
-        self._solver(diffusion).keep(scene, diffusion, caustics, fields)
+    def keep(self, plan: RenderPlan, fields: Fields) -> None:
+        """Keep the light of a plan that was found elsewhere. Needs no context, either."""
+        self._solver(plan.diffusion).keep(plan, fields)
 
     def release(self) -> None:
         """Free the texture."""

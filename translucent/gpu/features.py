@@ -12,6 +12,7 @@ from translucent.arrays import Array
 from translucent.planning.assembly import FALLBACK_SHEET
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.rendered import Treatment
 from translucent.planning.shadow_maps import dims_interfaces
 from translucent.planning.slots import Slot, medium_slots
 from translucent.scene.scene import Scene
@@ -26,13 +27,15 @@ class FrameFeatures:
 
     Parameters
     ----------
-    scene : Scene
     plan : RenderPlan
-        Of that scene.
     """
 
-    scene: Scene
     plan: RenderPlan
+
+    @property
+    def scene(self) -> Scene:
+        """Scene that the plan renders."""
+        return self.plan.scene
 
     @property
     def has_opaque(self) -> bool:
@@ -84,10 +87,10 @@ class FrameFeatures:
         """True if media, or the light in them, vary from place to place."""
         return self.scene.varies or self.scatters_again
 
-    @property
+    @cached_property
     def scatters_again(self) -> bool:
         """True if light that was scattered before is scattered into the rays."""
-        return bool(self.plan.given_back.volumes)
+        return bool(self.plan.treated(Treatment.VOLUME))
 
     @property
     def stopping_slots(self) -> int:

@@ -38,7 +38,6 @@ from translucent.gpu.uniforms import (
 from translucent.planning.passes import PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.backdrop import Backdrop
-from translucent.scene.scene import Scene
 
 
 class FrameJob(CameraView):
@@ -46,7 +45,7 @@ class FrameJob(CameraView):
 
     Parameters
     ----------
-    gl, scene, plan, targets, resources
+    gl, plan, targets, resources
     backdrop : Backdrop or TextureBackdrop, optional
         What a plan with the pass of that name needs.
     placed : PlacedScene, optional
@@ -106,7 +105,6 @@ class FrameJob(CameraView):
     def __init__(
         self,
         gl: moderngl.Context,
-        scene: Scene,
         plan: RenderPlan,
         targets: Targets,
         resources: Resources,
@@ -117,21 +115,21 @@ class FrameJob(CameraView):
         compact: bool = False,
     ) -> None:
         self.started = time.perf_counter()
-        self.plan = plan
+        self.plan, scene = plan, plan.scene
         self.backdrop = backdrop
         self.averaging = False
         self.sample, self.samples = 0, 1
         self.paths_traced = 0
         self.averaged = False
         self.report: Callable[[float], None] = lambda share: None
-        self.features = FrameFeatures(scene, plan)
+        self.features = FrameFeatures(plan)
         self.compact = compact and self.features.can_be_compact
         self.media_apart = self.features.media_apart if self.compact else None
         placed = placed or PlacedScene.of(scene)
         counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))
         contents = _contents(self.features, placed, Balance.of(placed, plan.method, counts), targets.size)
         if self.features.varies:
-            light = resources.diffusion.of(scene, plan.given_back.diffusion, plan.caustics)
+            light = resources.diffusion.of(plan)
             contents[DENSITY] = density_uniforms(scene, self.features.slots, media_sphere(scene)[0], light)
         super().__init__(gl, placed, self.roles_of(counts), contents, targets, resources)
         self._cleared: set[str] = set()
@@ -149,7 +147,7 @@ class FrameJob(CameraView):
     @cached_property
     def diffused_light(self) -> DiffusedLight | None:
         """Light that diffuses in bodies; None where it does not."""
-        return self.resources.diffusion.of(self.scene, self.plan.given_back.diffusion, self.plan.caustics)
+        return self.resources.diffusion.of(self.plan)
 
     @property
     def diffused_rows(self) -> dict[int, dict[str, npt.ArrayLike]]:

@@ -12,7 +12,6 @@ from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.targets import Targets
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.scene.scene import Scene
 
 #: Largest number of rounds that are followed at once.
 MOST_AT_ONCE = 256
@@ -26,10 +25,9 @@ class PhotonLight:
     Parameters
     ----------
     engine : GpuRenderer
-    scene : Scene
-    size : (width, height)
     plan : RenderPlan
         With caustics.
+    size : (width, height)
 
     Attributes
     ----------
@@ -42,7 +40,7 @@ class PhotonLight:
         differ by; infinite before there are two.
     """
 
-    def __init__(self, engine: GpuRenderer, scene: Scene, size: tuple[int, int], plan: RenderPlan) -> None:
+    def __init__(self, engine: GpuRenderer, plan: RenderPlan, size: tuple[int, int]) -> None:
         self._pass, gl = engine.photons, engine.context.gl
         self._gl = gl
         self.rounds, self.error = 0, np.inf
@@ -55,7 +53,7 @@ class PhotonLight:
             stack.callback(self._into.release)
             targets = Targets(gl, size)
             stack.callback(targets.release)
-            self._job = engine.prepare(scene, size, plan, targets=targets)
+            self._job = engine.prepare(plan, size, targets=targets)
             stack.callback(self._job.release)
             stack.callback(lambda: gl.detect_framebuffer(0).use())  # a released framebuffer must not be the bound one
             self._pass.draw_depth(self._job, objects)

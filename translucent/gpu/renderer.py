@@ -33,9 +33,7 @@ from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import Capabilities, RenderPlan
-from translucent.planning.scattering.choice import shown
 from translucent.scene.backdrop import Backdrop
-from translucent.scene.scene import Scene
 
 #: Passes that make no more than light, which the averages have when the rest is found at the pixel centers.
 _LIGHT = (PassName.CAUSTICS, PassName.SURFACES, PassName.TRACED, PassName.PATH_TRACE)
@@ -105,27 +103,24 @@ class GpuRenderer:
 
     def render(
         self,
-        scene: Scene,
-        size: tuple[int, int],
         plan: RenderPlan,
-        samples: int,
+        size: tuple[int, int],
         backdrop: Backdrop | TextureBackdrop | None = None,
         report: Callable[[float], None] | None = None,
-        *,
-        adaptive: bool = True,
     ) -> Frame:
-        """Run a plan of the scene; radiance and transmittance are the mean of `samples` sub-pixel samples.
+        """Run a plan; radiance and transmittance are the mean of the sub-pixel samples that its request has.
 
         A plan over a backdrop needs it, in the size of the frame. `report` takes the share of the work that is done,
-        now and then. `adaptive`: rays are traced from interfaces as often as it changes the picture.
+        now and then.
         """
+        samples = plan.request.samples
         with self._alone(), self.context.current():
-            job = self.prepare(scene, size, plan, backdrop, compact=True)
+            job = self.prepare(plan, size, backdrop, compact=True)
             job.report = report or job.report
             try:
                 self._timer.begin_frame()
                 if samples > 1:
-                    self._average(job, samples, adaptive=adaptive)
+                    self._average(job, samples)
                     job.averaging, job.averaged, job.sample, job.samples = False, True, 0, 1
                     job.place((0.0, 0.0))
                 self._run_passes(job, leave_out=_LIGHT if samples > 1 else ())
@@ -134,12 +129,10 @@ class GpuRenderer:
                 job.release()
                 self.context.drain()
 
-    def draw(
-        self, scene: Scene, framebuffer: moderngl.Framebuffer, plan: RenderPlan, exposure: float, tone: str
-    ) -> None:
-        """Run a plan of the scene and show its radiance, `exposure` stops brighter, in a framebuffer of the context."""
+    def draw(self, plan: RenderPlan, framebuffer: moderngl.Framebuffer, exposure: float, tone: str) -> None:
+        """Run a plan and show its radiance, `exposure` stops brighter, in a framebuffer of the context."""
         with self._alone(), self.context.current():
-            job = self.prepare(scene, framebuffer.size, plan)
+            job = self.prepare(plan, framebuffer.size)
             try:
                 self.run(job)
                 if self._present is None:
@@ -151,9 +144,8 @@ class GpuRenderer:
 
     def prepare(
         self,
-        scene: Scene,
-        size: tuple[int, int],
         plan: RenderPlan,
+        size: tuple[int, int],
         backdrop: Backdrop | TextureBackdrop | None = None,
         targets: Targets | None = None,
         *,
@@ -164,9 +156,8 @@ class GpuRenderer:
         Without `targets` of its own it is drawn into those of the last frame. A `compact` one is for `read` alone.
         """
         self._require_open()
-        scene = shown(scene, plan.given_back).with_ambient_emitted
         if targets is not None:
-            return FrameJob(self.context.gl, scene, plan, targets, self._resources, backdrop, compact=compact)
+            return FrameJob(self.context.gl, plan, targets, self._resources, backdrop, compact=compact)
         if self._targets is None or self._targets.size != size:
             old, self._targets = self._targets, None
             targets = Targets(self.context.gl, size)
@@ -174,7 +165,7 @@ class GpuRenderer:
                 targets.nothing().use()  # a released framebuffer must not be the bound one
                 old.release()
             self._targets = targets
-        return FrameJob(self.context.gl, scene, plan, self._targets, self._resources, backdrop, compact=compact)
+        return FrameJob(self.context.gl, plan, self._targets, self._resources, backdrop, compact=compact)
 
     def run(self, job: FrameJob, *, geometry_only: bool = False, leave_out: tuple[PassName, ...] = ()) -> None:
         """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""
@@ -282,10 +273,10 @@ class GpuRenderer:
             self._passes[kind] = kind(self.context.gl)
         return self._passes[kind]
 
-    def _average(self, job: FrameJob, samples: int, *, adaptive: bool) -> None:
+    def _average(self, job: FrameJob, samples: int) -> None:
         """Add up `samples` shifted renderings in the target for averages."""
         job.averaging = True
-        if adaptive and is_adaptive(job, samples):
+        if job.plan.request.adaptive and is_adaptive(job, samples):
             self._adaptive = self._adaptive or AdaptiveSampling(self.context.gl)
             self._adaptive.run(job, samples, lambda leave_out: self._run_passes(job, leave_out=leave_out))
             return

@@ -9,7 +9,6 @@ from translucent.gpu.features import FrameFeatures
 from translucent.gpu.formats import FORMATS, accumulator_format, compact_format
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
-from translucent.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -71,9 +70,9 @@ class FrameTraffic:
         return "\n".join(lines)
 
 
-def frame_traffic(scene: Scene, plan: RenderPlan) -> FrameTraffic:
-    """Bytes that a frame of a scene reads from its targets and writes to them, by its plan."""
-    features = FrameFeatures(scene, plan)
+def frame_traffic(plan: RenderPlan) -> FrameTraffic:
+    """Bytes that a frame reads from its targets and writes to them, by its plan."""
+    features = FrameFeatures(plan)
     cleared: set[str] = set()
     steps = [_COUNTED[step.name](features, step, cleared) if step.name in _COUNTED else None for step in plan.passes]
     found = (step or PassTraffic(spec.name) for step, spec in zip(steps, plan.passes, strict=True))

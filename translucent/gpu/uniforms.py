@@ -29,10 +29,10 @@ from translucent.gpu.layout import (
     VIEW,
 )
 from translucent.gpu.placement import PlacedScene, SampleView
-from translucent.media.given_back import LayeredMedium
 from translucent.media.medium import VACUUM
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
+from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
@@ -311,7 +311,7 @@ def _surface_row(
         "ior": medium.ior,
         "dispersion": surface.dispersion,
         "is_sheet": sheet is not None,
-        "scatters_much": isinstance(medium, LayeredMedium),
+        "scatters_much": treatment_of(body) is Treatment.LAYER,
         "sheet_depth": bounded_extinction(medium, scene.diagonal) * (sheet or 0.0),
         "longest": np.linalg.norm(body.bounds[1] - body.bounds[0]),
         "painted_through": surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color),

@@ -25,7 +25,6 @@ from translucent.gpu.shaders import build_program, set_uniform
 from translucent.gpu.strides import STRIDES, phases, shifts
 from translucent.gpu.viewport_side import Side, Size
 from translucent.planning.render_plan import RenderPlan
-from translucent.scene.scene import Scene
 
 #: Samples of a pixel after which its edges are smooth.
 SAMPLES = 16
@@ -201,7 +200,6 @@ class Viewport:
     def step(
         self,
         side: int,
-        scene: Scene,
         plan: RenderPlan,
         stride: int,
         samples: int = SAMPLES,
@@ -218,7 +216,7 @@ class Viewport:
         right, down = shifts(samples)[(round_ - 1) % samples] if round_ else (0.0, 0.0)
         self._rest.use()
         engine, size = self.engine, (self.size[0] // stride, self.size[1] // stride)
-        job = engine.prepare(scene, size, plan)
+        job = engine.prepare(plan, size)
         if photons is not None:
             job.photon_light = photons, stride, phase
         try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -56,9 +55,6 @@ class Medium(Frozen):
     InputError
         If a value is outside its range or not finite.
     """
-
-    #: Whether a frame shows what it scatters many times; see `translucent.media.given_back`.
-    gives_back: ClassVar[bool] = False
 
     absorption: Channels = (0.0, 0.0, 0.0)
     scattering: Channels = (0.0, 0.0, 0.0)

@@ -18,6 +18,7 @@ from translucent.page.payload import header_of, payload
 from translucent.page.plans import plan_page
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
+from translucent.planning.request import RenderRequest
 from translucent.renderer import Renderer
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Object, Scene
@@ -159,7 +160,7 @@ def view(
         raise InputError("tl.view", "the package anywidget is not installed", do) from None
     from translucent.notebook.widget import SceneView
 
-    planned = plan_page(scene, method, interfaces=interfaces)
+    planned = plan_page(scene, RenderRequest(method, interfaces=interfaces))
     mesh = (scene.bodies or scene.objects)[0].mesh
     data = payload(planned, mesh.name, check_size(size), VIEW_SAMPLES, exposure, tone)
     told = header_of(data)["scene"]["media"]

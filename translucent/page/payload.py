@@ -112,8 +112,8 @@ def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, e
 def _recorded(
     recorder: FrameRecorder, planned: PagePlan
 ) -> tuple[dict[str, tuple[Scene, RecordedFrame]], dict[str, str]]:
-    """Frames of the scene and its variants, and the variant that shows each setting of the switches."""
-    frames = {"base": (planned.scene, recorder.record(planned.scene, planned.plan))}
+    """Frames of the scene and of its variants, and which of them each switch setting is shown by."""
+    frames = {"base": (planned.scene, recorder.record(planned.plan))}
     aliases: dict[str, str] = {}
     if all(editable(body) for body in planned.scene.objects):
         return frames, aliases
@@ -126,7 +126,7 @@ def _recorded(
                 continue
             seen = variant(planned.scene, bends=bends, rough=rough)
             try:
-                frames[key] = seen, recorder.record(seen, planned.planned(seen))
+                frames[key] = seen, recorder.record(planned.planned(seen))
                 aliases[key] = key
             except InputError:
                 continue  # a way of drawing that was asked for cannot do it
@@ -283,7 +283,7 @@ def _variant_told(
     kept: frozenset[int],
     spectral_maps: bool,
 ) -> dict[str, Any]:
-    features = FrameFeatures(scene, frame.plan)
+    features = FrameFeatures(frame.plan)
     roles = BodyRoles.of(features, face_counts(scene, int(INFO["GL_SUBPIXEL_BITS"])))
     names = {block.binding: name for name, block in BLOCKS.items()}
     blocks = {names[binding]: into.add(_bytes(content)) for binding, content in frame.blocks.items()}

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
-from translucent.planning.interfaces import FrontInterface, Interfaces
-from translucent.planning.methods import DepthPeeling, Method
-from translucent.planning.methods.base import check_method
+from translucent.planning.interfaces import FrontInterface
+from translucent.planning.methods import DepthPeeling
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName
-from translucent.planning.plan import plan
+from translucent.planning.plan import plan_scene
 from translucent.planning.render_plan import Capabilities, RenderPlan
-from translucent.planning.scattering import Scattering
-from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS, ShadowMaps
+from translucent.planning.request import RenderRequest
+from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS
 from translucent.scene.scene import Object, Scene, check_scene
 from translucent.scene.surface import Surface
 
@@ -140,8 +138,7 @@ class PagePlan:
     ----------
     scene : Scene
     plan : RenderPlan
-    method, interfaces, scattering, shadows : optional
-        As they were asked for.
+    request : RenderRequest
     texture_units : int
         As the planner is told.
     distance : float, optional
@@ -150,10 +147,7 @@ class PagePlan:
 
     scene: Scene
     plan: RenderPlan
-    method: Method | None
-    interfaces: Interfaces | None
-    scattering: Scattering | None
-    shadows: ShadowMaps | None
+    request: RenderRequest
     texture_units: int
     distance: float | None = None
 
@@ -191,55 +185,40 @@ class PagePlan:
 
     def planned(self, scene: Scene) -> RenderPlan:
         """Plan of a variant of the scene."""
-        return _planned(scene, self.method, self.interfaces, self.scattering, self.shadows, self.texture_units)
+        return _planned(scene, self.request, self.texture_units)
 
 
-def plan_page(
-    scene: Scene,
-    method: Method | None = None,
-    *,
-    interfaces: Interfaces | None = None,
-    scattering: Scattering | None = None,
-    shadows: ShadowMaps | None = None,
-) -> PagePlan:
+def plan_page(scene: Scene, request: RenderRequest | None = None) -> PagePlan:
     """Plan a page of a scene.
 
     Raises
     ------
     InputError
-        If WebGL2 cannot draw the scene, or not by what was asked for.
+        If WebGL2 cannot draw the scene, or not by what is requested.
     """
     check_scene(scene)
-    check_method(method)
-    if interfaces is None and triangles(scene) > MOST_TRACED:
-        interfaces = FrontInterface()
-    asked = method, interfaces, scattering, shadows
+    request = request or RenderRequest()
+    if request.interfaces is None and triangles(scene) > MOST_TRACED:
+        request = replace(request, interfaces=FrontInterface())
     units = UNITS_WITH_SHADOWS
-    found = _planned(scene, *asked, units)
+    found = _planned(scene, request, units)
     if found.has(PassName.SURFACES):
         units = TEXTURE_UNITS
-        found = _planned(scene, *asked, units)
-    return PagePlan(scene, found, *asked, units)
+        found = _planned(scene, request, units)
+    return PagePlan(scene, found, request, units)
 
 
-def _planned(
-    scene: Scene,
-    method: Method | None,
-    interfaces: Interfaces | None,
-    scattering: Scattering | None,
-    shadows: ShadowMaps | None,
-    units: int,
-) -> RenderPlan:
+def _planned(scene: Scene, request: RenderRequest, units: int) -> RenderPlan:
+    method = request.method
     if method is not None and method.needs_storage:
         found = "its passes write to buffers, which WebGL2 has none of"
         raise InputError(f"a page with {method}", found, "use SignedDepth, or DepthPeeling for ordered intervals")
     machine = Capabilities(shader_storage=False, texture_units=units)
-    make = partial(plan, scene, capabilities=machine, interfaces=interfaces, scattering=scattering, shadows=shadows)
-    chosen = make(method)
+    chosen = plan_scene(scene, request, machine)
     if isinstance(peeling := chosen.method, DepthPeeling) and peeling.max_layers > MOST_LAYERS:
         # What the planner says why it took it stays.
         reasons = {step.name: step.reason for step in chosen.passes}
-        chosen = make(replace(peeling, max_layers=MOST_LAYERS))
+        chosen = plan_scene(scene, replace(request, method=replace(peeling, max_layers=MOST_LAYERS)), machine)
         passes = tuple(replace(step, reason=reasons.get(step.name, step.reason)) for step in chosen.passes)
         chosen = replace(chosen, passes=passes)
     for step in chosen.passes:

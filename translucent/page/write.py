@@ -6,6 +6,7 @@ import base64
 import html
 import io
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from translucent.arguments import brief, checked_but
@@ -19,6 +20,7 @@ from translucent.page.payload import name_of, payload
 from translucent.page.plans import PagePlan, plan_page
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
+from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Scattering
 from translucent.planning.shadow_maps import ShadowMaps
 from translucent.scene.camera import check_size
@@ -109,7 +111,7 @@ def write_page(
     file = Path(path)
     check_output(file)
     size = check_page_size(size)
-    planned = plan_page(scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows)
+    planned = plan_page(scene, RenderRequest(method, interfaces=interfaces, scattering=scattering, shadows=shadows))
     picture = None if poster is None else check_poster(poster, "poster")
     save_page(planned, file, name or title_of(scene), size, samples, exposure, tone, picture)
     return planned
@@ -199,15 +201,7 @@ def poster_of(planned: PagePlan, size: tuple[int, int], exposure: float, tone: s
     from translucent.renderer import Renderer
 
     with Renderer() as renderer:
-        frame = renderer.render(
-            planned.scene,
-            size,
-            planned.method,
-            samples=POSTER_SAMPLES,
-            interfaces=planned.interfaces,
-            scattering=planned.scattering,
-            shadows=planned.shadows,
-        )
+        frame = renderer.render_requested(planned.scene, size, replace(planned.request, samples=POSTER_SAMPLES))
     return jpeg(frame.to_srgb8(exposure, tone))
 
 
@@ -240,18 +234,12 @@ def _kind(picture: bytes, asked: str) -> str:
 def frame_html(frame: Frame, exposure: float, tone: str, name: str | None) -> str:
     """Text of a page; see `Frame.to_html`."""
     asked = f"a page of {frame!r}"
-    scene, choices = frame.scene, frame.choices
+    scene, request = frame.scene, frame.plan.request
     if scene is None:
         found = "it holds no scene: it was drawn before a backdrop, or put together by hand"
         raise InputError(asked, found, "write one of the whole scene: tl.write_page(scene, 'viewer.html')")
-    if choices.caustics is not None:
+    if request.caustics is not None:
         raise InputError(asked, "it has caustics, and WebGL2 has no photons", "render without caustics")
-    planned = plan_page(
-        scene,
-        choices.method,
-        interfaces=choices.interfaces,
-        scattering=choices.scattering,
-        shadows=choices.shadows,
-    )
+    planned = plan_page(scene, request)
     poster = jpeg(frame.to_srgb8(exposure, tone)) if frame.alpha is None else None
     return page_html(planned, name or title_of(scene), frame.size, exposure=exposure, tone=tone, poster=poster)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from translucent.errors import InputError
 from translucent.planning.bodies import count_of, indices, media_differ, open_bodies, scatters, sheets_of, solids_of
-from translucent.planning.effects import unmodelled_effects
+from translucent.planning.effects import AMBIENT, unmodelled_effects, with_ambient
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.interfaces.places import touching_interfaces, with_interfaces
 from translucent.planning.layers import layer_passes
@@ -37,8 +37,25 @@ FALLBACK_SHEET = 0.01
 COSTS = {"opaque": 2.8, "resolve": 0.4, "layers": 3.0}
 
 
-def assembled(scene: Scene, method: Method, why: str, interfaces: Interfaces, capabilities: Capabilities) -> RenderPlan:
+def assembled(
+    scene: Scene,
+    method: Method,
+    why: str,
+    interfaces: Interfaces,
+    capabilities: Capabilities,
+    *,
+    instead: str,
+    ambient: bool,
+) -> RenderPlan:
     """The plan of a method, which was chosen for the reason `why`, with OpenGL.
+
+    Parameters
+    ----------
+    scene, method, why, interfaces, capabilities
+    instead : str
+        Why interfaces are in screen space rather than traced, or nothing.
+    ambient : bool
+        Media emit the ambient radiance that they scatter, too.
 
     Raises
     ------
@@ -51,12 +68,14 @@ def assembled(scene: Scene, method: Method, why: str, interfaces: Interfaces, ca
     beside = () if method.makes_sheets else (*_declared_sheets(scene), *_fallback_passes(scene, spectral))
     # Sheets go first where intervals are in order: their sums are read where the intervals are resolved.
     passes = (*beside, *_light_views(scene, method), *own) if method.ordered else (*own, *beside)
-    found = _interface_passes(scene, method, interfaces)
+    found = _interface_passes(scene, method, interfaces, instead)
+    unlit = _unlit_passes(scene, spectral) if scatters(scene) and not capabilities.shader_storage else ()
     passes = (
         *_opaque_passes(scene),
         *passes,
         *found[:1],
-        PassSpec(PassName.TRANSMITTANCE, _shading(scene, method), cost=COSTS["resolve"]),
+        *unlit,
+        PassSpec(PassName.TRANSMITTANCE, _shading(scene, method, ambient=ambient), cost=COSTS["resolve"]),
         *found[1:],
         *layer_passes(scene, COSTS["layers"]),
     )
@@ -66,20 +85,19 @@ def assembled(scene: Scene, method: Method, why: str, interfaces: Interfaces, ca
         *_touching(scene, method, interfaces),
         *(_through_bodies(scene, interfaces) if found else ()),
     )
+    limits = (*_limits(scene, method), *([UNLIT] if unlit else []))
+    unmodelled = with_ambient(unmodelled) if ambient else unmodelled
     used = interfaces if found else None
-    return RenderPlan(method, passes, spectral, _limits(scene, method), unmodelled, interfaces=used)
+    return RenderPlan(scene, method, passes, spectral, limits, unmodelled, interfaces=used)
 
 
-def with_unlit_marked(scene: Scene, chosen: RenderPlan) -> RenderPlan:
-    """Add a pass that marks the pixels in which media scatter light that this OpenGL version cannot follow."""
+def _unlit_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
+    """Pass that marks the pixels in which media scatter light that this OpenGL version cannot follow."""
     media = ((i, scene.objects[i].medium) for i in solids_of(scene))
     scattering = tuple(i for i, medium in media if medium is not None and medium.scatters)
     reason = "paths in media that scatter: this OpenGL cannot follow lights there, so their pixels are marked invalid"
-    cost = SignedDepth.cost_for(spectral=chosen.spectral)
-    unlit = PassSpec(PassName.UNLIT, reason, scattering, 1, target="unlit", cost=cost)
-    last = next(i for i, step in enumerate(chosen.passes) if step.name is PassName.TRANSMITTANCE)
-    passes = (*chosen.passes[:last], unlit, *chosen.passes[last:])
-    return replace(chosen, passes=passes, limits=(*chosen.limits, UNLIT))
+    cost = SignedDepth.cost_for(spectral=spectral)
+    return (PassSpec(PassName.UNLIT, reason, scattering, 1, target="unlit", cost=cost),)
 
 
 def _check(scene: Scene, method: Method, capabilities: Capabilities) -> None:
@@ -99,12 +117,15 @@ def _check(scene: Scene, method: Method, capabilities: Capabilities) -> None:
     method.check(scene)
 
 
-def _interface_passes(scene: Scene, method: Method, interfaces: Interfaces) -> tuple[PassSpec, ...]:
+def _interface_passes(scene: Scene, method: Method, interfaces: Interfaces, instead: str) -> tuple[PassSpec, ...]:
     """Passes that find and shade interfaces; none where no interface changes light."""
     if not (found := with_interfaces(scene)):
         return ()
     straight = method.makes_sheets or all(scene.objects[i].sheet_thickness is not None for i in found)
-    return interfaces.passes(scene, straight=straight)
+    drawn, shaded = interfaces.passes(scene, straight=straight)
+    if instead and shaded.name is PassName.SURFACES:
+        shaded = replace(shaded, reason=f"{shaded.reason}; in screen space, since {instead}")
+    return drawn, shaded
 
 
 def _touching(scene: Scene, method: Method, interfaces: Interfaces) -> tuple[Note, ...]:
@@ -192,10 +213,12 @@ def _opaque_passes(scene: Scene) -> tuple[PassSpec, ...]:
     return (PassSpec(PassName.OPAQUE, reason, opaque, 1, cost=COSTS["opaque"]),)
 
 
-def _shading(scene: Scene, method: Method) -> str:
+def _shading(scene: Scene, method: Method, *, ambient: bool) -> str:
     """Description of how path lengths become radiance."""
     if not any(body.medium is not None and body.medium.emits for body in scene.bodies):
-        return "Beer-Lambert: what is behind, through exp(-optical depth)"
-    if method.ordered:
-        return "Beer-Lambert: what is behind, through exp(-optical depth), and what the intervals emit"
-    return "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T)"
+        found = "Beer-Lambert: what is behind, through exp(-optical depth)"
+    elif method.ordered:
+        found = "Beer-Lambert: what is behind, through exp(-optical depth), and what the intervals emit"
+    else:
+        found = "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T)"
+    return f"{found}; {AMBIENT}" if ambient else found

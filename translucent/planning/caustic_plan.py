@@ -5,25 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-
 from translucent.errors import InputError
 from translucent.formulas.phase import ISOTROPIC
-from translucent.media.medium import Medium
 from translucent.planning.bodies import count_of, indices
 from translucent.planning.caustics import Caustics
 from translucent.planning.methods import Method
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.planning.rendered import Treatment
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Time of a photon in media for each object of the scene, which are searched one after the other, in seconds of a
 #: processor core: through a ball of glass into fog, measured on two busy cores.
 SECONDS_OF_A_PHOTON = 2.5e-5
-
-#: Optical depth across a body whose light photons carry.
-DENSE = 1e4
 
 #: Passes that show light of media, of which the first that a plan has tells of photons in them.
 _CARRYING = PassName.LIGHT_VIEWS, PassName.TRACED, PassName.SURFACES
@@ -32,19 +27,6 @@ _CARRYING = PassName.LIGHT_VIEWS, PassName.TRACED, PassName.SURFACES
 def opaque_to_shadows(scene: Scene) -> frozenset[int]:
     """Numbers of the objects that stop the straight light of lamps where photons carry it: solids that bend it."""
     return frozenset(i for i, body in enumerate(scene.objects) if _turns_light(body) and body.sheet_thickness is None)
-
-
-def darkened(scene: Scene, bodies: frozenset[int]) -> Scene:
-    """The scene with these of its bodies so dense that no light passes; the scene itself if there are none."""
-    if not bodies:
-        return scene
-
-    def dense(body: Object) -> Object:
-        return replace(
-            body, medium=Medium(DENSE / float(np.linalg.norm(body.bounds[1] - body.bounds[0]))), surface=None
-        )
-
-    return replace(scene, objects=[dense(body) if i in bodies else body for i, body in enumerate(scene.objects)])
 
 
 def lit_by_photons(scene: Scene, solved: Iterable[int]) -> tuple[int, ...]:
@@ -64,8 +46,8 @@ def with_caustics(
         If no photon could land, or this machine or what else is asked for follows none.
     """
     _check(method)
-    back = found.given_back
-    lit = lit_by_photons(scene, sorted((*back.volumes, *back.diffused)))
+    volumes = found.treated(Treatment.VOLUME)
+    lit = lit_by_photons(scene, found.treated(Treatment.VOLUME, Treatment.DIFFUSION))
     _check_ways(scene, lit)
     carries = next((one for one in _CARRYING if found.has(one)), None)
     steps: list[PassSpec] = []
@@ -78,7 +60,7 @@ def with_caustics(
     return replace(
         found,
         passes=tuple(steps),
-        unmodelled=(*found.unmodelled, *_left_out(scene, lit, back.volumes, capabilities.opengl)),
+        unmodelled=(*found.unmodelled, *_left_out(scene, lit, volumes, capabilities.opengl)),
         caustics=caustics,
         opaque_to_shadows=opaque_to_shadows(scene),
     )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from translucent.arguments import brief, checked
-from translucent.errors import InputError
+from translucent.arguments import checked
 from translucent.planning.methods.base import check_count
 
 #: Largest number of photons of a frame: a software rasterizer follows so many in some minutes.
@@ -65,11 +64,3 @@ class Caustics:
 
     def __str__(self) -> str:
         return f"Caustics(photons={self.photons}, seed={self.seed})"
-
-
-def check_caustics(caustics: Caustics | None) -> None:
-    """Raise `InputError` unless caustics are ones, or None."""
-    if caustics is not None and not isinstance(caustics, Caustics):
-        raise InputError(
-            f"caustics {brief(caustics)}", "not tl.Caustics", "give for example tl.Caustics(photons=1_000_000)"
-        )

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
 
 import numpy as np
 
-from translucent.media.given_back import DiffusedMedium, DiffusedVolume, LayeredMedium
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.layers import layer_effects
 from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName
-from translucent.planning.render_plan import RenderPlan
-from translucent.planning.scattering.choice import GivenBack
+from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Note of a plan in which interfaces do nothing to light.
 STRAIGHT = Note(
     NoteKind.REFRACTION, "refraction and reflection: rays go straight, though interfaces bend and mirror them"
 )
+
+#: How a plan with ambient radiance shades pixels, beside what it does without.
+AMBIENT = "of the ambient radiance A, media scatter sigma_s A for each metre, which counts as emitted"
 
 
 def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: Interfaces | None = None) -> tuple[Note, ...]:
@@ -49,28 +49,21 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: Interfaces
     return tuple(effects)
 
 
-def with_ambient_told(plan: RenderPlan) -> RenderPlan:
-    """Add a note to the plan that media emit the ambient radiance that they would scatter."""
-    told = "of the ambient radiance A, media scatter sigma_s A for each metre, which counts as emitted"
-    shading = (PassName.TRANSMITTANCE, PassName.SHADE)
-    passes = tuple(
-        replace(step, reason=f"{step.reason}; {told}") if step.name in shading else step for step in plan.passes
-    )
-    effects = (effect for effect in plan.unmodelled if effect.kind is not NoteKind.ONLY_REMOVES)
+def with_ambient(notes: Iterable[Note]) -> tuple[Note, ...]:
+    """Notes of a plan in which media emit the ambient radiance that they would scatter."""
     way = Note(NoteKind.DIMMED_AMBIENT, "what dims ambient light on its way to a place in the media")
-    return replace(plan, passes=passes, unmodelled=(*effects, way))
+    return (*(note for note in notes if note.kind is not NoteKind.ONLY_REMOVES), way)
 
 
-def with_given_back_told(plan: RenderPlan, scene: Scene, back: GivenBack) -> RenderPlan:
-    """The plan of what bodies give back, with a note where they are layers though light should diffuse in them."""
+def layers_instead(scene: Scene, refusals: Iterable[tuple[int, str]]) -> tuple[Note, ...]:
+    """Notes on objects, by their numbers, that are layers though light should diffuse in them, and why."""
     reasons: dict[str, list[Object]] = {}
-    for i, why in back.refusals:
+    for i, why in refusals:
         reasons.setdefault(why, []).append(scene.objects[i])
-    notes = tuple(
+    return tuple(
         Note(NoteKind.LAYER_INSTEAD, f"diffusion in {object_names(items)}: {why}; shown as layers")
         for why, items in reasons.items()
     )
-    return replace(plan, given_back=back, unmodelled=(*plan.unmodelled, *notes))
 
 
 def shadow_effects(scene: Scene) -> list[Note]:
@@ -88,18 +81,18 @@ def shadow_effects(scene: Scene) -> list[Note]:
 
 def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> list[Note]:
     """Notes on scattered light that is not rendered."""
-    notes = _given_back_effects(scene) if interfaces else []
-    media = [body.medium for body in scene.bodies if body.medium is not None and body.medium.scatters]
-    if any(isinstance(medium, DiffusedVolume) for medium in media):
+    notes = _subsurface_effects(scene) if interfaces else []
+    bodies = [body for body in scene.bodies if body.medium is not None and body.medium.scatters]
+    if any(treatment_of(body) is Treatment.VOLUME for body in bodies):
         text = (
             "what is scattered more than once: what opaque objects and other bodies keep from it, and where it goes on "
             "ahead, as around lights behind media that scatter ahead"
         )
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
-        media = [medium for medium in media if not isinstance(medium, DiffusedVolume)]
-    if scattering := [medium for medium in media if not (interfaces and medium.gives_back)]:
+    shown = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
+    if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in shown]:
         if followed:
-            densest = max(float(np.max(np.asarray(medium.scattering))) for medium in scattering)
+            densest = max(float(np.max(np.asarray(medium.scattering))) for medium in media)
             text = (
                 "light scattered more than once, of which there is much in bodies that are thicker than a mean free "
                 f"path, here {1 / densest:.2g} m; light of the environment scattered"
@@ -111,23 +104,23 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
             "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
         )
         return [*notes, Note(NoteKind.LIGHTS_LEFT_OUT, text)]
-    shown = scene.opaque or any(body.covers or (interfaces and body.has_interface) for body in scene.bodies)
-    if not notes and scene.lights and not shown:
+    lit = scene.opaque or any(body.covers or (interfaces and body.has_interface) for body in scene.bodies)
+    if not notes and scene.lights and not lit:
         text = "lights: they shine on nothing, since no medium scatters and nothing is opaque"
         return [Note(NoteKind.UNUSED_LIGHTS, text)]
     return notes
 
 
-def _given_back_effects(scene: Scene) -> list[Note]:
-    """Notes on bodies that give back what they scatter many times."""
+def _subsurface_effects(scene: Scene) -> list[Note]:
+    """Notes on bodies whose surfaces show light that they scatter many times."""
     notes = []
-    if any(isinstance(body.medium, LayeredMedium) for body in scene.bodies):
+    if any(treatment_of(body) is Treatment.LAYER for body in scene.bodies):
         text = (
             "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the "
             "path of the ray, which edges and folds are not"
         )
         notes.append(Note(NoteKind.SPREAD_INSIDE, text))
-    if bodies := [body for body in scene.bodies if isinstance(body.medium, DiffusedMedium)]:
+    if bodies := [body for body in scene.bodies if treatment_of(body) is Treatment.DIFFUSION]:
         text = (
             f"{object_names(bodies)}: what other bodies scatter of the environment's light reaches them, and "
             "what is smaller than a cell has no light of its own"

@@ -6,13 +6,13 @@ import numpy as np
 
 from translucent.errors import InputError
 from translucent.media.density import DensityGrid
-from translucent.media.given_back import DiffusedVolume
 from translucent.planning.bodies import open_bodies, scatters, sheets_of
 from translucent.planning.caustics import Caustics
 from translucent.planning.methods import Method, RayMarched
 from translucent.planning.methods.ray_marched import MAX_STEPS
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.render_plan import Capabilities
+from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.lights import PositionalLight, SpotLight
 from translucent.scene.scene import Scene, object_names
 
@@ -100,7 +100,7 @@ def scattered_again_method(scene: Scene, caustics: Caustics | None = None) -> Ra
     if any(isinstance(light, SpotLight) for light in scene.lights):
         return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
     lamps = [np.asarray(light.position) for light in scene.lights if isinstance(light, PositionalLight)]
-    fogs = [body.bounds for body in scene.bodies if isinstance(body.medium, DiffusedVolume)]
+    fogs = [body.bounds for body in scene.bodies if treatment_of(body) is Treatment.VOLUME]
     if any((low <= lamp).all() and (lamp <= high).all() for lamp in lamps for low, high in fogs):
         return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
     return RayMarched(steps=FOG_POINTS, quadrature="gauss")

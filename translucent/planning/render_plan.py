@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Container
+from dataclasses import dataclass, field, replace
 
 from translucent.arguments import checked
 from translucent.planning.caustics import Caustics
@@ -11,8 +12,11 @@ from translucent.planning.interfaces.traced import RECORD_SIZE
 from translucent.planning.methods import Method, PathTraced
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
-from translucent.planning.scattering.choice import NOTHING_GIVEN_BACK, GivenBack
+from translucent.planning.rendered import Treatment, occluder_scene, occluders, treatment_of
+from translucent.planning.request import RenderRequest
+from translucent.planning.scattering import Diffusion
 from translucent.planning.shadow_maps import ShadowMaps
+from translucent.scene.scene import Scene
 
 
 @checked
@@ -40,11 +44,42 @@ class Capabilities:
 
 
 @dataclass(frozen=True)
+class MapPlan:
+    """Plan of maps of shadows: how the paths of light through the bodies of a scene are found.
+
+    Attributes
+    ----------
+    method : Method
+    passes : tuple of PassSpec
+        Over the objects of an `occluder_scene` of all `occluders`.
+    spectral : bool
+    """
+
+    method: Method
+    passes: tuple[PassSpec, ...]
+    spectral: bool
+
+    def of(self, scene: Scene, opaque: Container[int]) -> RenderPlan:
+        """Plan of a map for which no more than these of the opaque objects of a scene are drawn."""
+        everything, numbers = occluders(scene), occluders(scene, opaque)
+        place = {number: i for i, number in enumerate(numbers)}
+        passes = []
+        for step in self.passes:
+            objects = tuple(place[everything[i]] for i in step.objects if everything[i] in place)
+            if objects or step.name is not PassName.OPAQUE:
+                passes.append(replace(step, objects=objects))
+        return RenderPlan(occluder_scene(scene, numbers), self.method, tuple(passes), self.spectral)
+
+
+@dataclass(frozen=True)
 class RenderPlan:
     """Plan of a frame: the method and passes that run, each with its reason.
 
     Attributes
     ----------
+    scene : Scene
+        The scene as it is rendered: each object with its `Treatment`, and media with what they emit of the ambient
+        radiance. Plans are equal whatever their scenes are.
     method : Method
         How thickness is found.
     passes : tuple of PassSpec
@@ -59,13 +94,13 @@ class RenderPlan:
         What is rendered right, and a picture hardly shows: bodies that are black.
     interfaces : Interfaces, optional
         How interfaces are found; None where none changes light, or none is rendered.
-    given_back : GivenBack
-        Bodies that give back light which they scatter many times, and how.
+    diffusion : Diffusion
+        Grid of the bodies in which light diffuses.
     traced : bool
         Rays are traced on the processors, which finds all surfaces on each. Of the `method` only one thing counts
         then: whether bodies are sheets.
     paths : PathTraced, optional
-        The random paths that make the radiance, in place of interfaces and of what is given back; None where none do.
+        The random paths that make the radiance, in place of interfaces and treatments; None where none do.
     caustics : Caustics, optional
         The photons that land on opaque objects, and light media; None where none do.
     opaque_to_shadows : frozenset of int
@@ -73,8 +108,13 @@ class RenderPlan:
         their interfaces bend.
     shadows : ShadowMaps
         How shadows on opaque objects are found, if the plan has the pass.
+    maps : tuple of MapPlan
+        Then, of the maps that lights see, and of those that the environment sees if they differ.
+    request : RenderRequest
+        What was requested.
     """
 
+    scene: Scene = field(compare=False)
     method: Method
     passes: tuple[PassSpec, ...]
     spectral: bool = False
@@ -82,12 +122,14 @@ class RenderPlan:
     unmodelled: tuple[Note, ...] = ()
     remarks: tuple[Note, ...] = ()
     interfaces: Interfaces | None = None
-    given_back: GivenBack = NOTHING_GIVEN_BACK
+    diffusion: Diffusion = field(default_factory=Diffusion)
     traced: bool = False
     paths: PathTraced | None = None
     caustics: Caustics | None = None
     opaque_to_shadows: frozenset[int] = frozenset()
     shadows: ShadowMaps = field(default_factory=ShadowMaps)
+    maps: tuple[MapPlan, ...] = ()
+    request: RenderRequest = field(default_factory=RenderRequest, compare=False)
 
     @property
     def runs(self) -> str:
@@ -99,6 +141,31 @@ class RenderPlan:
         what = "all surfaces on each ray, in float64"
         sheet = self.method.usual_thickness
         return what if sheet is None else f"{what}, as sheets of {sheet:g} m"
+
+    def treated(self, *treatments: Treatment) -> tuple[int, ...]:
+        """Numbers of the objects with one of these treatments."""
+        return tuple(i for i, item in enumerate(self.scene.objects) if treatment_of(item) in treatments)
+
+    @property
+    def diffuses(self) -> bool:
+        """True if light is solved for on grids."""
+        return bool(self.treated(Treatment.DIFFUSION, Treatment.VOLUME))
+
+    @property
+    def multiple_scattering(self) -> str:
+        """How light that is scattered many times is shown, and in how many bodies; empty if it is not."""
+        ways = (
+            (Treatment.DIFFUSION, f"diffuses ({self.diffusion})"),
+            (Treatment.VOLUME, f"is scattered on ({self.diffusion})"),
+            (Treatment.LAYER, "is given back as by layers"),
+        )
+        counts = ((len(self.treated(treatment)), way) for treatment, way in ways)
+        return ", and ".join(f"{way} in {count} {'body' if count == 1 else 'bodies'}" for count, way in counts if count)
+
+    @property
+    def given_back(self) -> str:
+        """Former name of `multiple_scattering`."""
+        return self.multiple_scattering
 
     @property
     def exact(self) -> bool:
@@ -142,7 +209,7 @@ class RenderPlan:
             "method": self.runs,
             "exact": self.exact,
             "interfaces": None if self.interfaces is None else str(self.interfaces),
-            "given_back": str(self.given_back) if self.given_back else None,
+            "given_back": self.multiple_scattering or None,
             "caustics": None if self.caustics is None else str(self.caustics),
             "cost": round(self.cost, 2),
             "passes": [
@@ -163,8 +230,8 @@ class RenderPlan:
         cost = f", at about the cost of {self.cost:.1f} depth-only draws" if self.cost else ""
         lines = [f"{self.runs}: {'exact' if self.exact else 'not exact everywhere'}{cost}"]
         lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
-        if self.given_back:
-            lines.append(f"  light scattered many times {self.given_back}")
+        if shown := self.multiple_scattering:
+            lines.append(f"  light scattered many times {shown}")
         lines += [f"  limit: {limit}" for limit in self.limits]
         lines += [f"  not modelled: {effect}" for effect in self.unmodelled]
         lines += [f"  remark: {remark}" for remark in self.remarks]

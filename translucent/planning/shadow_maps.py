@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from translucent.arguments import brief, checked
+from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import count_of, indices, media_differ
 from translucent.planning.methods import SignedDepth
@@ -55,14 +55,6 @@ class ShadowMaps:
             )
         if self.directions is not None and not (isinstance(self.directions, int) and self.directions >= 1):
             raise InputError(f"ShadowMaps directions {self.directions!r}", "not a number of them", "give for example 8")
-
-
-def check_shadows(shadows: object) -> None:
-    """Raise `InputError` for what is no choice of shadows."""
-    if shadows is not None and not isinstance(shadows, ShadowMaps):
-        raise InputError(
-            f"shadows {brief(shadows)}", "not a choice of shadows", "give for example tl.ShadowMaps(size=2048)"
-        )
 
 
 def shadows_left_out(units: int) -> tuple[Note, ...]:

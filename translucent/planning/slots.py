@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.media.given_back import DiffusedVolume
 from translucent.media.medium import Medium
+from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.scene import Object, Scene, first_overlap
 
 #: Largest number of winding numbers that a ray keeps apart.
@@ -34,20 +34,20 @@ class Slot:
     priority: int
 
 
-def medium_slots(scene: Scene) -> tuple[Slot, ...]:
+def medium_slots(scene: Scene, apart: Sequence[int] = ()) -> tuple[Slot, ...]:
     """Slots of a scene, sorted by descending priority.
 
     Closed bodies of one medium share a slot: their winding numbers are never negative, so the sum of them says how
     often, and whether at all, the medium fills a point. An open body keeps a slot of its own, lest its holes cancel
-    those of another, and so does one whose density varies. With ``overlap="priority"`` only bodies of equal priority
-    share one.
+    those of another, and so does one whose density varies, or in which rays gather light. So do those that are to
+    be kept `apart`. With ``overlap="priority"`` only bodies of equal priority share one.
     """
     groups: dict[Hashable, list[int]] = {}
     fillings = _fillings(scene)
     for i, body in enumerate(scene.objects):
         if body.medium is None or body.sheet_thickness is not None:
             continue
-        own = i if not _never_negative(body) else None
+        own = i if i in apart or not _never_negative(body) else None
         priority = body.priority if scene.overlap == "priority" else 0
         groups.setdefault((own, priority, fillings[i]), []).append(i)
     slots = []
@@ -112,14 +112,18 @@ def _fillings(scene: Scene) -> list[Hashable]:
     media = {id(item.medium): item.medium for item in scene.objects}
     told = {number: _told(medium, bool(scene.lights)) for number, medium in media.items()}
     return [
-        i if (key := told[id(item.medium)]) is None or item.density is not None else key
+        i if (key := told[id(item.medium)]) is None or _is_like_no_other(item) else key
         for i, item in enumerate(scene.objects)
     ]
 
 
+def _is_like_no_other(item: Object) -> bool:
+    return item.density is not None or treatment_of(item) is Treatment.VOLUME
+
+
 def _told(medium: Medium | None, lit: bool) -> Hashable:
-    """Properties that matter of a medium that fills a point; None for one that is like no other."""
-    if medium is None or isinstance(medium, DiffusedVolume):
+    """Properties that matter of a medium that fills a point; None for none."""
+    if medium is None:
         return None
     told = (*medium.extinction.tolist(), *np.asarray(medium.emission).tolist())
     return (*told, *np.asarray(medium.scattering).tolist(), medium.phase_function) if lit else told

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shlex
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -23,15 +23,13 @@ from translucent.geometry.normals import keep_drawn_normals, made_normals
 from translucent.media.medium import Medium
 from translucent.media.presets import preset
 from translucent.planning.caustics import Caustics
-from translucent.planning.methods import Method
-from translucent.planning.scattering import Scattering
+from translucent.planning.request import RenderRequest
 from translucent.preview.document import AUTO, Document, Material, Orbit, camera_of, direction_from, length_text
 from translucent.preview.scenes import (
     Loaded,
     medium_of,
-    method_of,
     own_material,
-    scattering_of,
+    request_of,
     stage_name,
     tone_of,
     turn_from,
@@ -77,18 +75,14 @@ def check_export(path: str) -> None:
 def write_picture(
     path: str,
     scene: Scene,
-    method: Method | None,
     size: Size,
     look: Look = (0.0, "none"),
-    transparent: bool = False,
-    scattering: Scattering | None = None,
-    caustics: Caustics | None = None,
+    request: RenderRequest | None = None,
 ) -> None:
     """Write a .png, or an .exr with all quantities; a transparent one has the bodies alone."""
     report(None, "drawing")
     with Renderer() as renderer:
-        options: dict[str, Any] = {"transparent": transparent, "scattering": scattering, "caustics": caustics}
-        frame = renderer.render(scene, size, method, samples=SAMPLES, **options)
+        frame = renderer.render_requested(scene, size, replace(request or RenderRequest(), samples=SAMPLES))
     report(None, "writing")
     frame.save(path, *look)
 
@@ -96,21 +90,19 @@ def write_picture(
 def write_turntable(
     path: str,
     scene: Scene,
-    method: Method | None,
     size: Size,
     look: Look = (0.0, "none"),
+    request: RenderRequest | None = None,
     count: int = 48,
-    scattering: Scattering | None = None,
-    caustics: Caustics | None = None,
 ) -> None:
     """Write an animation of the model from all around."""
+    request = replace(request or RenderRequest(), samples=4)
     with Renderer() as renderer:
 
         def pictures() -> Iterator[npt.NDArray[np.uint8]]:
             for i, seen in enumerate(turntable(scene, count)):
                 report(i / count, f"picture {i + 1} of {count}")
-                frame = renderer.render(seen, size, method, samples=4, scattering=scattering, caustics=caustics)
-                yield frame.to_srgb8(*look)
+                yield renderer.render_requested(seen, size, request).to_srgb8(*look)
 
         write_animation(Path(path), pictures(), FPS)
 
@@ -266,7 +258,7 @@ def _medium_options(material: Material) -> tuple[list[str], list[str]]:
 
 def python_code(recipe: Recipe) -> str:
     """Python that renders the picture."""
-    document, look, display = recipe.document, recipe.document.look, recipe.document.display
+    document, look = recipe.document, recipe.document.look
     model, orbit, camera = recipe.loaded.model, recipe.orbit, camera_of(recipe.orbit)
     lines = ["import dataclasses", "", "import translucent as tl", "from translucent.assets import mesh_path"]
     lines += ["from translucent.scene.showcase import filled, named_environment", ""]
@@ -307,10 +299,11 @@ def python_code(recipe: Recipe) -> str:
         light = f"tl.DirectionalLight(({towards}), {look.light_irradiance:.12g})"
         lines += [f"scene = dataclasses.replace(scene, lights=[*scene.lights, {light}])"]
     choices = [f"samples={SAMPLES}"]
-    if (method := method_of(display.method, document.material)) is not None:
-        choices += [f"method=tl.{method!r}"]
-    if (scattering := scattering_of(display.scattering)) is not None:
-        choices += [f"scattering=tl.{scattering!r}"]
+    request = request_of(document)
+    if request.method is not None:
+        choices += [f"method=tl.{request.method!r}"]
+    if request.scattering is not None:
+        choices += [f"scattering=tl.{request.scattering!r}"]
     if recipe.caustics is not None:
         choices += [f"caustics=tl.Caustics({recipe.caustics.photons})"]
     lines += ["with tl.Renderer() as renderer:"]

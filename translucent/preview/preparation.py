@@ -94,16 +94,16 @@ def make_normals(task: Task, pool: Pool, mesh: Mesh) -> None:
         _smoothing.release()
 
 
-def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:
+def unsmoothed(plans: Sequence[RenderPlan]) -> list[Mesh]:
     """Large meshes that plans draw with normals not made yet."""
     drawn = {
-        i
+        i: item.mesh
         for plan in plans
         for step in plan.passes
-        for i in step.objects
-        if step.name is PassName.INTERFACES or (step.name is PassName.OPAQUE and scene.objects[i].surface is not None)
+        for i, item in ((i, plan.scene.objects[i]) for i in step.objects)
+        if step.name is PassName.INTERFACES or (step.name is PassName.OPAQUE and item.surface is not None)
     }
-    meshes = (scene.objects[i].mesh for i in sorted(drawn))
+    meshes = (drawn[i] for i in sorted(drawn))
     return [mesh for mesh in meshes if len(mesh.faces) > SMOOTHED_AT_ONCE and not has_drawn_normals(mesh)]
 
 
@@ -150,22 +150,27 @@ class Compiler:
         self.lane = Lane("compile")
         self.device = ""
 
-    def begin(self, scene: Scene, plans: Sequence[RenderPlan], then: Take) -> None:
+    def begin(self, plans: Sequence[RenderPlan], then: Callable[[Compiled], None]) -> None:
         """Start the worker process, with a frame like the one on show; from now on, the context waits for it."""
         self.budget.postpones = True
         self.budget.elsewhere |= self.budget.needed
-        self.request("", scene, plans, then, presents=True)
+        self.request("", plans, then, presents=True)
 
     def request(
-        self, name: str, scene: Scene, plans: Sequence[RenderPlan], then: Take, *, presents: bool = False
+        self,
+        name: str,
+        plans: Sequence[RenderPlan],
+        then: Callable[[Compiled], None],
+        *,
+        presents: bool = False,
     ) -> Task:
-        """Request the programs and normals for plans of a scene; with `presents`, those that show a frame, too."""
+        """Request the programs and normals for plans; with `presents`, those that show a frame, too."""
 
         def work(task: Task) -> Compiled:
             try:
-                for mesh in unsmoothed(scene, plans):
+                for mesh in unsmoothed(plans):
                     make_normals(task, self._pool, mesh)
-                given = stand_in(scene), tuple(map(_quick, plans)), self.device, presents
+                given = tuple(map(_quick, plans)), self.device, presents
                 return self._pool.call(task, compile_frames, *given, urgency=Urgency.PICTURE)
             except CancelledError:
                 raise
@@ -175,8 +180,8 @@ class Compiler:
         return self.lane.start(name, work, then)
 
 
-def compile_frames(scene: Scene, plans: Sequence[RenderPlan], device: str, presents: bool = False) -> Compiled:
-    """Draw a scene by plans, as it is drawn while it moves and at rest, and return the programs that this needed.
+def compile_frames(plans: Sequence[RenderPlan], device: str, presents: bool = False) -> Compiled:
+    """Draw plans, as they are drawn while things move and at rest, and return the programs that this needed.
 
     With `presents`, the first picture is shown in all modes of the window.
     """
@@ -188,21 +193,21 @@ def compile_frames(scene: Scene, plans: Sequence[RenderPlan], device: str, prese
             viewport.resize(FRAME)
             if presents:
                 for side in (0, 1):
-                    viewport.step(side, scene, plans[0], 1)
+                    viewport.step(side, plans[0], 1)
                 for mode, right_side, tone in product(MODES, RIGHT_SIDES, TONES):
                     report(None, mode)
                     viewport.present(Shown(mode, right_side, 0.5, tone=tone))
             for number, plan in enumerate(plans):
                 report(number / len(plans), type(plan.method).__name__)
-                engine.draw(scene, picture, plan, 0.0, "none")
+                engine.draw(plan, picture, 0.0, "none")
                 viewport.restart()
                 for _ in range(2):  # into other types of targets: the centers of pixels, and what is added to them
-                    viewport.step(0, scene, plan, 1, 1)
+                    viewport.step(0, plan, 1, 1)
                 if plan.caustics is not None:
-                    light = PhotonLight(engine, scene, FRAME, plan)
+                    light = PhotonLight(engine, plan, FRAME)
                     light.step(0.0)
                     light.show()
-                    viewport.step(1, scene, plan, 1, photons=light.texture)
+                    viewport.step(1, plan, 1, photons=light.texture)
                     light.release()
         except TranslucentError as error:
             trouble = str(error)
@@ -230,9 +235,8 @@ def _engine(written: float, device: str) -> tuple[GpuRenderer, CompileBudget]:
 
 
 def _quick(plan: RenderPlan) -> RenderPlan:
-    """Plan that needs the same programs, with few cells for diffusion."""
-    back = dataclasses.replace(plan.given_back, diffusion=Diffusion(LEAST_RESOLUTION))
-    return dataclasses.replace(plan, given_back=back)
+    """Plan that needs the same programs: of a stand-in for its scene, with few cells for diffusion."""
+    return dataclasses.replace(plan, scene=stand_in(plan.scene), diffusion=Diffusion(LEAST_RESOLUTION))
 
 
 def stand_in(scene: Scene) -> Scene:

@@ -12,16 +12,15 @@ from typing import TYPE_CHECKING, TypeVar
 from translucent.diffusion.keys import diffusion_key, place_of
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.strides import STRIDES
-from translucent.planning.caustics import Caustics
-from translucent.planning.interfaces import Interfaces, ScreenInterfaces
-from translucent.planning.methods import Method
+from translucent.planning.interfaces import ScreenInterfaces
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.rendered import Treatment, treatment_of
+from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
-from translucent.planning.scattering.choice import GivenBack, given_back, shown
 from translucent.planning.shadow_maps import ShadowMaps
+from translucent.planning.treatments import choose_treatments
 from translucent.preview.preparation import untraceable
-from translucent.preview.scenes import scattering_of
 from translucent.preview.tasks import Task
 from translucent.preview.worker import Pool, Urgency
 from translucent.preview.workspace import Workspace
@@ -192,9 +191,8 @@ class InteractiveQuality:
 
     Attributes
     ----------
-    scattering : Scattering, optional
-    interfaces : Interfaces, optional
-        None: the planner's choice.
+    request : RenderRequest
+        With the interfaces and the scattering to draw with now.
     notes : list of str
         Reasons why interfaces, and scattering, are simpler than requested; empty where they are not.
     solved : bool
@@ -202,8 +200,7 @@ class InteractiveQuality:
     """
 
     def __init__(self, traced_at_once: bool) -> None:
-        self.scattering: Scattering | None = None
-        self.interfaces: Interfaces | None = None
+        self.request = RenderRequest()
         self.notes, self.solved = ["", ""], False
         self._at_once = traced_at_once
         self._lights: tuple[object, ...] = ()
@@ -211,14 +208,14 @@ class InteractiveQuality:
         #: Bodies whose cells of the small grid are known, which take longest.
         self._cells_of: Hashable = None
 
-    def choose(self, workspace: Workspace, scene: Scene, method: Method | None, renderer: Renderer) -> None:
+    def choose(self, workspace: Workspace, scene: Scene, requested: RenderRequest, renderer: Renderer) -> None:
         """Choose scattering and interfaces to draw with now, and request what better ones need."""
         self.notes, self.solved = ["", ""], False
-        requested = scattering_of(workspace.document.display.scattering)
-        back = renderer.plan(scene, method, scattering=requested).given_back
-        self.scattering = self._choose_scattering(workspace, scene, requested, back, renderer.gpu.diffusion)
-        traced = renderer.plan(scene, method, scattering=self.scattering).has(PassName.TRACED)
-        self.interfaces = None if not traced or self.traceable(workspace, scene) else SCREEN
+        plan = renderer.plan_requested(scene, requested)
+        request = replace(requested, scattering=self._choose_scattering(workspace, scene, plan, renderer.gpu.diffusion))
+        if renderer.plan_requested(scene, request).has(PassName.TRACED) and not self.traceable(workspace, scene):
+            request = replace(request, interfaces=SCREEN)
+        self.request = request
 
     def traceable(self, workspace: Workspace, scene: Scene) -> bool:
         """True if rays can be traced through the meshes of the scene without making the window wait."""
@@ -234,85 +231,82 @@ class InteractiveQuality:
         return QUICK_SHADOWS if still else QUICKER_SHADOWS
 
     def _choose_scattering(
-        self, workspace: Workspace, scene: Scene, requested: Scattering | None, back: GivenBack, cache: DiffusionCache
+        self, workspace: Workspace, scene: Scene, plan: RenderPlan, cache: DiffusionCache
     ) -> Scattering | None:
         """Scattering as requested if its light is known, else a simpler one while a worker process solves for it.
 
         That begins when the same light is needed twice: while things move, that of every picture is another.
         """
-        if not back.solved:
-            return requested
-        instead: Scattering = ScatteringLayer() if back.diffused else SingleScattering()
-        simply = "as of flat layers" if back.diffused else "once alone"
-        marked, diffusion, lane = shown(scene, back).with_ambient_emitted, back.diffusion, workspace.lanes["diffuse"]
-        key = diffusion_key(marked, diffusion)
+        if not plan.diffuses:
+            return plan.request.scattering
+        at_surfaces = bool(plan.treated(Treatment.DIFFUSION))
+        instead: Scattering = ScatteringLayer() if at_surfaces else SingleScattering()
+        simply = "as of flat layers" if at_surfaces else "once alone"
+        key, lane = diffusion_key(plan), workspace.lanes["diffuse"]
         moves, self._last = key != self._last, key
         if cache.has(key):
-            return requested
+            return plan.request.scattering
         if lane.failed(key):
             self.notes[1] = f"light that is scattered many times {simply}, since it could not be solved for"
             return instead
-        small = _on_small_grid(scene, back)
-        bodies = None if small is None else _bodies(scene, small)
+        small = _on_small_grid(scene, plan)
+        bodies = None if small is None else _bodies(small)
 
         def solve(task: Task) -> None:
             if small is not None and self._cells_of != bodies:
-                cache.solve(shown(scene, small).with_ambient_emitted, SMALL)
+                cache.solve(small)
                 self._cells_of = bodies
-            solve_aside(task, workspace.pool, cache, marked, diffusion)
+            solve_aside(task, workspace.pool, cache, plan)
 
         if not moves:
             lane.request(key, "diffusing light", solve)
-        if small is not None and self._knows(scene, small, bodies, cache):
-            simply, instead = f"on a small grid, {SMALL} for {diffusion}", SMALL
+        if small is not None and self._knows(small, bodies, cache):
+            simply, instead = f"on a small grid, {SMALL} for {plan.diffusion}", SMALL
         self.notes[1] = f"light that is scattered many times {simply}, until its diffusion is solved for"
         return instead
 
-    def _knows(self, scene: Scene, small: GivenBack, bodies: Hashable, cache: DiffusionCache) -> bool:
+    def _knows(self, small: RenderPlan, bodies: Hashable, cache: DiffusionCache) -> bool:
         """True if the light on the small grid is known, which is solved for here if that is quick."""
-        marked = shown(scene, small).with_ambient_emitted
-        if cache.has(diffusion_key(marked, SMALL)):
+        if cache.has(diffusion_key(small)):
             return True
         if self._cells_of != bodies:
             return False
         begun = time.perf_counter()
-        cache.solve(marked, SMALL)
+        cache.solve(small)
         self.solved = True
         if time.perf_counter() - begun > LONGEST:
             self._cells_of = None
         return True
 
 
-def _on_small_grid(scene: Scene, back: GivenBack) -> GivenBack | None:
-    """Diffusion of the same bodies on the small grid; None where that does not take all of them, or is no smaller."""
-    small = replace(back, diffusion=SMALL)
-    if back.diffusion.resolution <= SMALL.resolution:
+def _on_small_grid(scene: Scene, plan: RenderPlan) -> RenderPlan | None:
+    """The plan on the small grid; None where that does not take all of its bodies, or is no smaller."""
+    if plan.diffusion.resolution <= SMALL.resolution:
         return None
-    if any(SMALL.refusal(scene.objects[i]) is not None for i in (*back.diffused, *back.volumes)):
+    if any(SMALL.refusal(scene.objects[i]) is not None for i in plan.treated(Treatment.DIFFUSION, Treatment.VOLUME)):
         return None
-    return small if given_back(scene, SMALL, layers=True) == small else None
+    treatments = ((i, treatment_of(item)) for i, item in enumerate(plan.scene.objects))
+    own = {i: treatment for i, treatment in treatments if treatment is not Treatment.SINGLE}
+    return replace(plan, diffusion=SMALL) if choose_treatments(scene, SMALL).of == own else None
 
 
-def _bodies(scene: Scene, back: GivenBack) -> Hashable:
+def _bodies(plan: RenderPlan) -> Hashable:
     """Places of the bodies in which light is solved for, and of the objects that shadow them."""
-    bodies = tuple(place_of(scene.objects[i]) for i in (*back.diffused, *back.volumes))
-    return bodies, tuple(place_of(item) for item in scene.opaque)
+    solved = plan.treated(Treatment.DIFFUSION, Treatment.VOLUME)
+    return tuple(place_of(plan.scene.objects[i]) for i in solved), tuple(map(place_of, plan.scene.opaque))
 
 
-def solve_aside(
-    task: Task, pool: Pool, cache: DiffusionCache, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None
-) -> None:
-    """Solve for the light of a scene whose media are marked in a worker process, for a cache.
+def solve_aside(task: Task, pool: Pool, cache: DiffusionCache, plan: RenderPlan) -> None:
+    """Solve for the light of the bodies of a plan in a worker process, for a cache.
 
     In a thread, it would share Python's lock with the window, whose frames would take twice as long.
     """
-    found = pool.call(task, solved_light, scene, diffusion, caustics, urgency=Urgency.PICTURE)
-    cache.keep(scene, diffusion, caustics, found)
+    cache.keep(plan, pool.call(task, solved_light, plan, urgency=Urgency.PICTURE))
 
 
-def solved_light(scene: Scene, diffusion: Diffusion, caustics: Caustics | None) -> Fields:
-    """Light of a scene whose media are marked, by the solver of this process, which keeps what it knows of bodies."""
-    return _solver().of(scene, diffusion, caustics)
+def solved_light(plan: RenderPlan) -> Fields:
+    """Light of the bodies of a plan, by the solver of this process, which keeps what it knows of bodies."""
+    return _solver().of(plan)
 
 
 @lru_cache(maxsize=1)

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from dataclasses import replace
 
-from translucent.diffusion.keys import diffusion_key
+from translucent.diffusion.keys import diffusion_key, media_lit_by_photons
 from translucent.errors import InputError
 from translucent.gpu.convergence import Convergence
 from translucent.gpu.photon_light import PhotonLight
 from translucent.gpu.viewport import Viewport
-from translucent.planning.caustic_plan import lit_by_photons
 from translucent.planning.caustics import Caustics
 from translucent.planning.methods import PathTraced
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.planning.scattering.choice import shown
+from translucent.planning.request import RenderRequest
 from translucent.preview.quality import solve_aside
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
@@ -60,7 +59,7 @@ class PathRefinement:
             if self.plan is None:
                 return False, False
             if self._held is None:
-                self._held = Convergence(renderer.gpu, scene, viewport.size, self.plan)
+                self._held = Convergence(renderer.gpu, self.plan, viewport.size)
                 self.note = "converging: the first paths"
                 return True, False
         except InputError as error:
@@ -124,7 +123,7 @@ class PhotonRefinement:
         scene: Scene,
         renderer: Renderer,
         viewport: Viewport,
-        plan: Callable[..., RenderPlan],
+        request: RenderRequest,
         seconds: float,
         drawing: float,
     ) -> bool:
@@ -138,8 +137,8 @@ class PhotonRefinement:
         scene : Scene
         renderer : Renderer
         viewport : Viewport
-        plan : callable
-            Plans the picture, with the caustics that it is given.
+        request : RenderRequest
+            Of the picture without photons.
         seconds : float
         drawing : float
             Seconds that a picture is expected to take.
@@ -147,13 +146,14 @@ class PhotonRefinement:
         try:
             if self._scene is not scene:
                 self.stop(viewport)
-                self._scene, self.plan = scene, plan(caustics=Caustics(ROUND))
-            if self.plan is None or self.done or not self._media_known(workspace, scene, renderer):
+                self._scene = scene
+                self.plan = renderer.plan_requested(scene, replace(request, caustics=Caustics(ROUND)))
+            if self.plan is None or self.done or not self._media_known(workspace, renderer):
                 return False
             if not self.plan.has(PassName.CAUSTICS):
                 return False  # nothing opaque that more could land on
             if self.light is None:
-                self.light = PhotonLight(renderer.gpu, scene, viewport.size, self.plan)
+                self.light = PhotonLight(renderer.gpu, self.plan, viewport.size)
                 self.note = "caustics: the first photons"
                 return True
         except InputError as error:
@@ -172,15 +172,14 @@ class PhotonRefinement:
             self._count()
         return True
 
-    def _media_known(self, workspace: Workspace, scene: Scene, renderer: Renderer) -> bool:
+    def _media_known(self, workspace: Workspace, renderer: Renderer) -> bool:
         """True if the light of photons in media is known, if there is any; else it is solved for."""
         assert self.plan is not None
-        back, caustics, cache = self.plan.given_back, self.plan.caustics, renderer.gpu.diffusion
-        if not lit_by_photons(scene, (*back.volumes, *back.diffused)):
+        plan, caustics, cache = self.plan, self.plan.caustics, renderer.gpu.diffusion
+        if not media_lit_by_photons(plan.scene):
             return True
         assert caustics is not None
-        marked, lane = shown(scene, back).with_ambient_emitted, workspace.lanes["diffuse"]
-        key = diffusion_key(marked, back.diffusion, caustics)
+        key, lane = diffusion_key(plan), workspace.lanes["diffuse"]
         if cache.has(key):
             self.in_media = True
             if not self.plan.has(PassName.CAUSTICS):
@@ -190,7 +189,7 @@ class PhotonRefinement:
             self.note = "no caustics: what photons light in media could not be solved for"
         elif lane.task is None:
             self.note = "caustics: photons in media first"
-            given = workspace.pool, cache, marked, back.diffusion, caustics
+            given = workspace.pool, cache, plan
             lane.request(key, "photons in media", lambda task: solve_aside(task, *given))
         return False
 

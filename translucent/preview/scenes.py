@@ -21,8 +21,10 @@ from translucent.geometry.normals import corner_normals, drawn_normals, has_draw
 from translucent.geometry.solids import Box
 from translucent.gltf.load import SUFFIXES, load_scene
 from translucent.media.medium import Medium, color_at
+from translucent.planning.caustics import Caustics
 from translucent.planning.methods import Method, method_from_name
-from translucent.planning.scattering import SCATTERINGS, Scattering
+from translucent.planning.request import RenderRequest
+from translucent.planning.scattering import SCATTERINGS
 from translucent.preview.document import (
     AUTO,
     FINISH,
@@ -394,6 +396,8 @@ def method_of(name: str, material: Material) -> Method | None:
     return method_from_name(name).with_thickness(material.thickness)
 
 
-def scattering_of(name: str) -> Scattering | None:
-    """Strategy for light that is scattered many times; None leaves it to the planner."""
-    return None if name == AUTO else SCATTERINGS[name]()
+def request_of(document: Document, caustics: Caustics | None = None) -> RenderRequest:
+    """Request for the picture of a document."""
+    display = document.display
+    scattering = None if display.scattering == AUTO else SCATTERINGS[display.scattering]()
+    return RenderRequest(method_of(display.method, document.material), scattering=scattering, caustics=caustics)

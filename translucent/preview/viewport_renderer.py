@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -13,7 +14,6 @@ from translucent.geometry.normals import drawn_normals
 from translucent.gpu.compile_budget import PostponedError, ProgramName
 from translucent.gpu.context import open_context
 from translucent.gpu.viewport import PixelProbe, Shown, Viewport
-from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.preview.measuring import ReferencePicture
@@ -31,7 +31,7 @@ from translucent.preview.quality import (
     samples_of,
 )
 from translucent.preview.refining import PathRefinement, PhotonRefinement
-from translucent.preview.scenes import method_of, tone_of
+from translucent.preview.scenes import method_of, request_of, tone_of
 from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
@@ -164,18 +164,18 @@ class ViewportRenderer:
         if scene is None:
             return False
         material, both = workspace.document.material, display.compare == "method"
-        method = method_of(display.method, material)
+        requested = request_of(workspace.document)
         second = method_of(display.method_b, material) if both else None
         if held is None:
             begun = time.perf_counter()
-            self.quality.choose(workspace, scene, method, self.renderer)
+            self.quality.choose(workspace, scene, requested, self.renderer)
             spent = time.perf_counter() - begun
             if self.quality.solved and spent > PREPARING * self._budget:
                 self._held = scene  # the next frame draws this one, or what moves all the time would not be drawn
                 return True
             self._budget -= min(spent, PREPARING * self._budget)
-        interfaces, scattering = self.quality.interfaces, self.quality.scattering
-        wanted = (scene, method, second, interfaces, scattering, self.viewport.size, self.renderer)
+        request = self.quality.request
+        wanted = (scene, request, second, self.viewport.size, self.renderer)
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
             self.waits = True
             return True
@@ -186,18 +186,18 @@ class ViewportRenderer:
             self._begin(workspace, scene)
             self.watch(workspace)
         else:  # or the interactive picture is drawn again
-            plan = partial(self.renderer.plan, scene, interfaces=interfaces, scattering=scattering)
-            self.plans = [plan(method), plan(second) if both else None]
+            plan = partial(self.renderer.plan_requested, scene)
+            self.plans = [plan(request), plan(replace(request, method=second)) if both else None]
             self._shown = wanted
             self.viewport.restart()
             self.presenter.truth = None
             self._strides.begin(self.plans, self._budget)
             self._moving, self.simpler = None, ""
-            if self._compiler is not None and self._compiler.budget.postpones and unsmoothed(scene, self._drawn_plans):
+            if self._compiler is not None and self._compiler.budget.postpones and unsmoothed(self._drawn_plans):
                 self._postpone(workspace, wanted)
                 return True
             if display.mode == "picture" and display.compare == "off":
-                return self._draw_at_once(scene, method, workspace)
+                return self._draw_at_once(scene, workspace)
         # One side at a time, the one that is behind: two would take twice as long.
         sides = sorted((0, 1), key=self.viewport.steps) if both else [0]
         still = (display.converges or display.follows_photons) and self.quality.traceable(workspace, scene)
@@ -211,36 +211,35 @@ class ViewportRenderer:
         if display.converges and still and not more:
             more, drawn = self.paths.step(scene, self.renderer, self.viewport, self._budget)
         if lit:
-            more, drawn = self._light_by_photons(scene, method, workspace)
+            more, drawn = self._light_by_photons(scene, workspace)
             if self.photons.light is None and not more:  # there are no photons to follow
                 more = drawn = self._step(0, scene, display.antialias)
         return self.presenter.present(self.viewport, changed=drawn, last=not more) or more
 
-    def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
+    def _draw_at_once(self, scene: Scene, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
-        look, interfaces, usual = workspace.document.look, self.quality.interfaces, self.plans[0]
+        look, usual = workspace.document.look, self.plans[0]
         assert usual is not None
         shadows = self.quality.quick_shadows(scene)
-        choices: dict[str, Any] = {"scattering": self.quality.scattering, "shadows": shadows}
+        request = replace(self.quality.request, shadows=shadows)
         if shadows is not None:
-            self._moving = self.renderer.plan(scene, method, interfaces=interfaces, **choices)
+            self._moving = self.renderer.plan_requested(scene, request)
         slowest = self._budget * COARSEST_TRACED**2
         plans = usual, self._moving or usual
         if any(plan.has(PassName.TRACED) and self._times.known(plan) > slowest for plan in plans):
-            interfaces = SCREEN
-            self._moving = self.renderer.plan(scene, method, interfaces=interfaces, **choices)
+            request = replace(request, interfaces=SCREEN)
+            self._moving = self.renderer.plan_requested(scene, request)
         begun, factor = time.perf_counter(), self._times.factor(self._moving or usual, FACTORS, self._budget)
         try:
             with self.viewport.at_once(factor) as framebuffer:
-                developed = look.exposure, tone_of(look, scene)
-                plan = self.renderer.draw(scene, framebuffer, method, *developed, interfaces=interfaces, **choices)
+                plan = self.renderer.draw_requested(scene, framebuffer, request, look.exposure, tone_of(look, scene))
         except PostponedError as error:
             if error.program is None:
                 self._shown = ()  # the same again: what has been made is for pictures of this size
             raise
         self._finish(0, plan, factor, begun)
         self.state = "moving" if factor == 1.0 else f"moving, {1 / factor:.0%} of the resolution"
-        if interfaces is not self.quality.interfaces:
+        if request.interfaces is not self.quality.request.interfaces:
             self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
         elif shadows is not None:
             self.simpler = f"shadows from {shadows.directions} directions of the environment while the picture moves"
@@ -256,18 +255,18 @@ class ViewportRenderer:
         if plan is None or drawn >= whole * (1 + samples):
             return False
         self.simpler, begun = "", time.perf_counter()
-        self.viewport.step(side, scene, plan, stride, max(samples, 1))
+        self.viewport.step(side, plan, stride, max(samples, 1))
         self._finish(side, plan, stride, begun)
         if self._strides.corrected(side, plan, drawn + 1, self._budget):
             self.viewport.restart(side)
         return True
 
-    def _light_by_photons(self, scene: Scene, method: Method | None, workspace: Workspace) -> tuple[bool, bool]:
+    def _light_by_photons(self, scene: Scene, workspace: Workspace) -> tuple[bool, bool]:
         """Follow photons, or draw a step of the picture with their light; whether more is to come, and it changed."""
         photons, strides = self.photons, self._strides.of
         expected = 0.0 if self.plans[0] is None else self._times.known(self.plans[0])
-        plan = partial(self.renderer.plan, scene, method, scattering=self.quality.scattering)
-        if not photons.ready(workspace, scene, self.renderer, self.viewport, plan, self._budget, expected):
+        request = replace(self.quality.request, interfaces=None)
+        if not photons.ready(workspace, scene, self.renderer, self.viewport, request, self._budget, expected):
             if (shown := photons.show_media(self.viewport)) is not None:
                 self.plans[0], strides[0] = shown, self._times.stride(shown, self._budget)
             return False, False
@@ -277,7 +276,7 @@ class ViewportRenderer:
             strides[1] = self._times.stride(photons.plan, self._budget)
         stride, begun = strides[photons.side], time.perf_counter()
         samples = samples_of(stride, workspace.document.display.antialias)
-        self.viewport.step(photons.side, scene, photons.plan, stride, max(samples, 1), photons=photons.light.texture)
+        self.viewport.step(photons.side, photons.plan, stride, max(samples, 1), photons=photons.light.texture)
         self._finish(0, photons.plan, stride, begun)
         if photons.take_over(self.viewport, stride, samples):
             strides[0], self.plans[0] = stride, photons.plan
@@ -313,7 +312,7 @@ class ViewportRenderer:
             self._begun = True
             workspace.prepare()
             if self._compiler is not None:
-                self._compiler.begin(scene, self._drawn_plans, partial(self._take_compiled, workspace))
+                self._compiler.begin(self._drawn_plans, partial(self._take_compiled, workspace))
 
     @property
     def _drawn_plans(self) -> list[RenderPlan]:
@@ -331,11 +330,11 @@ class ViewportRenderer:
             # The user does not wait, so that the window does the work.
             self._requested = None
             self._take_compiled(workspace, Compiled(frozenset()), program)
-            for mesh in unsmoothed(scene, self._drawn_plans):
+            for mesh in unsmoothed(self._drawn_plans):
                 drawn_normals(mesh)
         elif compiler.lane.task is None or not compiler.lane.task.name:  # work that nobody waits for is replaced
             then = partial(self._take_compiled, workspace, missing=program)
-            self._requested = compiler.request("preparing the picture", scene, self._drawn_plans, then)
+            self._requested = compiler.request("preparing the picture", self._drawn_plans, then)
 
     def _take_compiled(self, workspace: Workspace, found: Compiled, missing: ProgramName | None = None) -> None:
         """Let the context build the programs found, and the one that was `missing`, even if it was not."""
@@ -363,7 +362,7 @@ class ViewportRenderer:
             compiler.budget.postpones = True
             self._take_compiled(workspace, found)
 
-        compiler.request("preparing the picture", scene, self._drawn_plans, take)
+        compiler.request("preparing the picture", self._drawn_plans, take)
         return None
 
     def _rebuild(self, workspace: Workspace) -> None:
@@ -377,8 +376,7 @@ class ViewportRenderer:
                 if scene is not None:
                     viewport.resize(FRAME)
                     for plan in self._drawn_plans:
-                        choices: dict[str, Any] = {"interfaces": plan.interfaces, "scattering": self.quality.scattering}
-                        viewport.step(0, scene, fresh.plan(scene, plan.method, **choices), 1)
+                        viewport.step(0, fresh.plan_requested(scene, plan.request), 1)
                 viewport.resize(size)
             except TranslucentError as error:
                 self.shader_problem = str(error)

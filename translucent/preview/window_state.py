@@ -6,7 +6,7 @@ import dataclasses
 import math
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ from translucent.preview.document import Material, Model
 from translucent.preview.exports import Recipe, command_line, python_code, write_picture, write_turntable
 from translucent.preview.library import ENVIRONMENT_SUFFIXES, EnvironmentFolder, model_key, model_picture
 from translucent.preview.measuring import Crossing, first_object
-from translucent.preview.scenes import material_of, medium_of, method_of, scattering_of, tone_of
+from translucent.preview.scenes import material_of, medium_of, request_of, tone_of
 from translucent.preview.session import save_session
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
@@ -390,12 +390,12 @@ class WindowState:
         if scene is None:
             return
         look = document.look.exposure, tone_of(document.look, scene)
-        shown = scene, method_of(document.display.method, document.material), self.view.viewport.size, look
-        choices = scattering_of(document.display.scattering), self._caustics(scene)
+        shown, request = (scene, self.view.viewport.size, look), request_of(document, self._caustics(scene))
         if kind == "turntable":
-            self.work.export(path, write_turntable, *shown, self.export["pictures"], *choices)
+            self.work.export(path, write_turntable, *shown, request, self.export["pictures"])
         else:
-            self.work.export(path, write_picture, *shown, self.export["transparent"], *choices)
+            request = replace(request, transparent=bool(self.export["transparent"]))
+            self.work.export(path, write_picture, *shown, request)
 
     def copy_recipe(self, kind: str) -> str | None:
         """Copy a ``command``, or ``python``, that makes the picture from here; None before there is one."""
@@ -419,10 +419,10 @@ class WindowState:
         document = self.work.document
         if not document.display.caustics:
             return None
-        light, method = self.view.photons.light, method_of(document.display.method, document.material)
+        light = self.view.photons.light
         caustics = Caustics(max(light.photons if light is not None else 0, Caustics().photons))
         try:
-            self.view.renderer.plan(scene, method, caustics=caustics)
+            self.view.renderer.plan_requested(scene, request_of(document, caustics))
         except InputError as error:
             self.work.tell("warning", f"without caustics: {error}")
             return None

@@ -14,7 +14,6 @@ from translucent.arrays import Array, Integers, Mask
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
-from translucent.planning.choices import RenderChoices
 from translucent.planning.methods import Method, RayMarched
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
@@ -95,6 +94,7 @@ def march(
     return Frame(
         **{name: array.reshape(height, width, *array.shape[1:]) for name, array in arrays.items()},
         plan=RenderPlan(
+            scene,
             scheme.method,
             (PassSpec(PassName.MARCH, f"asked for: {scheme}"),),
             limits=(Note(NoteKind.STEPS, f"sums over {scheme.method.steps} steps in each interval"),),
@@ -102,7 +102,6 @@ def march(
         seconds={"total": time.perf_counter() - began},
         provenance={"backend": "reference", "numpy": np.__version__},
         scene=scene,
-        choices=RenderChoices(),
     )
 
 

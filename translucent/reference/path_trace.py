@@ -16,7 +16,6 @@ import numpy as np
 from translucent.arrays import Array, Integers
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
-from translucent.planning.choices import RenderChoices
 from translucent.planning.methods import SignedDepth
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
@@ -247,6 +246,7 @@ def path_trace(
     frame = Frame(
         **{name: array.reshape(height, width, *array.shape[1:]) for name, array in arrays.items()},
         plan=RenderPlan(
+            scene,
             SignedDepth(),
             (PassSpec(PassName.PATH_TRACE, reason),),
             limits=(Note(NoteKind.NOISE, "radiance has noise"),),
@@ -255,7 +255,6 @@ def path_trace(
         seconds={"total": time.perf_counter() - began},
         provenance={"backend": "reference", "numpy": np.__version__},
         scene=scene,
-        choices=RenderChoices(),
     )
     return frame, error.reshape(height, width, 3)
 

@@ -16,7 +16,6 @@ from translucent.errors import InputError
 from translucent.files.reading import require_memory
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
-from translucent.planning.choices import RenderChoices
 from translucent.planning.effects import STRAIGHT
 from translucent.planning.methods import Method
 from translucent.planning.methods.base import check_method
@@ -150,7 +149,6 @@ def render(
         seconds={"intersect": crossed - start, "shade": end - crossed, "total": end - start},
         provenance=provenance,
         scene=scene,
-        choices=RenderChoices(),
     )
 
 

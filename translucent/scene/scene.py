@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from typing import Any, Literal, get_args
@@ -139,7 +139,7 @@ class Object(Frozen):
         """True if its interface changes light: refracts, reflects, tints or scatters it."""
         if self.medium is None or self.covers:
             return False
-        return self.medium.ior != 1.0 or self.medium.gives_back or not self.plain
+        return self.medium.ior != 1.0 or not self.plain
 
     def to_unit_box(self, center: Array) -> Array:
         """(3, 4): from points of the world, given from `center` (3,) in metres, to the box of a `Density`; float64."""
@@ -372,17 +372,6 @@ class Scene(Frozen):
         """True if any medium scatters ambient radiance."""
         media = [body.medium for body in self.bodies if body.medium is not None]
         return any(bool((np.asarray(medium.scattering) * np.asarray(self.ambient) > 0).any()) for medium in media)
-
-    @cached_property
-    def with_ambient_emitted(self) -> Scene:
-        """Copy in which media emit the ambient radiance that they scatter; the scene itself if there is none."""
-        if not self.scatters_ambient:
-            return self
-        objects = [
-            body if body.medium is None else replace(body, medium=replace(body.medium, emission=self.source(body)))
-            for body in self.objects
-        ]
-        return replace(self, objects=objects, ambient=(0.0, 0.0, 0.0))
 
     @cached_property
     def shown(self) -> tuple[Object, ...]:

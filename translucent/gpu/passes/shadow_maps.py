@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import weakref
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 
 import moderngl
@@ -29,20 +29,15 @@ from translucent.gpu.placement import AxialRange, PlacedScene, depth_range
 from translucent.gpu.resources import Resources
 from translucent.gpu.shadow_atlas import Seen, ShadowView, ShadowViews
 from translucent.gpu.shadow_cameras import ShadowThrowers, holds_eye
-from translucent.gpu.storage import SHADER_STORAGE
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import media_center
 from translucent.media.medium import Medium
-from translucent.planning.caustic_plan import darkened
-from translucent.planning.methods import Method
 from translucent.planning.mirrors import lit_side
 from translucent.planning.passes import PassName, PassSpec
-from translucent.planning.paths import straight_scene
-from translucent.planning.plan import plan
-from translucent.planning.render_plan import Capabilities, RenderPlan
-from translucent.scene.environment import Environment
+from translucent.planning.render_plan import MapPlan, RenderPlan
+from translucent.planning.rendered import darkened, occluding_bodies
 from translucent.scene.lights import DirectionalLight
-from translucent.scene.scene import Light, Object, Scene
+from translucent.scene.scene import Light, Scene
 from translucent.scene.shadow_directions import shadow_directions
 
 #: Most shares of the directions of the environment where one sample of a pixel may have to do.
@@ -55,15 +50,13 @@ _FARTHEST = 16.0
 #: Sine of the angle below a ground up to which light may fall on it, by rounding.
 _GRAZING = 1e-4
 
-_BLACK = Environment.constant((0.0, 0.0, 0.0))
-
 
 class MapJob(FrameJob):
     """Frame that a light sees, drawn into its place in the atlas; axial depths are metres ahead of the scene's center.
 
     Parameters
     ----------
-    gl, scene, plan, targets, resources
+    gl, plan, targets, resources
     view : ShadowView
     center : (3,) float64
         Of the media.
@@ -74,20 +67,19 @@ class MapJob(FrameJob):
     def __init__(
         self,
         gl: moderngl.Context,
-        scene: Scene,
         plan: RenderPlan,
         targets: Targets,
         resources: Resources,
         view: ShadowView,
         center: Array,
     ) -> None:
-        self._view = view
+        self._view, scene = view, plan.scene
         self.corner = view.corner
         self.path_only, self.two_media = not resources.shadows.spectral, resources.shadows.two_media
         self.projected_depth = self.path_only and not self.two_media and view.ends and _resolves(scene)
         zero = float(scene.camera.forward @ (center - scene.camera.eye))
         placed = replace(PlacedScene.of(scene), media=AxialRange(zero, zero + 1.0))
-        super().__init__(gl, scene, plan, targets, resources, placed=placed, with_depth=self.projected_depth)
+        super().__init__(gl, plan, targets, resources, placed=placed, with_depth=self.projected_depth)
 
     def roles_of(self, counts: FaceCounts) -> BodyRoles:
         """Roles of the objects, with the slots of two media."""
@@ -124,7 +116,7 @@ class ShadowMapsPass:
         self._made: dict[PassName, Callable[[FrameJob, PassSpec], None]] = {}
         self._targets: dict[int, Targets] = {}
         self._placed: tuple[object, ShadowViews] | None = None
-        self._plans: dict[Hashable, tuple[Scene, RenderPlan]] = {}
+        self._plans: dict[Hashable, RenderPlan] = {}
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Render those of the maps that the frame reads and that are not there, and write the uniforms.
@@ -153,7 +145,7 @@ class ShadowMapsPass:
             self._render(job, seen, first, step)
         assert atlas.views is not None
         center = media_center(scene)
-        media = _slots(scene)[1] if atlas.two_media else [_throwing(scene)[0].medium]
+        media = _slots(scene)[1] if atlas.two_media else [occluding_bodies(scene)[0].medium]
         extinctions = np.array([bounded_extinction(medium, scene.diagonal) for medium in media])
         turns = first, -step if few or job.bending else step
         if job.averaged:
@@ -167,22 +159,20 @@ class ShadowMapsPass:
     def _render(self, job: FrameJob, seen: Seen, first: int, step: int) -> None:
         """Render the maps of lights, and of every so-many-th direction of the environment."""
         scene, atlas = job.scene, job.resources.shadows
-        # Where all bodies are drawn as sheets, these throw the shadows, too.
-        method = job.plan.method if job.plan.method.makes_sheets else None
-        dark = darkened(scene, job.plan.opaque_to_shadows)
+        dark, lit = darkened(scene, job.plan.opaque_to_shadows), job.plan.maps[0]
         opaque = tuple(i for i, item in enumerate(scene.objects) if item.medium is None)
-        everything = self._planned(dark, method, opaque)
+        key, everything = self._planned(lit, dark, opaque)
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
-        in_place = all(one.name in _IN_PLACE for one in everything[2].passes)
+        in_place = all(one.name in _IN_PLACE for one in everything.passes)
         if atlas.held is None:
             views = self._views(job, seen, opaque, in_place=in_place)
-            spectral = everything[2].spectral or not in_place or dark is not scene
-            two = spectral and dark is scene and not job.resources.media_change and _has_two_media(*everything[1:])
+            spectral = everything.spectral or not in_place or dark is not scene
+            two = spectral and dark is scene and not job.resources.media_change and _has_two_media(everything)
             atlas.make(views, spectral=spectral and not two, two_media=two)
             atlas.held = seen
         assert atlas.views is not None
         center = media_center(scene)
-        used = {everything[0]}
+        used = {key}
         for view in _read(job, atlas.views, first, step):
             if view in atlas.drawn:
                 continue
@@ -192,10 +182,10 @@ class ShadowMapsPass:
                 self._targets[view.size] = Targets(self._gl, (view.size, view.size))
             # Where no opaque object is in the way, none has to be drawn; photons are those of lights alone.
             clear = dark is scene or view in atlas.views.sky
-            key, lit, chosen = self._planned(scene if clear else dark, method, view.opaque)
+            key, plan = self._planned(*((job.plan.maps[-1], scene) if clear else (lit, dark)), view.opaque)
             used.add(key)
-            chosen = chosen if dark is scene else replace(chosen, spectral=True)
-            before = replace(lit, camera=view.camera), chosen, self._targets[view.size], job.resources
+            plan = replace(plan, scene=replace(plan.scene, camera=view.camera))
+            before = plan if dark is scene else replace(plan, spectral=True), self._targets[view.size], job.resources
             try:
                 if in_place:
                     self._add_up(MapJob(self._gl, *before, view, center))
@@ -229,19 +219,13 @@ class ShadowMapsPass:
             self._placed = key, ShadowViews.of(seen_by, seen_from_sky, job.plan.shadows.size, limit)
         return self._placed[1]
 
-    def _planned(
-        self, scene: Scene, method: Method | None, opaque: tuple[int, ...]
-    ) -> tuple[Hashable, Scene, RenderPlan]:
-        """The scene without interfaces, and no opaque objects but these, and its plan; with a key of them."""
-        bodies, ends = set(map(id, _throwing(scene))), set(opaque)
-        objects = [item for i, item in enumerate(scene.objects) if i in ends or id(item) in bodies]
+    def _planned(self, maps: MapPlan, scene: Scene, opaque: tuple[int, ...]) -> tuple[Hashable, RenderPlan]:
+        """Plan of a map that ends at these opaque objects alone, with a key of it."""
         # Lights move more often than objects change.
-        key = tuple(map(weakref.ref, objects)), scene.overlap, method
+        key = tuple(map(weakref.ref, scene.objects)), scene.overlap, maps, opaque
         if key not in self._plans:
-            seen = straight_scene(replace(scene, objects=objects, environment=_BLACK, environment_shadows=0))
-            storage = self._gl.version_code >= SHADER_STORAGE
-            self._plans[key] = seen, plan(seen, method, Capabilities(shader_storage=storage))
-        return key, *self._plans[key]
+            self._plans[key] = maps.of(scene, opaque)
+        return key, self._plans[key]
 
     def _add_up(self, light: MapJob) -> None:
         """Draw one map where it is."""
@@ -309,16 +293,11 @@ _STEPS: dict[PassName, type[SignedDepthPass | ThinLayerPass | FragmentListsPass 
 }
 
 
-def _throwing(scene: Scene) -> Sequence[Object]:
-    """Bodies that throw shadows. Layers throw none; but a plan needs bodies, and alone they are clear sheets."""
-    return [item for item in scene.bodies if not item.covers] or scene.bodies
-
-
 def _slots(scene: Scene) -> tuple[tuple[int, ...], list[Medium | None]]:
     """Slots of all objects by the extinction of those that throw shadows, -1 of others and of clear ones; and the
     medium of each slot, two at least.
     """
-    throwing, found = set(map(id, _throwing(scene))), dict[bytes, Medium | None]()
+    throwing, found = set(map(id, occluding_bodies(scene))), dict[bytes, Medium | None]()
     slots = []
     for item in scene.objects:
         extinction = None if item.medium is None or id(item) not in throwing else np.asarray(item.medium.extinction)
@@ -330,10 +309,10 @@ def _slots(scene: Scene) -> tuple[tuple[int, ...], list[Medium | None]]:
     return tuple(slots), [*found.values(), None, None][: max(len(found), 2)]
 
 
-def _has_two_media(scene: Scene, chosen: RenderPlan) -> bool:
+def _has_two_media(plan: RenderPlan) -> bool:
     """Tell whether paths in two media are all that light goes through."""
-    names = {step.name for step in chosen.passes}
-    return PassName.SIGNED_DEPTH in names and names.issubset(_SUMS) and len(_slots(scene)[1]) == 2
+    names = {step.name for step in plan.passes}
+    return PassName.SIGNED_DEPTH in names and names.issubset(_SUMS) and len(_slots(plan.scene)[1]) == 2
 
 
 def _sky_lights(scene: Scene) -> list[Light]:

@@ -19,9 +19,9 @@ from translucent.gpu.passes.variants import Variants, coat_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import media_center
-from translucent.media.given_back import LayeredMedium
 from translucent.planning.mirrors import Mirror, ground_of, mirror_of
 from translucent.planning.passes import PassSpec
+from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.scene import Scene
 
 _SAMPLERS = (
@@ -175,7 +175,7 @@ class TracedInterfacesPass:
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
             EMISSION=job.features.emits and not job.features.scatters,
-            LAYERED=any(isinstance(body.medium, LayeredMedium) for body in scene.bodies),
+            LAYERED=any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
             DIFFUSED=job.diffused_light is not None,
             MICROFACETS=mirror or rough,
             ROUGH=rough,

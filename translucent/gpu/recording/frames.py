@@ -18,8 +18,6 @@ from translucent.gpu.scene_view import CameraView
 from translucent.gpu.targets import Targets
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.planning.scattering.choice import shown
-from translucent.scene.scene import Scene
 
 #: Size of a recorded frame: prime numbers, so that no texture of another purpose has it.
 SIZE = (1021, 769)
@@ -98,17 +96,16 @@ class FrameRecorder:
         """Caches of what has been made."""
         return self._resources
 
-    def record(self, scene: Scene, plan: RenderPlan) -> RecordedFrame:
-        """Record a frame of a scene by its plan."""
-        scene = shown(scene, plan.given_back).with_ambient_emitted
-        job = RecordedJob(self._context, scene, plan, self._targets, self._resources)
+    def record(self, plan: RenderPlan) -> RecordedFrame:
+        """Record a frame."""
+        job = RecordedJob(self._context, plan, self._targets, self._resources)
         frame = RecordedFrame(plan)
         self.gl.live_blocks = {}
         self._run(job, frame.once, frame.single)
         frame.blocks = dict(self.gl.live_blocks)
         bodies = cast(RecordedBuffer, job.uniforms.bodies)
         frame.bodies = [
-            bytes(bodies.content[i * BODY_STRIDE : (i + 1) * BODY_STRIDE]) for i in range(len(scene.objects))
+            bytes(bodies.content[i * BODY_STRIDE : (i + 1) * BODY_STRIDE]) for i in range(len(plan.scene.objects))
         ]
         job.averaging, job.sample, job.samples = True, 0, self._samples
         self.gl.steps = frame.averaged

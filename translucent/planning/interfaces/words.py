@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from translucent.media.given_back import DiffusedMedium, LayeredMedium
 from translucent.planning.interfaces.places import with_interfaces
+from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.scene import Scene, object_names
 
 
@@ -33,8 +33,8 @@ def effects_of(scene: Scene, *, bends: bool = True, mirrored: str = "the environ
         effects.append("paint reflects what does not enter")
     if any((np.asarray(surface.color) != 1).any() or surface.color_texture for surface in surfaces):
         effects.append("colors tint what enters")
-    if any(isinstance(body.medium, LayeredMedium) for body in bodies):
+    if any(treatment_of(body) is Treatment.LAYER for body in bodies):
         effects.append("light that scatters many times leaves as from a layer (Kubelka and Munk, Saunderson)")
-    if any(isinstance(body.medium, DiffusedMedium) for body in bodies):
+    if any(treatment_of(body) is Treatment.DIFFUSION for body in bodies):
         effects.append("light that scatters many times leaves as it has diffused in the body")
     return "; ".join(effects) or "interfaces"

@@ -1,0 +1,82 @@
+"""What is requested of a picture, as one value from whoever asks to the planner and the renderer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from translucent.arguments import brief
+from translucent.errors import InputError
+from translucent.planning.caustics import Caustics
+from translucent.planning.interfaces import FrontInterface, Interfaces, ScreenInterfaces, TracedInterfaces
+from translucent.planning.methods import Method
+from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
+from translucent.planning.shadow_maps import ShadowMaps
+
+#: More samples per pixel change nothing that 8 bits could show.
+MAX_SAMPLES = 4096
+
+#: Names that configurations of interfaces had, and what to write instead.
+_OLD_NAMES = {"both": ScreenInterfaces(), "front": FrontInterface()}
+
+
+@dataclass(frozen=True)
+class RenderRequest:
+    """Request for a picture of a scene; None leaves a choice to the planner. See `Renderer.render`.
+
+    Parameters
+    ----------
+    method : Method, optional
+    samples : int
+    interfaces : TracedInterfaces, ScreenInterfaces or FrontInterface, optional
+    scattering : Diffusion, ScatteringLayer or SingleScattering, optional
+    caustics : Caustics, optional
+    shadows : ShadowMaps, optional
+    transparent, adaptive : bool
+    over_backdrop : bool
+        Everything opaque is a picture that is drawn elsewhere.
+
+    Raises
+    ------
+    InputError
+        If a value is none of these.
+    """
+
+    method: Method | None = None
+    samples: int = 1
+    interfaces: Interfaces | None = None
+    scattering: Scattering | None = None
+    caustics: Caustics | None = None
+    shadows: ShadowMaps | None = None
+    transparent: bool = False
+    adaptive: bool = True
+    over_backdrop: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.samples, int) or not 1 <= self.samples <= MAX_SAMPLES:
+            asked, found = f"samples {brief(self.samples)}", f"not a whole number in 1 to {MAX_SAMPLES}"
+            raise InputError(asked, found, "give for example 16")
+        ways = TracedInterfaces(), ScreenInterfaces(), FrontInterface()
+        known: tuple[tuple[str, type, str, str], ...] = (
+            ("method", Method, "a thickness method", "give for example tl.SignedDepth()"),
+            ("interfaces", Interfaces, "a choice of interfaces", _one_of(*ways)),
+            ("scattering", Scattering, "a choice of scattering", _one_of(*(one() for one in _SCATTERINGS))),
+            ("caustics", Caustics, "tl.Caustics", "give for example tl.Caustics(photons=1_000_000)"),
+            ("shadows", ShadowMaps, "a choice of shadows", "give for example tl.ShadowMaps(size=2048)"),
+        )
+        for name, kind, what, do in known:
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, kind):
+                if name == "interfaces" and isinstance(value, str) and value in _OLD_NAMES:
+                    do = f"write interfaces=tl.{_OLD_NAMES[value]}"
+                raise InputError(f"{name} {brief(value)}", f"not {what}", do)
+        if self.over_backdrop and self.caustics is not None:
+            found = "what is drawn elsewhere has no mesh that light could land on"
+            raise InputError("caustics before a backdrop", found, "leave out one of the two")
+
+
+_SCATTERINGS = Diffusion, ScatteringLayer, SingleScattering
+
+
+def _one_of(*values: object) -> str:
+    *others, last = (f"tl.{value}" for value in values)
+    return f"give {', '.join(others)} or {last}"
