@@ -6,6 +6,8 @@ import io
 import json
 import os
 import struct
+import subprocess
+import sys
 import tracemalloc
 import zipfile
 import zlib
@@ -428,3 +430,16 @@ def test_odd_pictures_are_read_without_a_word_of_pillow(tmp_path: Path) -> None:
     damaged = tiff[: tiff[4]] + b"".join([struct.pack("<H", count), *tags[:-1], unknown]) + tiff[where + 12 * count :]
     (tmp_path / "a.tiff").write_bytes(damaged)
     pixel_color(tmp_path / "a.tiff", 0, 0)
+
+
+def test_what_pillow_logs_of_a_damaged_tiff_is_not_printed(tmp_path: Path) -> None:
+    """In a process of its own, since pytest has handlers for what is logged."""
+    tiff = _picture("TIFF", "RGB")
+    three = struct.pack("<HHIH", 277, 3, 1, 3)  # samples per pixel
+    assert tiff.count(three) == 1
+    (tmp_path / "a.tiff").write_bytes(tiff.replace(three, struct.pack("<HHIH", 277, 3, 1, 10280)))
+    script = "import sys; from translucent.media.pixel import pixel_color; pixel_color(sys.argv[1], 0, 0)"
+    command = [sys.executable, "-c", script, tmp_path / "a.tiff"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "InputError: pixel 0,0 of" in done.stderr.splitlines()[-1]
+    assert "More samples per pixel" not in done.stderr.splitlines()[0]

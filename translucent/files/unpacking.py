@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
 import math
 import os
 import warnings
@@ -21,6 +22,9 @@ from translucent.files.reading import open_file, require_room, shown
 
 if TYPE_CHECKING:
     from PIL.ImageFile import ImageFile
+
+# Without a handler of its own, what Pillow logs of a damaged file is printed.
+logging.getLogger("PIL").addHandler(logging.NullHandler())
 
 #: Formats of pictures that are read: Pillow knows more, some of which run other programs.
 PICTURES = ("PNG", "JPEG", "BMP", "GIF", "TIFF", "WEBP", "TGA", "PPM")
