@@ -8,7 +8,7 @@ and world coincide.
 Source: KHR_materials_volume ("thickness in the coordinate space of the mesh"), KHR_materials_variants, glTF 2.0
 section 3.5.
 
-Not read: animation, skins, morph targets, instancing extensions.
+Not read: skins, morph targets, instancing extensions. Animations: `translucent.gltf.animations`.
 """
 
 from __future__ import annotations
