@@ -68,6 +68,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.gltf.fields import JsonFields, Triple
@@ -282,6 +283,7 @@ class GltfMaterial:
         }
 
 
+@checked
 def read_materials(path: str | Path, *, draft_extensions: bool = False) -> list[GltfMaterial]:
     """Read all materials of a .gltf or .glb file, in its order, without the files that it links to.
 
