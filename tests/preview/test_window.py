@@ -176,6 +176,31 @@ def test_a_window_that_is_closed_while_work_is_under_way_ends_well(display: str,
     assert done.returncode == 0, done.stderr
 
 
+def test_ctrl_c_within_a_table_is_raised(display: str) -> None:
+    """Dear ImGui objects to the table that is left open."""
+    code = (
+        "import signal\n"
+        "from imgui_bundle import imgui\n"
+        "from translucent.preview import app\n"
+        "from translucent.preview.document import Document\n"
+        "from translucent.preview.script import Script\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "imgui.end_table = lambda: signal.raise_signal(signal.SIGINT)\n"
+        "class Waiting(Script):\n"
+        "    def step(self, state):\n"
+        "        return False\n"
+        "try:\n"
+        "    app.run(Document(), (640, 480), script=Waiting([]))\n"
+        "except KeyboardInterrupt:\n"
+        "    print('interrupted', flush=True)\n"
+    )
+    environment = {**os.environ, "DISPLAY": display}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=environment, check=False
+    )
+    assert done.stdout.splitlines()[-1:] == ["interrupted"], done.stderr
+
+
 def test_the_first_picture_waits_for_nobody(display: str) -> None:
     """A window draws by itself, before anything has been done in it."""
     code = (

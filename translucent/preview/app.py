@@ -103,6 +103,8 @@ def run(
         try:
             hello_imgui.run(params)
         except RuntimeError as error:
+            if window.failure is not None:  # it left a table open, for example, which Dear ImGui objects to
+                raise window.failure from error
             if "glfw" not in str(error).lower():
                 raise
             found = f"no window can be opened on display {os.environ.get('DISPLAY', '')!r}"
