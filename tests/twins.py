@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.formulas import (
+    bsdf,
     color,
     diffusion,
     interface,
@@ -27,6 +28,7 @@ MODULES: dict[str, ModuleType] = {
     "interface": interface,
     "thin_film": thin_film,
     "light": light,
+    "bsdf": bsdf,
     "phase": phase,
     "two_stream": two_stream,
     "diffusion": diffusion,
@@ -216,7 +218,46 @@ def _phase_arguments(values: np.ndarray) -> list[np.ndarray]:
 #: Within the box, on its boundary, and what rounding puts outside.
 ALONG = np.concatenate([np.linspace(0, 1, 13), [-1e-6, 1 + 1e-6, 1e-30, 1 - 1e-7]])
 
+FILM = [np.float32([share, ior, metres]) for share in (0.0, 0.4, 1.0) for ior in (1.33, 2.0) for metres in (0.0, 4e-7)]
+
+
+def _filmed_arguments() -> list[np.ndarray]:
+    iors = np.array([1 / 1.5, 1.5]), np.array([1.0, 1.4])
+    columns = _mixed(np.array([0.0, 0.04, 0.5]), np.array([0.1, 0.8, 1.0]), *iors, np.arange(len(FILM)))
+    bare, cosine, ior, before, number = columns
+    return [bare, cosine, ior, np.array(FILM)[number.astype(int)], before]
+
+
+def _facing_arguments() -> list[np.ndarray]:
+    facing, cosine, number = _mixed(np.array([0.02, 0.5, 1.0]), np.array([0.05, 0.5, 1.0]), np.arange(len(FILM)))
+    return [np.array(FILM)[number.astype(int)], np.stack([facing, 0.5 * facing, facing], axis=1), cosine]
+
+
+def _base_arguments() -> list[np.ndarray]:
+    light = _triples(np.array([0.0, 1e-3, 1.0, 1e5] * 6))
+    share = np.resize([0.0, 0.3, 1.0], len(light)).astype(np.float32)
+    color, passed = (_triples(np.linspace(*ends, len(light))) for ends in ((0, 1), (0.5, 0)))
+    return [light, light[::-1].copy(), color, passed, share]
+
+
+def _microfacet_arguments() -> list[np.ndarray]:
+    direction, normal, _ = _directions_and_normals()
+    alpha = np.resize([1e-3, 0.09, 0.5, 1.0], len(normal)).astype(np.float32)
+    shares = np.random.default_rng(8).random((len(normal), 2)).astype(np.float32)
+    # Where no component decides by rounding which axis the frame is made with.
+    clear = np.abs(np.abs(normal[:, 0]) - 0.7) > 1e-5
+    return [column[clear] for column in (normal, direction, alpha, shares)]
+
+
 ARGUMENTS = {
+    "filmed_reflectance": _filmed_arguments(),
+    "thin_wall_exitance": _film_slab_arguments(),
+    "microfacet_normal": _microfacet_arguments(),
+    "masking_ratio": _mixed(UNIT[::3], np.linspace(-1, 1, 21), np.array([1e-4, 1e-2, 0.25, 1.0])),
+    "kept_on_side": _directions_and_normals()[:2],
+    "diffuse_radiance": _base_arguments(),
+    "filmed_facing": _facing_arguments(),
+    "microfacet_value": _mixed(UNIT[::3], UNIT[::4], UNIT[::5], np.array([1e-2, 0.25, 1.0])),
     "cone_attenuation": _cone_arguments(),
     "linear_density": _mixed(ALONG, np.array([0.0, 1.0, 1e-6, 1e12]), np.array([0.0, 1.0, 3.0])),
     "exponential_density": _mixed(ALONG, np.array([1e-6, 1.0, 1e12]), np.array([0.0, -1e-7, 1e-3, -0.5, 3.0, -60.0])),
@@ -302,6 +343,10 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
     "tone_agx": 64.0,  # powers
 }
 FLOOR = {
+    "filmed_reflectance": 4e-5,  # as thin_film_reflectance
+    "filmed_facing": 2e-4,  # the same, over 1 - (1 - cos)^5, which is above 0.2 here
+    "microfacet_normal": 1e-5,  # near normal incidence the axes across it are as wrong as its sine is small
+    "kept_on_side": 4e-7,
     "fresnel_dielectric": 2e-7,
     "refracted_cosine": 1e-7,
     # Cosines of some 50 radians, good to a rounding of those; mixed by a matrix whose rows add up to 5.

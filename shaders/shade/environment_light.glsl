@@ -25,8 +25,3 @@ vec3 mirrored_environment(vec3 direction) {
 vec3 environment_irradiance(vec3 normal) {
     return light_scale * textureLod(light_irradiance, equirectangular_uv(normal, light_turn), 0.0).rgb;
 }
-
-// Where the table of reflectance has its entry: both ends of cosine and roughness are centers of texels.
-vec2 reflectance_coordinate(float cosine, float roughness) {
-    return (vec2(cosine, roughness) * (REFLECTANCE_TABLE_SIZE - 1.0) + 0.5) / REFLECTANCE_TABLE_SIZE;
-}

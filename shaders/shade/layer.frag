@@ -36,8 +36,8 @@ layout(location = 1) out vec4 behind;
 
 void main() {
     // All that takes derivatives comes first: they are undefined where a neighbor has been discarded.
-    OpaqueFinish finish = opaque_finish_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
-    if (finish.is_hole || axial < axial_start) { discard; }
+    OpaqueSurface surface = opaque_surface_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
+    if (surface.is_hole || axial < axial_start) { discard; }
 #if OPAQUE
     // What lies on an opaque surface is seen, also where rounding puts it behind.
     if (axial > last_axial() + sheet_tolerance) { discard; }
@@ -48,16 +48,16 @@ void main() {
     in_front = behind = vec4(0.0);
 #if GLOW
     if (abs(axial_depth - texelFetch(entered, ivec2(gl_FragCoord.xy), 0).w) > touching) { discard; }
-    in_front.rgb = min(finish.emitted, vec3(NOTHING));
+    in_front.rgb = min(surface.emitted, vec3(NOTHING));
 #else
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
     vec3 ray = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
     // Interpolated normals may look away from the eye where the faces do not: then the surface is seen edge-on.
-    vec3 normal = gl_FrontFacing ? finish.normal : -finish.normal;
+    vec3 normal = gl_FrontFacing ? surface.normal : -surface.normal;
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
-    float share = layer_opacity * finish.opacity;
-    vec4 shown = vec4(share * min(opaque_radiance_of(finish, normal, ray, from_center), vec3(NOTHING)), share);
+    float share = layer_opacity * surface.opacity;
+    vec4 shown = vec4(share * min(opaque_radiance_of(surface, normal, ray, from_center), vec3(NOTHING)), share);
 #if BODIES
     if (axial_depth > texelFetch(fronts, ivec2(gl_FragCoord.xy), 0).r + touching) {
         behind = shown;

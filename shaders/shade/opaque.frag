@@ -51,8 +51,8 @@ vec3 diffuse_radiance(vec3 normal) {
 
 void main() {
 #if SURFACE
-    OpaqueFinish finish = opaque_finish_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
-    if (finish.is_hole || (opaque_passed.w == 0.0 && !gl_FrontFacing)) { discard; }
+    OpaqueSurface surface = opaque_surface_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
+    if (surface.is_hole || (opaque_passed.w == 0.0 && !gl_FrontFacing)) { discard; }
 #endif
     opaque_axial_depth = axial * axial_depth_scale + axial_depth_start;
 #if !PROJECTED_DEPTH
@@ -65,10 +65,10 @@ void main() {
 #if SURFACE
     ray = normalize(ray);
     // Interpolated normals may look away from the eye where the faces do not: then the surface is seen edge-on.
-    vec3 normal = gl_FrontFacing ? finish.normal : -finish.normal;
+    vec3 normal = gl_FrontFacing ? surface.normal : -surface.normal;
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
-    vec3 light = opaque_radiance_of(finish, normal, ray, from_center);
+    vec3 light = opaque_radiance_of(surface, normal, ray, from_center);
 #else
     vec3 normal = normalize(world_normal);
     vec3 light = diffuse_radiance(dot(normal, ray) > 0.0 ? -normal : normal);

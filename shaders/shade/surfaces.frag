@@ -1,5 +1,5 @@
-// Light at the interfaces of bodies: what they reflect, what enters and bends, and what paint and many scattering events
-// give back. What the media absorb and emit on straight rays has been found; the first interval of a refracted ray is as long
+// Light at the interfaces of bodies: what they reflect and refract, and the radiance of their diffuse base and of light that
+// scatters many times. What the media absorb and emit on straight rays has been found; the first interval of a refracted ray is as long
 // as it is bent. Row 0 of the output is the top row. ONE_INTERFACE: rays bend where they enter, and leave without bending.
 // Drawn where there is an interface: shade/no_interface.frag shades the rest, and leaves the depth that tells the two apart.
 
@@ -8,7 +8,6 @@
 #include <Environment>
 #include <Surfaces>
 #include <SurfaceRow>
-#include "lib/interface.glsl"
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
 #include "lib/two_stream.glsl"
@@ -25,10 +24,10 @@ uniform sampler2D emitted_radiance_sum;
 uniform sampler2D straight_transmittance;
 uniform sampler2D straight_optical_depth;
 uniform sampler2D straight_thickness;
-uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission, variance of normals
+uniform sampler2D surface_parameters;  // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
 #if !ONE_INTERFACE
-uniform sampler2D left_finish;       // object of what is left
+uniform sampler2D left_parameters;   // object of what is left
 #endif
 
 layout(location = 0) out vec4 out_radiance;
@@ -51,17 +50,17 @@ struct Straight {
 // Light that bends where it enters and nowhere else. How far on the body ends changes nothing of its way, and what is
 // absorbed is what the straight ray's path absorbs. A microfacet turns it by (1 - 1 / ior) times its angle, a reflection
 // by twice that angle.
-Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, bool enters, Straight straight) {
+Crossing refracted(Surface surface, vec3 point, vec3 normal, vec3 ray, float ior, bool enters, Straight straight) {
     vec3 passed = transmittance(straight.optical_depth);
-    float blur = finish.roughness * sqrt(0.5 * abs(1.0 - 1.0 / ior));
+    float blur = surface.roughness * sqrt(0.5 * abs(1.0 - 1.0 / ior));
     vec3 light = passed * radiance_beyond(point, refracted_direction(ray, normal, ior), blur);
     return Crossing(light, straight.optical_depth, straight.thickness);
 }
 #else
 // Light that crosses the first interval along a refracted ray; the media there are taken to be mixed as along the straight one.
-Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, bool enters, Straight straight) {
+Crossing refracted(Surface surface, vec3 point, vec3 normal, vec3 ray, float ior, bool enters, Straight straight) {
     vec3 inside = enters ? refracted_direction(ray, normal, ior) : ray;
-    Exit leaving = find_exit(point, inside, finish.longest, -inside);
+    Exit leaving = find_exit(point, inside, surface.longest, -inside);
     vec3 beyond = point + leaving.path * inside;
     Crossing result;
     result.thickness = max(straight.thickness + leaving.path - straight.first_interval, 0.0);
@@ -72,14 +71,11 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
         return result;
     }
     float cosine = clamp(-dot(leaving.normal, inside), 0.0, 1.0);
-    vec3 kept = vec3(interface_reflectance(cosine, 1.0 / ior, 0.0));
-#if THIN_FILM
-    kept = filmed_reflectance(finish.film, kept.r, cosine, 1.0 / ior, ior);
-#endif
-    float blur = refraction_roughness(finish.roughness, ior);
+    vec3 kept = film_over(surface.film, fresnel_dielectric(cosine, 1.0 / ior), cosine, 1.0 / ior, ior);
+    float blur = refraction_roughness(surface.roughness, ior);
     // What the far interface keeps inside leaves after at least one more crossing, taken to be as long as this one: seen
-    // where it is mirrored to. Light that scatters on the way comes out all the same where media give it back.
-    vec3 again = finish.scatters_much ? vec3(1.0) : passed;
+    // where it is reflected to. Light that scatters on the way leaves all the same as from a layer.
+    vec3 again = surface.scatters_much ? vec3(1.0) : passed;
     result.light = kept * again * environment_light(reflected_direction(inside, leaving.normal), blur);
     vec3 outside = refracted_direction(inside, leaving.normal, 1.0 / ior);
     if (min(kept.r, min(kept.g, kept.b)) < 1.0) { result.light += (1.0 - kept) * radiance_beyond(beyond, outside, blur); }
@@ -88,18 +84,49 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
 }
 #endif
 
-Crossing crossed(Finish finish, vec3 point, vec3 normal, vec3 ray, bool enters, Straight straight) {
-    if (finish.is_sheet || straight.first_interval < 0.0) {
+Crossing crossed(Surface surface, vec3 point, vec3 normal, vec3 ray, bool enters, Straight straight) {
+    if (surface.thin_walled || straight.first_interval < 0.0) {
         vec3 passed = transmittance(straight.optical_depth);
-        float blur = refraction_roughness(finish.roughness, finish.ior);
+        float blur = refraction_roughness(surface.roughness, surface.ior);
         return Crossing(passed * radiance_beyond(point, ray, blur), straight.optical_depth, straight.thickness);
     }
-    if (finish.dispersion == 0.0) { return refracted(finish, point, normal, ray, finish.ior, enters, straight); }
-    vec3 iors = channel_iors(finish.ior, finish.dispersion);
-    Crossing result = refracted(finish, point, normal, ray, iors.g, enters, straight);
-    result.light.r = refracted(finish, point, normal, ray, iors.r, enters, straight).light.r;
-    result.light.b = refracted(finish, point, normal, ray, iors.b, enters, straight).light.b;
+    if (surface.dispersion == 0.0) { return refracted(surface, point, normal, ray, surface.ior, enters, straight); }
+    vec3 iors = channel_iors(surface.ior, surface.dispersion);
+    Crossing result = refracted(surface, point, normal, ray, iors.g, enters, straight);
+    result.light.r = refracted(surface, point, normal, ray, iors.r, enters, straight).light.r;
+    result.light.b = refracted(surface, point, normal, ray, iors.b, enters, straight).light.b;
     return result;
+}
+
+// Lobes of the first interface. Of a thin wall they count all reflections between its two sides: what one passage absorbs is in
+// the optical depth already.
+Lobes first_lobes(Surface surface, float cosine, float bare, bool starts_inside) {
+    vec3 front = starts_inside ? vec3(bare) : film_over(surface.film, bare, cosine, surface.ior, 1.0);
+    if (!surface.thin_walled) { return smooth_lobes(front); }
+    return thin_wall_entrance(front, bare, surface.wall_depth / max(refracted_cosine(cosine, surface.ior), MIN_THIN_LAYER_COSINE));
+}
+
+// Light that the interface reflects of the environment and of lights, below and in a clear coat, which takes its part of the lobes.
+vec3 reflected_light(Surface surface, inout Lobes lobes, vec3 point, vec3 normal, vec3 ray, float variance) {
+    vec3 direction = reflected_direction(ray, normal), light = vec3(0.0);
+    float coat = coat_reflectance(surface.clearcoat, clamp(-dot(normal, ray), 0.0, 1.0));
+    lobes = below_coat(lobes, coat);
+    bool reflects = max(lobes.reflection.r, max(lobes.reflection.g, lobes.reflection.b)) > 0.0;
+    if (reflects) { light = surface.unoccluded * lobes.reflection * environment_light(direction, surface.roughness); }
+    if (coat > 0.0) { light += surface.unoccluded * coat * environment_light(direction, surface.clearcoat.y); }
+    return reflects || coat > 0.0 ? light + coated_highlights(point, normal, ray, surface, variance) : light;
+}
+
+// Light that is scattered many times in the body below.
+vec3 multiply_scattered(Surface surface, int object, vec3 point, vec3 normal, vec3 ray, float cosine, Crossing crossing, bool starts_inside) {
+    vec3 light = vec3(0.0);
+    if (surface.scatters_much) {
+        light += layer_exitance(surface, point, normal, crossing.thickness, transmittance(crossing.optical_depth));
+    }
+    float cosine_inside = starts_inside ? 1.0 : refracted_cosine(cosine, surface.ior);
+    light += subsurface_exitance(object, point, cosine_inside, crossing.optical_depth);
+    vec3 inside = starts_inside ? ray : refracted_direction(ray, normal, surface.ior);
+    return light + ahead_in_scattered(object, inside, crossing.optical_depth);
 }
 
 void main() {
@@ -116,86 +143,43 @@ void main() {
     vec4 front = texelFetch(entered, texel, 0);
     out_transmittance = vec4(through, 1.0);
 
+    vec4 parameters = texelFetch(surface_parameters, texel, 0);
 #if ONE_INTERFACE
     const bool starts_inside = false;
 #else
     vec4 back = texelFetch(left, texel, 0);
     bool starts_inside = back.w < front.w;
+    if (starts_inside) { parameters = texelFetch(left_parameters, texel, 0); }
 #endif
-#if ONE_INTERFACE
-    vec4 surface = texelFetch(surface_finish, texel, 0);
-#else
-    vec4 surface = starts_inside ? texelFetch(left_finish, texel, 0) : texelFetch(surface_finish, texel, 0);
-#endif
-    Finish finish = finish_of(surface);
+    Surface surface = surface_of(parameters);
     if (!starts_inside) {
         vec4 tint = texelFetch(surface_color, texel, 0);
-        finish.color = tint.rgb;
-        finish.unoccluded = tint.a;
+        surface.color = tint.rgb;
+        surface.unoccluded = tint.a;
     }
 
     vec3 normal = front.xyz;
     float axial_depth = starts_inside ? surface_eye_axial_depth : front.w;
     vec3 point = point_at(pixel, axial_depth);
     float cosine = clamp(-dot(normal, ray), 0.0, 1.0);
-    float reflectance = starts_inside ? 0.0 : interface_reflectance(cosine, finish.ior, finish.roughness);
-    vec3 mirrored_share = vec3(reflectance);
-    vec3 entered_share = vec3(1.0 - reflectance);
-#if THIN_FILM
-    if (!starts_inside) { mirrored_share = filmed_reflectance(finish.film, reflectance, cosine, finish.ior, 1.0); }
-    entered_share = 1.0 - mirrored_share;
-#endif
-    if (finish.is_sheet) {
-        // All reflections between its two sides; what one passage absorbs is in the optical depth already.
-        vec3 passage = finish.sheet_depth / max(refracted_cosine(cosine, finish.ior), MIN_THIN_LAYER_COSINE);
-        vec3 back_and_forth = reflectance * transmittance(passage);
-#if THIN_FILM
-        vec3 front_share = mirrored_share;
-        back_and_forth = sqrt(front_share * reflectance) * transmittance(passage);
-        mirrored_share = film_slab_reflectance(front_share, reflectance, passage);
-        entered_share = (1.0 - front_share) * (1.0 - reflectance) / max(1.0 - back_and_forth * back_and_forth, 1e-6);
-#else
-        mirrored_share = slab_reflectance(reflectance, passage);
-        entered_share = (1.0 - reflectance) * (1.0 - reflectance) / max(1.0 - back_and_forth * back_and_forth, 1e-6);
-#endif
-    }
-    vec3 mirrored = vec3(0.0);
-    if (max(mirrored_share.r, max(mirrored_share.g, mirrored_share.b)) > 0.0) {
-        mirrored = finish.unoccluded * mirrored_share * environment_light(reflected_direction(ray, normal), finish.roughness)
-            + highlights(point, normal, ray, finish, highlight_alpha(finish.roughness, surface.w));
-    }
-#if CLEAR_COAT
-    if (!starts_inside && finish.clearcoat.x > 0.0) {
-        float coated = coated_share(finish.clearcoat, cosine);
-        entered_share *= 1.0 - coated;
-        mirrored = (1.0 - coated) * mirrored + coat_highlights(point, normal, ray, finish, surface.w)
-            + finish.unoccluded * coated * environment_light(reflected_direction(ray, normal), finish.clearcoat.y);
-    }
-#endif
+    if (starts_inside) { surface.clearcoat.x = 0.0; }
+    float bare = starts_inside ? 0.0 : interface_reflectance(cosine, surface.ior, surface.roughness);
+    Lobes lobes = first_lobes(surface, cosine, bare, starts_inside);
+    vec3 reflected = reflected_light(surface, lobes, point, normal, ray, parameters.w);
 
     vec3 light = vec3(0.0);
-    if (finish.transmission > 0.0) {
+    if (surface.transmission > 0.0) {
 #if ONE_INTERFACE
         const float first_interval = 0.0; // nothing asks how long it is
 #else
         float first_interval = back.w < NOTHING ? (end_of_interval(texel) - axial_depth) * surface_ahead.y * advance : -1.0;
 #endif
-        Crossing crossing = crossed(finish, point, normal, ray, !starts_inside, Straight(thickness, depth, first_interval));
-        light = crossing.light;
-        if (finish.scatters_much) {
-            light += scattered_out(finish, point, normal, crossing.thickness, transmittance(crossing.optical_depth));
-        }
-#if DIFFUSED
-        int object = int(surface.x + 0.5);
-        float cosine_inside = starts_inside ? 1.0 : refracted_cosine(cosine, finish.ior);
-        light += diffused_out(object, point, cosine_inside, crossing.optical_depth);
-        vec3 inside = starts_inside ? ray : refracted_direction(ray, normal, finish.ior);
-        light += haze(object, inside, crossing.optical_depth);
-#endif
-        light *= finish.transmission * finish.color;
+        Crossing crossing = crossed(surface, point, normal, ray, !starts_inside, Straight(thickness, depth, first_interval));
+        light = crossing.light + multiply_scattered(surface, int(parameters.x + 0.5), point, normal, ray, cosine, crossing, starts_inside);
+        light *= surface.transmission * surface.color;
     }
-    if (finish.transmission < 1.0 && !starts_inside) {
-        light += (1.0 - finish.transmission) * paint(finish, point, normal);
+    if (surface.transmission < 1.0 && !starts_inside) {
+        light += (1.0 - surface.transmission) * base_radiance(surface, point, normal);
     }
-    out_radiance = vec4(min(mirrored + entered_share * (light + emitted), vec3(NOTHING)), 1.0);
+    out_radiance = vec4(min(reflected + lobes.transmission * (light + emitted), vec3(NOTHING)), 1.0);
 }

@@ -1,7 +1,8 @@
 // What a pixel sees of the environment along a ray: differentials of the ray with regard to its place in the picture, carried
 // through reflections and refractions (Igehy 1999, "Tracing ray differentials"), and a lookup that averages over them.
-// Needs <constants>, lib/interface.glsl, hierarchy.glsl and environment_light.glsl.
+// Needs <constants>, lib/interface.glsl, hierarchy.glsl, interaction.glsl and environment_light.glsl. FOOTPRINTS.
 
+#if FOOTPRINTS
 uniform float pixel_step;  // in pixels: what a sample stands for
 
 // Differentials of a ray's point and direction by a step to the right and one down in the picture, as large as what a sample
@@ -17,7 +18,11 @@ struct Ellipse {
     float breadth;
 };
 
-vec3 way_of(vec2 pixel) {
+Footprint no_footprint() {
+    return Footprint(mat2x3(0.0), mat2x3(0.0));
+}
+
+vec3 direction_through(vec2 pixel) {
     return normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
 }
 
@@ -26,15 +31,19 @@ mat2x3 spread_out(vec3 along, vec2 shares) {
     return mat2x3(shares.x * along, shares.y * along);
 }
 
-// Footprint of a pixel on the way of its ray at an axial depth.
+// Footprint of a pixel on its ray at an axial depth.
 Footprint footprint_of(vec2 pixel, float axial_depth) {
-    vec3 point = point_at(pixel, axial_depth), direction = way_of(pixel);
+    vec3 point = point_at(pixel, axial_depth), direction = direction_through(pixel);
     vec2 right = pixel + vec2(pixel_step, 0.0), down = pixel + vec2(0.0, pixel_step);
     return Footprint(mat2x3(point_at(right, axial_depth) - point, point_at(down, axial_depth) - point),
-        mat2x3(way_of(right) - direction, way_of(down) - direction));
+        mat2x3(direction_through(right) - direction, direction_through(down) - direction));
 }
 
-// Where the neighbors of a ray meet the plane of a face.
+void advance(inout Footprint footprint, float path) {
+    footprint.point += path * footprint.direction;
+}
+
+// Where the neighbors of a ray hit the plane of a face.
 mat2x3 onto_plane(mat2x3 point, vec3 direction, vec3 face_normal) {
     float across = dot(face_normal, direction);
     float least = across < 0.0 ? min(across, -LEAST_ACROSS) : max(across, LEAST_ACROSS);
@@ -43,14 +52,14 @@ mat2x3 onto_plane(mat2x3 point, vec3 direction, vec3 face_normal) {
 
 // Differentials of the smooth normal where a ray has hit, turned as that is: corner normals are interpolated over a face.
 mat2x3 normal_differentials(Hit hit, mat2x3 point, vec3 smooth_normal) {
-    TracedBody place = traced_body(hit.object);
+    TracedBody body = traced_body(hit.object);
     uvec4 a = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle), 0);
     uvec4 b = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle + 1), 0);
     uvec4 c = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle + 2), 0);
     vec3 first = unpacked_normal(a.w), second = unpacked_normal(b.w) - first, third = unpacked_normal(c.w) - first;
     vec3 to_second = uintBitsToFloat(b.xyz) - uintBitsToFloat(a.xyz), to_third = uintBitsToFloat(c.xyz) - uintBitsToFloat(a.xyz);
     vec3 face = cross(to_second, to_third);
-    mat3 world = mat3(place.local_x.xyz, place.local_y.xyz, place.local_z.xyz);
+    mat3 world = mat3(body.local_x.xyz, body.local_y.xyz, body.local_z.xyz);
     mat2x3 local = transpose(world) * point;
     // How the weights of the second and the third corner change.
     vec2 seconds = cross(to_third, face) * local / max(dot(face, face), 1e-37);
@@ -83,8 +92,18 @@ mat2x3 refracted_differentials(mat2x3 incident, mat2x3 normals, vec3 direction, 
     return bounded((1.0 / ior) * incident + (cosine / ior - inside) * normals + spread_out(normal, along));
 }
 
+// Footprints behind an interface: of the reflected ray, and of the refracted one, which goes straight on through a thin wall.
+void split_footprint(Footprint own, Hit hit, Interaction at, out Footprint reflected, out Footprint refracted) {
+    mat2x3 point = onto_plane(own.point, at.direction, at.face_normal);
+    mat2x3 normals = normal_differentials(hit, point, at.normal);
+    reflected = Footprint(point, reflected_differentials(own.direction, normals, at.direction, at.normal));
+    refracted = Footprint(point, at.thin_walled ? own.direction
+        : refracted_differentials(own.direction, normals, at.direction, at.normal, at.ior));
+}
+
 // The ellipse with the moments of the parallelogram of a footprint: half axes are standard deviations.
-Ellipse ellipse_of(mat2x3 direction) {
+Ellipse ellipse_of(Footprint footprint) {
+    mat2x3 direction = footprint.direction;
     float right = dot(direction[0], direction[0]), down = dot(direction[1], direction[1]), both = dot(direction[0], direction[1]);
     float middle = 0.5 * (right + down), off = length(vec2(0.5 * (right - down), both));
     float longer = (middle + off) / 12.0, shorter = max(middle - off, 0.0) / 12.0;
@@ -110,3 +129,21 @@ vec3 averaged_environment(vec3 direction, float blur, Ellipse ellipse) {
     }
     return sum / lookups;
 }
+#else
+// Rays without footprints: the environment is not a picture.
+struct Footprint {
+    float none;
+};
+
+struct Ellipse {
+    float none;
+};
+
+Footprint no_footprint() { return Footprint(0.0); }
+Footprint footprint_of(vec2 pixel, float axial_depth) { return Footprint(0.0); }
+void advance(inout Footprint footprint, float path) {}
+void split_footprint(Footprint own, Hit hit, Interaction at, out Footprint reflected, out Footprint refracted) {
+    reflected = refracted = own;
+}
+Ellipse ellipse_of(Footprint footprint) { return Ellipse(0.0); }
+#endif

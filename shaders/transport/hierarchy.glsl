@@ -128,13 +128,13 @@ void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit
     if (own.object >= 0) { hit = Hit(own.path + ahead, own.object, own.triangle, own.weights); }
 }
 
-// Whether an object stands in a record (see record.glsl).
-bool is_listed(uvec4 record, int object) {
+// Whether an object stands in an interior list (see interior_list.glsl).
+bool is_listed(uvec4 list, int object) {
     uvec4 id = uvec4(uint(object + 1));
-    return any(equal(record & 0xffffu, id)) || any(equal(record >> 16, id));
+    return any(equal(list & 0xffffu, id)) || any(equal(list >> 16, id));
 }
 
-// The nearest surface between two distances on a ray, of all objects but those in the record `left_out`. Positions count
+// The nearest surface between two distances on a ray, of all objects but those in the list `left_out`. Positions count
 // from the center of the media.
 Hit nearest_hit(vec3 origin, vec3 direction, float start, float end, uvec4 left_out) {
     Hit hit = Hit(end, -1, -1, vec2(0.0));

@@ -2,7 +2,7 @@
 // "Multiple-scattering microfacet BSDFs with the Smith model"). Heights are not correlated, and evenly spread from 0 to 1.
 // The float64 twin is translucent/reference/microfacets.py. Needs lib/interface.glsl and random.glsl.
 
-const int MOST_MEETINGS = 100;  // with microfacets; at a roughness of 1 one path in a million gets as far
+const int MOST_FACETS = 100;  // that light interacts with; at a roughness of 1 one path in a million gets as far
 const float LEVEL = 1e-6;       // largest slope of directions that stay at their height
 
 // Smith's Lambda of GGX, upwards and downwards.
@@ -14,10 +14,10 @@ float microfacet_slope(float z, float alpha) {
 }
 
 // Moves light to the height of the next microfacet on its way; whether it leaves the surface instead.
-bool leaves_surface(vec3 way, float alpha, float chance, inout float height) {
-    float slope = microfacet_slope(way.z, alpha);
-    if (abs(way.z) < LEVEL) { return false; }
-    if (way.z > 0.0 && (slope == 0.0 || chance <= pow(height, slope))) { return true; }
+bool leaves_surface(vec3 direction, float alpha, float chance, inout float height) {
+    float slope = microfacet_slope(direction.z, alpha);
+    if (abs(direction.z) < LEVEL) { return false; }
+    if (direction.z > 0.0 && (slope == 0.0 || chance <= pow(height, slope))) { return true; }
     height = clamp(height * min(pow(chance, -1.0 / slope), 1e30), 0.0, 1.0);
     return false;
 }
@@ -36,17 +36,17 @@ vec3 visible_facet(vec3 towards, float alpha, vec2 shares) {
     return normalize(vec3(alpha * normal.xy, max(normal.z, 0.0)));
 }
 
-// Density in 1/sr with which microfacets at a height turn light on its way to a light, unseen by others (Walter et al. 2007,
+// Density in 1/sr with which microfacets at a height turn light towards a light, unseen by others (Walter et al. 2007,
 // eq. 13 to 17).
-float turned_to(vec3 to_light, vec3 way, float height, float ior, float alpha) {
+float turned_to(vec3 to_light, vec3 direction, float height, float ior, float alpha) {
     bool back = to_light.z > 0.0;
     float across = back ? 1.0 : ior;
-    vec3 half_way = across * to_light - way;
+    vec3 half_way = across * to_light - direction;
     float size = length(half_way);
-    float area = microfacet_slope(way.z, alpha) * way.z;
+    float area = microfacet_slope(direction.z, alpha) * direction.z;
     if (size <= LEVEL || area <= 0.0) { return 0.0; }
     half_way *= (half_way.z < 0.0 ? -1.0 : 1.0) / size;
-    float cos_way = -dot(way, half_way), cos_light = dot(to_light, half_way);
+    float cos_way = -dot(direction, half_way), cos_light = dot(to_light, half_way);
     if (cos_way <= 0.0 || (cos_light > 0.0) != back) { return 0.0; }
     float base = dot(half_way.xy, half_way.xy) + alpha * alpha * half_way.z * half_way.z;
     float facets = alpha / base * (alpha / base) / PI;
@@ -56,24 +56,24 @@ float turned_to(vec3 to_light, vec3 way, float height, float ior, float alpha) {
         * leaving / area;
 }
 
-// Direction of light that leaves a rough interface; zero where it does not after very many meetings. Directions are in a
+// Direction of light that leaves a rough interface; zero where it does not after very many microfacets. Directions are in a
 // frame whose third axis is the normal, on the side that light comes from; ior is that of the other side relative to this.
 // seen: density in 1/sr with which it turns to a light.
-vec3 scattered_at_microfacets(vec3 way, float ior, float alpha, vec3 to_light, inout Draws draws, out float seen) {
+vec3 scattered_at_microfacets(vec3 direction, float ior, float alpha, vec3 to_light, inout Draws draws, out float seen) {
     float height = 1.0;
     float side = 1.0;  // below the surface all is as above it, turned upside down
     seen = 0.0;
-    for (int meeting = 0; meeting < MOST_MEETINGS; ++meeting) {
+    for (int facet_number = 0; facet_number < MOST_FACETS; ++facet_number) {
         vec4 shares = random_shares(draws);
-        if (leaves_surface(side * way, alpha, shares.x, height)) { return way; }
+        if (leaves_surface(side * direction, alpha, shares.x, height)) { return direction; }
         float relative = side > 0.0 ? ior : 1.0 / ior;
 #if LIGHTS
-        seen += turned_to(side * to_light, side * way, height, relative, alpha);
+        seen += turned_to(side * to_light, side * direction, height, relative, alpha);
 #endif
-        vec3 facet = side * visible_facet(-side * way, alpha, shares.yz);
-        float cosine = clamp(-dot(way, facet), 0.0, 1.0);
+        vec3 facet = side * visible_facet(-side * direction, alpha, shares.yz);
+        float cosine = clamp(-dot(direction, facet), 0.0, 1.0);
         bool passes = shares.w >= fresnel_dielectric(cosine, relative);
-        way = normalize(passes ? refracted_direction(way, facet, relative) : reflected_direction(way, facet));
+        direction = normalize(passes ? refracted_direction(direction, facet, relative) : reflected_direction(direction, facet));
         if (passes) {
             side = -side;
             height = 1.0 - height;  // heights count upwards on either side

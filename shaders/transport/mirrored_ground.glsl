@@ -4,31 +4,26 @@
 
 uniform int mirrored;        // 1: these rays, and not those of the first interfaces
 uniform vec4 mirror_plane;   // of the ground: unit normal upwards, and metres along it from the center of the media
-uniform vec2 mirror_finish;  // roughness and ior of its coat
+uniform vec2 mirror_surface; // roughness and ior of its coat
 
-// The ray of a pixel in which the ground is seen, and the share of the light that its coat mirrors; false elsewhere.
-bool begin_in_mirror(vec2 pixel, ivec2 texel, vec3 direction, out Ray ray, out Seen seen, out vec3 share) {
+// The ray of a pixel in which the ground is seen, and the fraction of the light that its coat reflects; false elsewhere.
+bool begin_in_mirror(vec2 pixel, ivec2 texel, vec3 direction, out Ray ray, out PrimaryHit primary, out vec3 reflectance) {
     vec3 point = point_at(pixel, texelFetch(opaque_axial_depth, texel, 0).r), normal = mirror_plane.xyz;
     float cosine = -dot(normal, direction);
     // Nothing is that far off, either.
     if (cosine <= 0.0 || !(abs(dot(normal, point) - mirror_plane.w) <= MIRROR_TOLERANCE * surface_reach)) { return false; }
     point += (dot(normal, point) - mirror_plane.w) / cosine * direction;  // where the rasterizer does not quite see it
-    float alpha = mirror_finish.x * mirror_finish.x;
+    float alpha = mirror_surface.x * mirror_surface.x;
     vec3 facet = normal;
     if (blurred_share < 1.0) { facet = microfacet_normal(normal, direction, sqrt(1.0 - blurred_share) * alpha, microfacet_shares(0, 1)); }
-    vec3 way = reflected_direction(direction, facet);
-    if (dot(way, normal) <= 0.0) { return false; }
-    ray = Ray(point + MIRROR_MARGIN * surface_reach * normal, 0.0, way, vec3(1.0), uvec4(0u), 1, 0, true, blurred_share * alpha * alpha,
-        1, -normal
-#if FOOTPRINTS
-        , Footprint(mat2x3(0.0), mat2x3(0.0))
-#endif
-    );
-    seen.object = AIR;
-    seen.point = ray.origin;
-    seen.normal = normal;
-    vec2 table = textureLod(reflectance_table, reflectance_coordinate(cosine, mirror_finish.x), 0.0).rg;
-    float step = (mirror_finish.y - 1.0) / (mirror_finish.y + 1.0);
-    share = layer_of(vec3(step * step), table).mirrored;
+    vec3 reflected = reflected_direction(direction, facet);
+    if (dot(reflected, normal) <= 0.0) { return false; }
+    ray = Ray(point + MIRROR_MARGIN * surface_reach * normal, 0.0, reflected, vec3(1.0), uvec4(0u), 1, 0, true,
+        blurred_share * alpha * alpha, 1, -normal, no_footprint());
+    primary.object = AIR;
+    primary.point = ray.origin;
+    primary.normal = normal;
+    float step = (mirror_surface.y - 1.0) / (mirror_surface.y + 1.0);
+    reflectance = layer_of(vec3(step * step), reflectance_entry(cosine, mirror_surface.x)).albedo;
     return true;
 }

@@ -1,5 +1,5 @@
 // Random paths of light through media and interfaces, some events of one path of each pixel, and then of the next one. The
-// estimator is that of translucent/reference/interface_paths.py, but for what follows here. The channels of light take one way
+// estimator is that of translucent/reference/interface_paths.py, but for what follows here. The channels of light take one path
 // together: how far they fly is drawn for one of them, chosen by what it carries, and weighted with the balance heuristic
 // over all (Veach & Guibas 1995; Wilkie et al. 2014), so that together they never carry more than before. What media absorb
 // and emit on a segment is exact.
@@ -9,7 +9,6 @@
 #include <Environment>
 #include <Surfaces>
 #include <TracedBody>
-#include "lib/interface.glsl"
 #include "lib/optics.glsl"
 #include "lib/phase.glsl"
 #include "lib/ray.glsl"
@@ -17,14 +16,16 @@
 #include "shade/background.glsl"
 #include "shade/environment_light.glsl"
 #include "shade/environment_beyond.glsl"
-uniform sampler2D reflectance_table;
+#include "shade/interface_bsdf.glsl"
 #include "shade/opaque_light.glsl"
 #include "transport/path_state.glsl"
 #include "transport/random.glsl"
 #include "transport/hierarchy.glsl"
-#include "transport/record.glsl"
-#include "transport/place.glsl"
+#include "transport/interior_list.glsl"
+#include "transport/surface_hit.glsl"
+#include "transport/interaction.glsl"
 #include "transport/microfacets.glsl"
+#include "transport/sampled_branch.glsl"
 #include "transport/straight_light.glsl"
 #include "transport/light_passed.glsl"
 
@@ -36,10 +37,9 @@ uniform int spread;          // 1: paths start all over their pixels, and not at
 uniform int all_closed;      // 1: no solid has holes: what seems to leave through one passes an edge by rounding
 
 const int CHANNEL = 1;             // whose indices of refraction count
-const float ROULETTE = 0.1;       // share of light below which paths end by Russian roulette, or go on with this share
+const float ROULETTE = 0.1;       // throughput below which paths end by Russian roulette, or go on with this
 const int MANY_INTERFACES = 256;  // after which they end so whatever they carry: total reflection may hold light for ever
 const float GOES_ON = 0.95;
-const float EDGE_ON = 1e-3;
 const uint MOST_DRAWN = 1u << 22;
 const float EYE_MARGIN = 1e-3;    // axial depth before the media at which paths begin
 
@@ -50,8 +50,8 @@ vec2 pixel_of(ivec2 texel, uint path) {
     return vec2(texel) + (spread == 1 ? fract(share + 0.5) : 0.5 + frame_size.zw);
 }
 
-float largest_share(vec3 share) {
-    return max(share.r, max(share.g, share.b));
+float largest_of(vec3 channels) {
+    return max(channels.r, max(channels.g, channels.b));
 }
 
 // Number of a channel, chosen by what each carries.
@@ -70,7 +70,7 @@ vec3 environment_seen(Path path, vec2 pixel) {
 #endif
 }
 
-// Irradiance on paint, as far as lights reach it.
+// Irradiance on a diffuse base, as far as lights reach it.
 vec3 unblocked_irradiance(vec3 point, vec3 normal) {
     vec3 sum = environment_irradiance(normal);
 #if LIGHTS
@@ -87,16 +87,16 @@ vec3 unblocked_irradiance(vec3 point, vec3 normal) {
 
 #include "transport/opaque_objects.glsl"
 
-// Share of the light of each channel that the media of a place turn by an angle, in 1/sr.
-vec3 phase_of(uvec4 record, int dominant, vec3 scattering, float cosine) {
+// Fraction of the light of each channel that the media of a place turn by an angle, in 1/sr.
+vec3 phase_of(uvec4 interior, int effective, vec3 scattering, float cosine) {
 #if ONE_OBJECT || PRIORITY
-    return vec3(phase_value(traced_body(dominant).phase, cosine));
+    return vec3(phase_value(traced_body(effective).phase, cosine));
 #else
     vec3 sum = vec3(0.0);
-    for (int i = 0; i < RECORD_SIZE; ++i) {
-        uint entry = record_entry(record, i);
+    for (int i = 0; i < INTERIOR_SIZE; ++i) {
+        uint entry = interior_entry(interior, i);
         if (entry == 0u) { break; }
-        if (!counts_in(record, i)) { continue; }
+        if (!fills(interior, i)) { continue; }
         TracedBody body = traced_body(int(entry) - 1);
         sum += body.scattering * phase_value(body.phase, cosine);
     }
@@ -105,17 +105,17 @@ vec3 phase_of(uvec4 record, int dominant, vec3 scattering, float cosine) {
 }
 
 // Phase function of one of the media of a place, chosen by what it scatters of the light.
-vec4 chosen_phase(uvec4 record, int dominant, vec3 scattering, vec3 carried, float share) {
+vec4 chosen_phase(uvec4 interior, int effective, vec3 scattering, vec3 carried, float share) {
 #if ONE_OBJECT || PRIORITY
-    return traced_body(dominant).phase;
+    return traced_body(effective).phase;
 #else
     vec3 each = carried / max(scattering, vec3(1e-30));
     float left = share * dot(each, scattering);
     vec4 phase = vec4(0.0);
-    for (int i = 0; i < RECORD_SIZE; ++i) {
-        uint entry = record_entry(record, i);
+    for (int i = 0; i < INTERIOR_SIZE; ++i) {
+        uint entry = interior_entry(interior, i);
         if (entry == 0u) { break; }
-        if (!counts_in(record, i)) { continue; }
+        if (!fills(interior, i)) { continue; }
         TracedBody body = traced_body(int(entry) - 1);
         float own = dot(each, body.scattering);
         if (own > 0.0) { phase = body.phase; }
@@ -128,18 +128,10 @@ vec4 chosen_phase(uvec4 record, int dominant, vec3 scattering, vec3 carried, flo
 
 // Ends paths that carry little, or lets them carry more for those that end (Arvo & Kirk 1990).
 void play_roulette(inout Path path, float share) {
-    float chance = min(largest_share(path.share) / ROULETTE, 1.0);
-    if (path.met > MANY_INTERFACES) { chance = min(chance, GOES_ON); }
+    float chance = min(largest_of(path.throughput) / ROULETTE, 1.0);
+    if (path.depth > MANY_INTERFACES) { chance = min(chance, GOES_ON); }
     path.ends = share >= chance;
-    path.share /= max(chance, 1e-30);
-}
-
-// Goes on from a point of a surface: on the side that its direction goes to, a little off, so that it is not met again.
-void leave(inout Path path, vec3 point, vec3 face_normal) {
-    float offset = SURFACE_OFFSET * surface_reach;
-    float across = dot(face_normal, path.direction);
-    path.origin = point + (across < 0.0 ? -offset : offset) * face_normal;
-    path.skipped = offset / max(abs(across), 1e-2);
+    path.throughput /= max(chance, 1e-30);
 }
 
 void begin_path(inout Path path, vec2 pixel, ivec2 texel) {
@@ -147,11 +139,11 @@ void begin_path(inout Path path, vec2 pixel, ivec2 texel) {
     path = Path(point_at(pixel, max(-EYE_MARGIN, surface_eye_axial_depth)), 0.0, direction, vec3(1.0), vec3(0.0), uvec4(0u),
         FLAG_FOLLOWED, 0, false, false);
 #if FROM_EYE
-    if (start_record.x != 0u) {
+    if (start_interior.x != 0u) {
         vec3 eye = point_at(pixel, surface_eye_axial_depth);
         path.skipped = 2.0 * SURFACE_OFFSET * surface_reach;
         path.origin = eye + path.skipped * direction;
-        path.record = record_at_eye(eye, direction, path.skipped);
+        path.interior = interior_at_eye(eye, direction, path.skipped);
     }
 #endif
 #if OPAQUE
@@ -162,8 +154,8 @@ void begin_path(inout Path path, vec2 pixel, ivec2 texel) {
 #endif
 }
 
-// Turns a path where media scatter it, and adds that of one of the lights there.
-void scatter(inout Path path, Filling filling, int dominant, inout Draws draws) {
+// Turns a path where media scatter it, and adds light of one of the lights there.
+void scatter(inout Path path, Medium medium, int effective, inout Draws draws) {
     path.flags |= FLAG_BENT | FLAG_REFLECTED;
     path.skipped = 0.0;
     vec4 shares = random_shares(draws);
@@ -171,222 +163,180 @@ void scatter(inout Path path, Filling filling, int dominant, inout Draws draws) 
     int number = min(int(shares.x * float(light_count)), light_count - 1);
     shares.x = fract(shares.x * float(light_count));
     LightSample arriving = light_at(number, path.origin);
-    vec3 phase = phase_of(path.record, dominant, filling.scattering, dot(arriving.towards, path.direction));
-    vec3 through = straight_transmittance(path.origin, 0.0, path.record, arriving.towards, arriving.distance_m, CHANNEL);
-    path.light += path.share * phase * through * arriving.irradiance * float(light_count);
+    vec3 phase = phase_of(path.interior, effective, medium.scattering, dot(arriving.towards, path.direction));
+    vec3 through = straight_transmittance(path.origin, 0.0, path.interior, arriving.towards, arriving.distance_m, CHANNEL);
+    path.light += path.throughput * phase * through * arriving.irradiance * float(light_count);
 #endif
-    vec4 phase_function = chosen_phase(path.record, dominant, filling.scattering, path.share, shares.x);
+    vec4 phase_function = chosen_phase(path.interior, effective, medium.scattering, path.throughput, shares.x);
     vec3 before = path.direction;
     path.direction = turned_by(before, phase_cosine(phase_function, shares.y), shares.z);
 #if !(ONE_OBJECT || PRIORITY)
-    vec3 turned = phase_of(path.record, dominant, filling.scattering, dot(before, path.direction));
-    float density = dot(path.share, turned) / max(dot(path.share, vec3(1.0)), 1e-30);
-    path.share *= turned / max(density, 1e-30);
+    vec3 turned = phase_of(path.interior, effective, medium.scattering, dot(before, path.direction));
+    float density = dot(path.throughput, turned) / max(dot(path.throughput, vec3(1.0)), 1e-30);
+    path.throughput *= turned / max(density, 1e-30);
 #endif
     play_roulette(path, shares.w);
 }
 
-// Light at an interface: one branch, chosen by its share.
-void meet(inout Path path, Place place, TracedBody body, int before, int after, inout Draws draws) {
-    bool is_sheet = int(body.kind) == KIND_SHEET;
-    vec3 normal = place.smooth_normal;
-    float facing = dot(normal, path.direction);
-    if (facing > -EDGE_ON) { normal = normalize(normal - (facing + EDGE_ON) * path.direction); }
-    float cosine = clamp(-dot(normal, path.direction), 0.0, 1.0);
-    float ior = index_of(is_sheet ? place.object : after, CHANNEL) / index_of(before, CHANNEL);
-    vec3 point = path.origin + place.path * path.direction;
-    vec3 passing = body.transmission * (is_sheet || place.object == after ? body.color : vec3(1.0));
-    float reflectance = fresnel_dielectric(cosine, ior);
+// Adds the light of one of the lights that the microfacets of a rough interface turn into the path. seen: density of that in 1/sr.
+void add_light_at_facets(inout Path path, Interaction at, SurfaceHit surface, LightSample arriving, float seen) {
+#if LIGHTS
+    // Light that comes from the other side of the face than of the smooth surface does not exist.
+    float side = dot(arriving.towards, at.normal) < 0.0 ? -1.0 : 1.0;
+    float across = dot(arriving.towards, at.face_normal);
+    if (seen <= 0.0 || side * across <= 0.0) { return; }
+    float skipped;
+    vec3 origin = origin_beside(at.point, at.face_normal, arriving.towards, skipped);
+    vec3 through = straight_transmittance(origin, skipped, side > 0.0 ? path.interior : surface.interior, arriving.towards,
+        arriving.distance_m - skipped, CHANNEL);
+    vec3 passing = side > 0.0 ? vec3(1.0) : passing_base(at);
+    path.light += path.throughput * passing * through * arriving.irradiance * seen * float(light_count);
+#endif
+}
+
+// Adds the radiance of the diffuse base, for the fraction of the light that comes to it: whatever the path does next.
+void add_base(inout Path path, Interaction at, TracedBody body, vec3 arriving) {
+    if (at.transmission == 1.0 || arriving == vec3(0.0)) { return; }
+    vec3 base = diffuse_radiance(unblocked_irradiance(at.point, at.normal), unblocked_irradiance(at.point, -at.normal), at.color,
+        body.passed, body.passed_share);
+    path.light += path.throughput * arriving * (1.0 - at.transmission) * base;
+}
+
+// The interaction of a path with an interface: one branch, by chance.
+void interact(inout Path path, SurfaceHit surface, TracedBody body, int before, int after, inout Draws draws) {
+    vec3 normal = facing_normal(surface.smooth_normal, path.direction);
+    vec3 point = path.origin + surface.path * path.direction;
+    Interaction at = interaction_at(surface, body, point, path.direction, normal, before, after, CHANNEL);
     vec4 shares = random_shares(draws);
     path.flags |= FLAG_BENT;
-    ++path.met;
-    vec3 mirrored = vec3(reflectance);
-    float coated = 0.0;
-#if THIN_FILM
-    if (body.film.x > 0.0) {
-        float film_ior = body.film.y / index_of(before, CHANNEL);
-        mirrored = mix(mirrored, thin_film_reflectance(cosine, ior, film_ior, body.film.y * body.film.z), body.film.x);
-    }
-#endif
-#if CLEAR_COAT
-    if (is_sheet || place.outside) { coated = body.clearcoat * fresnel_dielectric(cosine, CLEARCOAT_IOR); }
-#endif
-    bool passes = shares.x >= reflectance;
-    vec3 painted = vec3(1.0);
-    vec3 way = reflected_direction(path.direction, normal);
-#if ROUGH
-    float alpha = body.roughness * body.roughness;
-    if (alpha > 0.0 && ior != 1.0) {
-        mat3 frame = frame_around(normal);
-        vec3 to_light = vec3(0.0);
-        float seen;
+    ++path.depth;
+    vec3 emitted;
+    Lobes lobes = polished_lobes(at, body, emitted);
+    path.light += path.throughput * emitted;
+    LightSample arriving = LightSample(vec3(0.0), 0.0, vec3(0.0));
 #if LIGHTS
-        int number = min(int(shares.y * float(light_count)), light_count - 1);
-        LightSample arriving = light_at(number, point);
-        to_light = arriving.towards * frame;
+    if (is_rough(at)) { arriving = light_at(min(int(shares.y * float(light_count)), light_count - 1), at.point); }
 #endif
-        way = scattered_at_microfacets(path.direction * frame, ior, alpha, to_light, draws, seen);
-        path.lost = way == vec3(0.0);
-        passes = way.z < 0.0;
-        way = frame * way;
-#if LIGHTS
-        // Light that comes from the other side of the face than of the smooth surface does not exist.
-        float side = to_light.z < 0.0 ? -1.0 : 1.0;
-        if (seen > 0.0 && side * dot(arriving.towards, place.face_normal) > 0.0) {
-            float offset = SURFACE_OFFSET * surface_reach;
-            float skipped = offset / max(abs(dot(place.face_normal, arriving.towards)), 1e-2);
-            vec3 through = straight_transmittance(point + side * offset * place.face_normal, skipped,
-                side > 0.0 ? path.record : place.record, arriving.towards, arriving.distance_m - skipped, CHANNEL);
-            path.light += path.share * (side > 0.0 ? vec3(1.0) : passing) * through * arriving.irradiance * seen * float(light_count);
-        }
-#endif
-    } else
-#endif
-    if (is_sheet) {
-        float through = 1.0 / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
-        vec3 depth = body.extinction * through;
-#if EMISSION
-        // What a sheet emits goes back and forth in it, too.
-        vec3 again = reflectance * transmittance(depth);
-        vec3 leaving = (1.0 - mirrored) * (1.0 + again) / max(1.0 - mirrored * transmittance(depth) * again, vec3(1e-6));
-        leaving *= 1.0 - coated;
-        path.light += path.share * leaving * emitted_radiance(body.emission, body.extinction, through);
-#endif
-#if THIN_FILM
-        vec3 back = film_slab_reflectance(mirrored, reflectance, depth), on = film_slab_transmittance(mirrored, reflectance, depth);
-#else
-        vec3 back = slab_reflectance(reflectance, depth), on = slab_transmittance(reflectance, depth);
-#endif
-        back += coated * (1.0 - back);
-        on *= 1.0 - coated;
-        float chance = dot(path.share, on * passing + vec3(1e-30));
-        chance /= chance + dot(path.share, back);
-        // Paint is lit by all that passes, whatever the path does.
-        path.light += path.share * on * (1.0 - body.transmission)
-            * (body.transmission < 1.0 ? body.color * (1.0 - body.passed_share) * unblocked_irradiance(point, normal)
-            + body.passed * unblocked_irradiance(point, -normal) : vec3(0.0)) / PI;
-        passes = shares.x < chance;
-        way = passes ? path.direction : way;
-        path.share *= passes ? on / chance : back / (1.0 - chance);
-        painted = vec3(0.0);
-    } else {
-        mirrored += coated * (1.0 - mirrored);
-        if (mirrored != vec3(reflectance)) {
-            float chance = dot(mirrored, vec3(1.0 / 3.0));
-            passes = shares.x >= chance;
-            path.share *= passes ? (1.0 - mirrored) / (1.0 - chance) : mirrored / max(chance, 1e-30);
-        }
-        if (passes) { way = refracted_direction(path.direction, normal, ior); }
-    }
-    if (passes) {
-        if (body.transmission < 1.0 && painted.r > 0.0) {
-            vec3 front = body.color * (1.0 - body.passed_share) * unblocked_irradiance(point, normal);
-            path.light += path.share * (1.0 - body.transmission) * (front + body.passed * unblocked_irradiance(point, -normal)) / PI;
-        }
-        path.share *= passing;
-        path.record = place.record;
+    float seen;
+    Branch next = sampled_branch(at, lobes, path.throughput, shares.x, arriving.towards, draws, seen);
+    add_light_at_facets(path, at, surface, arriving, seen);
+    add_base(path, at, body, is_rough(at) ? vec3(next.transmitted ? 1.0 : 0.0) : lobes.transmission);
+    path.throughput *= next.weight;
+    if (next.transmitted) {
+        path.interior = surface.interior;
     } else {
         path.flags |= FLAG_REFLECTED;
     }
-    path.direction = kept_on_side(normalize(way), passes ? -place.face_normal : place.face_normal);
-    leave(path, point, place.face_normal);
+    path.lost = path.lost || next.lost;
+    path.direction = next.direction;
+    path.origin = origin_beside(at.point, at.face_normal, path.direction, path.skipped);
     play_roulette(path, shares.z);
     path.ends = path.ends || path.lost;
 }
 
-// Follows a path to its next event or surface.
-void follow(inout Path path, vec2 pixel, ivec2 texel, inout Draws draws) {
-    int before = dominant_body(path.record);
-    Filling filling = filling_of(path.record, before);
-    bool scatters = false;
-    float flight = NOTHING;
-    int channel = 1;
+// Attenuates a path up to where media scatter it (it collides), or to a surface, by what is not left to chance. channel: that the
+// length was drawn for.
+void attenuate(inout Path path, Medium medium, bool collides, float length_m, int channel) {
 #if SCATTER
-    scatters = largest_share(filling.scattering) > 0.0;
-    if (scatters) {
-        vec4 shares = random_shares(draws);
-        channel = chosen_channel(path.share, shares.x);
-        float along = filling.scattering[channel];
-        flight = along > 0.0 ? min(-log(shares.y) / along, NOTHING) : NOTHING;
+    if (largest_of(medium.scattering) > 0.0) {
+        // Relative to the channel that was drawn for: the others may differ by more than float32 holds.
+        vec3 relative = exp(-(medium.scattering - medium.scattering[channel]) * length_m);
+        vec3 found = collides ? medium.scattering * relative : relative;
+        float density = dot(path.throughput, found) / dot(path.throughput, vec3(1.0));
+        path.throughput *= transmittance(max(medium.extinction - medium.scattering, vec3(0.0)) * length_m) * found / density;
+        return;
     }
 #endif
+    path.throughput *= transmittance(medium.extinction * length_m);
+}
+
+// How far a path flies before media scatter it, and the channel that this is drawn for; NOTHING where they do not.
+float drawn_flight(Path path, Medium medium, inout Draws draws, out int channel) {
+    channel = 1;
+#if SCATTER
+    if (largest_of(medium.scattering) > 0.0) {
+        vec4 shares = random_shares(draws);
+        channel = chosen_channel(path.throughput, shares.x);
+        float along = medium.scattering[channel];
+        return along > 0.0 ? min(-log(shares.y) / along, NOTHING) : NOTHING;
+    }
+#endif
+    return NOTHING;
+}
+
+// Ends a path at an opaque object.
+void end_at_object(inout Path path, SurfaceHit surface, TracedBody body, vec3 point, vec2 pixel, ivec2 texel) {
+    path.ends = true;
+#if OPAQUE
+    if ((path.flags & FLAG_BENT) == 0u) {
+        path.light += path.throughput * background(pixel, path.direction, stored(texel));
+        return;
+    }
+#endif
+    vec3 normal = body.plain == 1.0 ? surface.face_normal : facing_normal(surface.smooth_normal, path.direction);
+    path.light += path.throughput * opaque_light(body, normal, path.direction, point);
+}
+
+// Follows a path to its next event or surface.
+void follow(inout Path path, vec2 pixel, ivec2 texel, inout Draws draws) {
+    int before = effective_medium(path.interior);
+    Medium medium = medium_in(path.interior, before);
+    int channel;
+    float flight = drawn_flight(path, medium, draws, channel);
     // A little farther than it flies: events beside a surface are kept off it, or rounding might put them behind.
     float margin = 2.0 * SURFACE_OFFSET * surface_reach;
     float end = flight < NOTHING ? max(flight - path.skipped, 0.0) + margin : NOTHING;
 #if EMISSION
-    if (largest_share(filling.emission) > 0.0) { end = NOTHING; }
+    if (largest_of(medium.emission) > 0.0) { end = NOTHING; }
 #endif
     Hit hit = nearest_hit(path.origin, path.direction, 0.0, end, uvec4(0u));
-    bool meets = hit.object >= 0;
+    bool hits = hit.object >= 0;
     float farthest = 1e3 * surface_reach;
-    float surface = meets ? hit.path + path.skipped : max(flight, farthest);
-    bool collides = flight < surface;
-    vec3 at = path.origin + max(min(flight - path.skipped, meets ? hit.path - margin : NOTHING), 0.0) * path.direction;
-    bool astray = path.record.x != 0u && !meets && (!collides || length(at) > surface_reach);
+    float surface_path = hits ? hit.path + path.skipped : max(flight, farthest);
+    bool collides = flight < surface_path;
+    vec3 event = path.origin + max(min(flight - path.skipped, hits ? hit.path - margin : NOTHING), 0.0) * path.direction;
+    bool astray = path.interior.x != 0u && !hits && (!collides || length(event) > surface_reach);
     if (astray && all_closed == 1) {
-        path.record = uvec4(0u);
+        path.interior = uvec4(0u);
     } else {
         path.lost = astray;
 #if EMISSION
-        path.light += path.share * emitted_radiance(filling.emission, filling.extinction, min(surface, farthest));
+        path.light += path.throughput * emitted_radiance(medium.emission, medium.extinction, min(surface_path, farthest));
 #endif
-        float length_m = collides ? flight : min(surface, farthest);
-        if (scatters) {
-            // Relative to the channel that was drawn for: the others may differ by more than float32 holds.
-            vec3 relative = exp(-(filling.scattering - filling.scattering[channel]) * length_m);
-            vec3 found = collides ? filling.scattering * relative : relative;
-            float density = dot(path.share, found) / dot(path.share, vec3(1.0));
-            path.share *= transmittance(max(filling.extinction - filling.scattering, vec3(0.0)) * length_m) * found / density;
-        } else {
-            path.share *= transmittance(filling.extinction * length_m);
-        }
+        attenuate(path, medium, collides, collides ? flight : min(surface_path, farthest), channel);
         if (path.lost) {
             path.ends = true;
             return;
         }
         if (collides) {
-            path.origin = at;
-            scatter(path, filling, before, draws);
+            path.origin = event;
+            scatter(path, medium, before, draws);
             return;
         }
     }
-    if (!meets) {
-        path.light += path.share * environment_seen(path, pixel);
+    if (!hits) {
+        path.light += path.throughput * environment_seen(path, pixel);
         path.ends = true;
         return;
     }
     bool sound = true;
-    Place place = place_at(path.origin, path.direction, path.record, 0.0, hit, before, CHANNEL, sound);
-    TracedBody body = traced_body(place.object);
-    path.lost = !sound && (all_closed == 0 || is_full(path.record));
-    path.light += path.share * place.glow;
-    path.share *= place.coat;
-    if (int(body.kind) == KIND_OPAQUE && (place.outside || body.one_sided == 0.0)) {
-        path.ends = true;
-#if OPAQUE
-        if ((path.flags & FLAG_BENT) == 0u) {
-            path.light += path.share * background(pixel, path.direction, stored(texel));
-            return;
-        }
-#endif
-        vec3 normal = place.smooth_normal;
-        float facing = dot(normal, path.direction);
-        if (body.plain == 1.0) {
-            normal = place.face_normal;
-        } else if (facing > -EDGE_ON) {
-            normal = normalize(normal - (facing + EDGE_ON) * path.direction);
-        }
-        path.light += path.share * opaque_light(body, normal, path.direction, path.origin + hit.path * path.direction);
+    SurfaceHit surface = surface_hit(path.origin, path.direction, path.interior, 0.0, hit, before, CHANNEL, sound);
+    TracedBody body = traced_body(surface.object);
+    path.lost = !sound && (all_closed == 0 || is_full(path.interior));
+    path.light += path.throughput * surface.emitted;
+    path.throughput *= surface.transmittance;
+    if (int(body.type) == TYPE_OPAQUE && (surface.outside || body.one_sided == 0.0)) {
+        end_at_object(path, surface, body, path.origin + hit.path * path.direction, pixel, texel);
         return;
     }
-    int after = dominant_body(place.record);
-    if (int(body.kind) != KIND_SHEET && !alters_light(before, after, CHANNEL)) {
-        leave(path, path.origin + place.path * path.direction, place.face_normal);
-        path.record = place.record;
+    int after = effective_medium(surface.interior);
+    if (int(body.type) != TYPE_THIN_WALL && !alters_light(before, after, CHANNEL)) {
+        path.origin = origin_beside(path.origin + surface.path * path.direction, surface.face_normal, path.direction, path.skipped);
+        path.interior = surface.interior;
     } else {
-        meet(path, place, body, before, after, draws);
+        interact(path, surface, body, before, after, draws);
     }
-    path.ends = path.ends || path.lost || path.share == vec3(0.0);
+    path.ends = path.ends || path.lost || path.throughput == vec3(0.0);
 }
 
 void main() {

@@ -1,8 +1,8 @@
-// Rays that meet the interfaces of bodies, followed through the mesh: a tree of exact reflections and refractions. The
-// stronger branch is always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked
-// up in the environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
-// interface is that which the rasterizer has found. adaptive: of several samples of a pixel, those that are worth it; with
-// the square of their luminance in place of the transmittance. ROUGH: some body is. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
+// Rays traced through the meshes wherever interfaces reflect and refract them: a tree of exact branches. The stronger branch is
+// always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked up in the environment;
+// so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first interface is that
+// which the rasterizer has found. adaptive: of several samples of a pixel, those that are worth it; with the square of their
+// luminance in place of the transmittance. ROUGH: some body is. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
 
 #include <constants>
 #include <View>
@@ -11,7 +11,6 @@
 #include <SurfaceRow>
 #include <TracedBody>
 #include "lib/color.glsl"
-#include "lib/interface.glsl"
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
 #include "shade/background.glsl"
@@ -21,83 +20,83 @@
 #include "shade/diffused_light.glsl"
 #include "shade/opaque_light.glsl"
 #include "transport/hierarchy.glsl"
-#include "transport/record.glsl"
-#include "transport/place.glsl"
+#include "transport/interior_list.glsl"
+#include "transport/surface_hit.glsl"
+#include "transport/interaction.glsl"
 #include "transport/light_passed.glsl"
-#if FOOTPRINTS
 #include "transport/footprint.glsl"
-#endif
 #include "transport/opaque_objects.glsl"
 
 uniform int adaptive;              // 1: with the square of luminance, and opaque objects as the mean of all samples shows them
 
-#include "transport/branch_ends.glsl"
-#include "transport/sampled_facets.glsl"
+#include "transport/escaped_rays.glsl"
+#include "transport/facets.glsl"
 
 uniform sampler2D emitted_radiance_sum;
 uniform sampler2D straight_transmittance;
-uniform sampler2D entered;           // interface towards the eye: normal, axial depth
-uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission, variance of normals
+uniform sampler2D entered;             // interface towards the eye: normal, axial depth
+uniform sampler2D surface_parameters;  // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
 uniform int most_interfaces;
-uniform int all_closed;              // 1: no solid has holes: what seems to leave through one passes an edge by rounding
-uniform float faintest_share;        // of the light, its three channels together: fainter rays are not followed
+uniform int all_closed;                // 1: no solid has holes: what seems to leave through one passes an edge by rounding
+uniform float faintest_share;          // throughput, its three channels together, below which rays are not followed
 layout(location = 0) out vec4 out_radiance;
 layout(location = 1) out vec4 out_transmittance;
 
-const float EDGE_ON = 1e-3;
-const int WAITING = 8;
-const int GLIMPSES = 8;
+const int MOST_STACKED = 8;
+const int MOST_ESCAPED = 8;
 
-// One of the rays that wait to be followed.
 struct Ray {
     vec3 origin;
-    float skipped;    // metres of its path that lie before its origin: from the surface, which it must not meet again
+    float skipped;      // metres of its segment that lie before its origin: from the surface, which it must not hit again
     vec3 direction;
-    vec3 share;       // of the light at its end that reaches the eye
-    uvec4 record;
-    int met;          // interfaces
-    int forks;        // left
-    bool reflected;   // sees the environment as a light
-    float blur;       // squared alpha of a mirror with the same blur
-    int turns;        // which of its interfaces it was reflected at, a bit each
-    vec3 outwards;    // normal of the body where it starts inside one
-#if FOOTPRINTS
+    vec3 throughput;    // fraction of the light at its end that reaches the eye
+    uvec4 interior;
+    int depth;          // interfaces behind it
+    int forks;          // left
+    bool reflected;     // sees the environment as a light
+    float blur;         // squared alpha of a mirror with the same blur
+    int branch_code;    // which of its interfaces it was reflected at, a bit each
+    vec3 outwards;      // normal of the body where it starts inside one
     Footprint footprint;
+};
+
+// The first interface, as the rasterizer has found it.
+struct PrimaryHit {
+    int object;
+    vec3 point;
+    vec3 normal;
+    Surface surface;
+};
+
+// Rays still to follow, and rays of which it is not known yet what they see: a step ends two at most.
+#if FORKS > 0
+Ray stack[MOST_STACKED];
+#else
+Ray stack[1];
 #endif
-};
+int stacked = 0;
+EscapedRay escaped[MOST_ESCAPED];
+int escapes = 0;
+vec3 traced_radiance = vec3(0.0);
+float traced_lost = 0.0;  // fraction of the light whose ray went through a hole, or is in more bodies than its list holds
 
-float strength(vec3 share) {
-    return dot(share, vec3(1.0));
+float strength(vec3 throughput) {
+    return dot(throughput, vec3(1.0));
 }
 
-// Ray that goes on from a point of a surface: on the side that its direction goes to, a little off, so that it does not meet
-// the surface again.
-void leave(inout Ray ray, vec3 point, vec3 face_normal) {
-    float offset = SURFACE_OFFSET * surface_reach;
-    float across = dot(face_normal, ray.direction);
-    ray.origin = point + (across < 0.0 ? -offset : offset) * face_normal;
-    ray.skipped = offset / max(abs(across), 1e-2);
+void escape(EscapedRay end) {
+    escaped[escapes++] = end;
 }
-
-struct Sum {
-    vec3 light;
-    float lost;        // share of the light whose ray went through a hole, or is in more bodies than a record holds
-};
 
 #if OPAQUE
 uniform int ground_object;   // number of the object that is the ground, or -1
 uniform vec4 ground_plane;   // unit normal upwards, and metres along it from the center of the media
-
 #endif
 
-// What a ray sees that is not followed on: the environment, or the ground before it.
-Glimpse seen_ahead(Ray ray, vec3 direction, vec3 share, bool reflected) {
-    Glimpse end = Glimpse(AIR, vec3(0.0), ray.origin, ray.origin, direction, share, reflected, ray.blur
-#if FOOTPRINTS
-        , ellipse_of(ray.footprint.direction)
-#endif
-    );
+// Ends a ray that is not followed on: it sees the environment, or the ground before it.
+void terminate(Ray ray, vec3 direction, vec3 throughput, bool reflected) {
+    EscapedRay end = EscapedRay(AIR, vec3(0.0), ray.origin, ray.origin, direction, throughput, reflected, ray.blur, ellipse_of(ray.footprint));
 #if OPAQUE
     float falling = -dot(ground_plane.xyz, direction), height = dot(ground_plane.xyz, ray.origin) - ground_plane.w;
     if (ground_object >= 0 && falling > 1e-3 && height > 0.0) {
@@ -106,280 +105,230 @@ Glimpse seen_ahead(Ray ray, vec3 direction, vec3 share, bool reflected) {
         end.point += height / falling * direction;
     }
 #endif
-    return end;
+    escape(end);
 }
 
-// The first interface, as the rasterizer has found it.
-struct Seen {
-    int object;
-    vec3 point;
-    vec3 normal;
-    Finish finish;
-};
-
-Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
-    Sum sum = Sum(vec3(0.0), 0.0);
-#if FORKS > 0
-    Ray waiting[WAITING];
+// Whether light that is scattered in a body leaves it as from a layer.
+bool is_layer(int body) {
+#if LAYERED
+    return body != AIR && surface_table_row(body).scatters_much > 0.5;
 #else
-    Ray waiting[1];
+    return false;
 #endif
-    int waits = 0;
+}
+
+// Adds what media emit and scatter towards the eye along a segment, and attenuates its ray; returns the transmittance.
+vec3 through_media(inout Ray ray, int effective, Hit hit) {
+    if (ray.interior.x == 0u) { return vec3(1.0); }
+    if (hit.object < 0) { traced_lost += strength(ray.throughput) / 3.0; }  // it has left through a hole
+    Medium medium = medium_in(ray.interior, effective);
+    float path = min(hit.path + ray.skipped, 1e3 * surface_reach);
+#if EMISSION
+    traced_radiance += ray.throughput * emitted_radiance(medium.emission, medium.extinction, path);
+#endif
+    vec3 passed = transmittance(medium.extinction * path);
+    if (is_layer(effective)) {
+        Surface layer = surface_of(vec4(float(effective), 0.0, 1.0, 0.0));
+        traced_radiance += ray.throughput * layer_exitance(layer, ray.origin, ray.outwards, path, passed);
+    }
+    if (effective != AIR) {
+        float cosine = clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0);
+        traced_radiance += ray.throughput * subsurface_exitance(effective, ray.origin, cosine, medium.extinction * path);
+        traced_radiance += ray.throughput * ahead_in_scattered(effective, ray.direction, medium.extinction * path);
+    }
+    ray.throughput *= passed;
+    return passed;
+}
+
+// Lets a ray go on behind surfaces that do nothing to light.
+void pass_on(inout Ray ray, vec3 point, vec3 face_normal, uvec4 interior, vec3 normal) {
+    ray.origin = origin_beside(point, face_normal, ray.direction, ray.skipped);
+    ray.interior = interior;
+    ray.outwards = normal;
+}
+
+// Before the first interface a ray is in no body; it started a little before what the rasterizer has found.
+bool starts_within(Ray ray, TracedBody body, bool outside) {
+#if FROM_EYE
+    return false;
+#else
+    return ray.depth == 0 && int(body.type) == TYPE_SOLID && !outside && ray.interior.x == 0u;
+#endif
+}
+
+// A clear coat: takes its part of the lobes and of what is emitted below, and reflects it as the interface below does, or adds
+// what a rougher one sees. normal: of the surface; polished: the interface below is.
+void add_coat(Ray ray, Interaction at, TracedBody body, vec3 normal, bool polished, float unoccluded, inout Lobes lobes, inout vec3 emitted) {
+#if CLEAR_COAT
+    if (body.clearcoat == 0.0 || !(at.outside || at.thin_walled)) { return; }
+    float coat = coat_reflectance(vec2(body.clearcoat, body.clearcoat_roughness), clamp(-dot(normal, at.direction), 0.0, 1.0));
+    lobes = below_coat(lobes, coat);
+    emitted *= 1.0 - coat;
+    if (polished && body.clearcoat_roughness == 0.0) {
+        lobes.reflection += coat;
+    } else {
+        float alpha = body.clearcoat_roughness * body.clearcoat_roughness;
+        vec3 direction = kept_on_side(reflected_direction(at.direction, normal), at.face_normal);
+        traced_radiance += unoccluded * coat * ray.throughput * environment_seen(at.point, direction, true, ray.blur + alpha * alpha);
+    }
+#endif
+}
+
+// Radiance of the diffuse base, for the fraction of the light that comes to it.
+void add_base(Ray ray, vec3 arriving, Interaction at, PrimaryHit primary) {
+#if DIFFUSE_BASE
+    if (at.transmission == 1.0) { return; }
+    Surface surface = primary.surface;
+    if (at.object != primary.object) {
+        surface = surface_of(vec4(float(at.object), at.roughness, at.transmission, 0.0));
+        surface.color = at.color;
+    }
+    traced_radiance += ray.throughput * arriving * (1.0 - at.transmission) * base_radiance(surface, at.point, at.normal);
+#endif
+}
+
+// Goes on with the stronger of two branches, and stacks or ends the weaker one; returns whether the ray ends. again: what another
+// way through the body leaves of light that is reflected back into it; total: reflection; last: of the interfaces.
+bool branch(inout Ray ray, Ray back, Ray on, vec3 again, bool total, bool last) {
+    bool on_stronger = strength(on.throughput) >= strength(back.throughput);
+    vec3 arrival = ray.direction;
+    bool arrived_reflected = ray.reflected;
+    Ray weaker = back;
+    ray = on;
+    if (!on_stronger) {
+        weaker = on;
+        ray = back;
+    }
+    bool stacks = false;
+#if FORKS > 0
+    weaker.forks -= weaker.depth == 1 ? 0 : 1;
+    stacks = weaker.forks >= 0 && !last && stacked < MOST_STACKED && strength(weaker.throughput) > faintest_share;
+    if (stacks) { stack[stacked++] = weaker; }
+#endif
+    if (!stacks && strength(weaker.throughput) > 0.0) {
+        terminate(weaker, weaker.direction, (on_stronger ? again : vec3(1.0)) * weaker.throughput, weaker.reflected);
+    }
+    if (!last && strength(ray.throughput) >= faintest_share) { return false; }
+    // What is reflected totally is looked up as if it left straight on: reflected on, it would most often leave there, too.
+    vec3 throughput = (on_stronger ? vec3(1.0) : again) * ray.throughput;
+    terminate(ray, total ? arrival : ray.direction, throughput, total ? arrived_reflected : ray.reflected);
+    return true;
+}
+
+// The interaction of a ray with an interface; returns whether the ray ends there. again, last: as for `branch`.
+bool interact(inout Ray ray, Interaction at, TracedBody body, Hit hit, SurfaceHit surface, PrimaryHit primary, float unoccluded, vec3 again, bool last) {
+    // Textures are read where a ray first hits an object; farther on it counts as the same all over.
+    if (at.object == primary.object) {
+        at.roughness = primary.surface.roughness;
+        at.transmission = primary.surface.transmission;
+        at.color = primary.surface.color;
+    }
+    bool polished = at.roughness == 0.0;
+    float alpha = at.roughness * at.roughness;
+    Facet facet = take_facet(at, alpha, ray.depth, ray.branch_code);
+    float bare = interface_reflectance(cosine_of(at), at.ior, at.roughness);
+    vec3 emitted, refracted = refracted_at(at);
+    Lobes lobes = interface_lobes(at, body, bare, emitted);
+    mask_lobes(lobes, facet, at, refracted);
+    add_coat(ray, at, body, facet.surface_normal, polished, unoccluded, lobes, emitted);
+    traced_radiance += ray.throughput * emitted;
+    add_base(ray, lobes.transmission, at, primary);
+    lobes.transmission *= passing_base(at);
+    float ior_inside = max(at.ior, 1.0 / at.ior);
+    Ray back = ray, on = ray;
+    back.depth = on.depth = ray.depth + 1;
+    split_footprint(ray.footprint, hit, at, back.footprint, on.footprint);
+    back.direction = reflected_at(at);
+    back.origin = origin_beside(at.point, at.face_normal, back.direction, back.skipped);
+    back.throughput = unoccluded * ray.throughput * lobes.reflection;
+    back.forks = ray.depth == 0 ? 0 : ray.forks;
+    back.reflected = true;
+    back.blur += alpha * alpha * (at.outside ? 1.0 : ior_inside * ior_inside);
+    back.branch_code = ray.branch_code * 2 + 1;
+    back.outwards = -at.normal;
+    on.direction = refracted;
+    on.origin = origin_beside(ray.origin + surface.path * ray.direction, at.face_normal, on.direction, on.skipped);
+    on.throughput = ray.throughput * lobes.transmission;
+    on.interior = surface.interior;
+    on.blur += alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0);
+    on.branch_code = ray.branch_code * 2;
+    on.outwards = at.normal;
+    return branch(ray, back, on, again, bare == 1.0, last);
+}
+
+// Follows a ray to the next surface, and from there on; returns whether it ends. reach: how far a surface is looked for at first.
+bool follow(inout Ray ray, PrimaryHit primary, inout float reach, int channel, bool late) {
+    int before = effective_medium(ray.interior);
+    bool sound = true;
+    Hit hit = first_hit(ray.origin, ray.direction, 0.0, reach);
+    SurfaceHit surface = surface_hit(ray.origin, ray.direction, ray.interior, 0.0, hit, before, channel, sound);
+    bool looks_on = hit.object < 0 && reach < NOTHING;
+    reach = NOTHING;
+    if (looks_on) { return false; }  // the rasterizer sees this edge a little elsewhere
+    if (hit.object < 0 && all_closed == 1) {
+        ray.interior = uvec4(0u);
+        before = AIR;
+    }
+    vec3 passed = through_media(ray, before, hit);
+    if (hit.object < 0) {
+        escape(EscapedRay(AIR, vec3(0.0), ray.origin, ray.origin, ray.direction, ray.throughput, ray.reflected, ray.blur, ellipse_of(ray.footprint)));
+        return true;
+    }
+    vec3 point = ray.origin + hit.path * ray.direction;
+    advance(ray.footprint, hit.path);
+    TracedBody body = traced_body(surface.object);
+    int type = int(body.type);
+    if (starts_within(ray, body, surface.outside)) {
+        ray.origin = origin_beside(point, surface.face_normal, ray.direction, ray.skipped);
+        return false;
+    }
+    if (!sound && (all_closed == 0 || is_full(ray.interior))) { traced_lost += strength(ray.throughput) / 3.0; }
+    bool first = ray.depth == 0 && surface.object == primary.object && distance(point, primary.point) < 1e-3 * surface_reach;
+    vec3 normal = facing_normal(first ? primary.normal : surface.smooth_normal, ray.direction);
+    traced_radiance += ray.throughput * surface.emitted;
+    ray.throughput *= surface.transmittance;
+    if (type == TYPE_OPAQUE && (surface.outside || body.one_sided == 0.0)) {
+        // It is in an open body, and whether rightly so, what is behind the opaque object would tell.
+        if (all_closed == 0 && is_in_open_body(ray.interior)) { traced_lost += strength(ray.throughput) / 3.0; }
+        escape(EscapedRay(surface.object, normal, ray.origin, point, ray.direction, ray.throughput, ray.reflected, ray.blur, ellipse_of(ray.footprint)));
+        return true;
+    }
+    int after = effective_medium(surface.interior);
+    if (type != TYPE_THIN_WALL && !alters_light(before, after, channel)) {
+        ray.origin = origin_beside(ray.origin + surface.path * ray.direction, surface.face_normal, ray.direction, ray.skipped);
+        ray.interior = surface.interior;
+        ray.outwards = normal;
+        return false;
+    }
+    Interaction at = interaction_at(surface, body, point, ray.direction, normal, before, after, channel);
+    // Light that scatters on the way leaves all the same as from a layer.
+    vec3 again = surface.outside || is_layer(before) ? vec3(1.0) : passed;
+    bool last = ray.depth + 1 >= most_interfaces || late;
+    return interact(ray, at, body, hit, surface, primary, first ? primary.surface.unoccluded : 1.0, again, last);
+}
+
+// Light of a tree of rays, and how much of it is lost.
+void trace(Ray ray, PrimaryHit primary, float reach, int channel) {
+    traced_radiance = vec3(0.0);
+    traced_lost = 0.0;
+    stacked = escapes = 0;
     bool ends = false;
-    vec3 passed = vec3(1.0);  // transmittance of the last segment
-    float reach = first_reach;
-    Glimpse glimpses[GLIMPSES];
-    int ended = 0;  // branches of which it is not known yet what they see; a step ends two at most
     int step = 0;
     do {
-        for (; step < MOST_STEPS && ended + 2 <= GLIMPSES; ++step) {
+        for (; step < MOST_STEPS && escapes + 2 <= MOST_ESCAPED; ++step) {
             if (ends) {
-                if (waits == 0) { break; }
-                ray = waiting[--waits];
-                ends = false;
+                if (stacked == 0) { break; }
+                ray = stack[--stacked];
             }
-            int before = dominant_body(ray.record);
-            bool sound = true;
-            Hit hit = first_hit(ray.origin, ray.direction, 0.0, reach);
-            Place place = place_at(ray.origin, ray.direction, ray.record, 0.0, hit, before, channel, sound);
-            if (hit.object < 0 && reach < NOTHING) {
-                reach = NOTHING;  // the rasterizer sees this edge a little elsewhere
-                continue;
-            }
-            reach = NOTHING;
-            if (hit.object < 0 && all_closed == 1) {
-                ray.record = uvec4(0u);
-                before = AIR;
-            }
-            passed = vec3(1.0);
-            if (ray.record.x != 0u) {
-                if (hit.object < 0) { sum.lost += strength(ray.share) / 3.0; }  // it has left through a hole
-                Filling filling = filling_of(ray.record, before);
-                float path = min(hit.path + ray.skipped, 1e3 * surface_reach);
-#if EMISSION
-                sum.light += ray.share * emitted_radiance(filling.emission, filling.extinction, path);
-#endif
-                passed = transmittance(filling.extinction * path);
-#if LAYERED
-                if (before != AIR && surface_table_row(before).scatters_much > 0.5) {
-                    Finish layer = finish_of(vec4(float(before), 0.0, 1.0, 0.0));
-                    sum.light += ray.share * scattered_out(layer, ray.origin, ray.outwards, path, passed);
-                }
-#endif
-#if DIFFUSED
-                if (before != AIR) {
-                    float cosine = clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0);
-                    sum.light += ray.share * diffused_out(before, ray.origin, cosine, filling.extinction * path);
-                    sum.light += ray.share * haze(before, ray.direction, filling.extinction * path);
-                }
-#endif
-                ray.share *= passed;
-            }
-            if (hit.object < 0) {
-                glimpses[ended++] = Glimpse(AIR, vec3(0.0), ray.origin, ray.origin, ray.direction, ray.share, ray.reflected, ray.blur
-#if FOOTPRINTS
-                    , ellipse_of(ray.footprint.direction)
-#endif
-                );
-                ends = true;
-                continue;
-            }
-            vec3 point = ray.origin + hit.path * ray.direction;
-#if FOOTPRINTS
-            ray.footprint.point += hit.path * ray.footprint.direction;
-#endif
-            TracedBody body = traced_body(place.object);
-            int kind = int(body.kind);
-            bool outside = place.outside;
-            vec3 face_normal = place.face_normal;
-#if !FROM_EYE
-            // Before the first interface a ray is in no body; it started a little before what the rasterizer has found.
-            if (ray.met == 0 && kind == KIND_SOLID && !outside && ray.record.x == 0u) {
-                leave(ray, point, face_normal);
-                continue;
-            }
-#endif
-            if (!sound && (all_closed == 0 || is_full(ray.record))) { sum.lost += strength(ray.share) / 3.0; }
-            vec3 smooth_normal = place.smooth_normal;
-            bool first = ray.met == 0 && place.object == seen.object && distance(point, seen.point) < 1e-3 * surface_reach;
-            if (first) { smooth_normal = seen.normal; }
-            float facing = dot(smooth_normal, ray.direction);
-            if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
-            sum.light += ray.share * place.glow;
-            ray.share *= place.coat;
-            if (kind == KIND_OPAQUE && (outside || body.one_sided == 0.0)) {
-                // It is in an open body, and whether rightly so, what is behind the opaque object would tell.
-                if (all_closed == 0 && is_in_open_body(ray.record)) { sum.lost += strength(ray.share) / 3.0; }
-                glimpses[ended++] = Glimpse(place.object, smooth_normal, ray.origin, point, ray.direction, ray.share, ray.reflected, ray.blur
-#if FOOTPRINTS
-                    , ellipse_of(ray.footprint.direction)
-#endif
-                );
-                ends = true;
-                continue;
-            }
-            int after = dominant_body(place.record);
-            if (kind != KIND_SHEET && !alters_light(before, after, channel)) {
-                leave(ray, ray.origin + place.path * ray.direction, face_normal);
-                ray.record = place.record;
-                ray.outwards = smooth_normal;
-                continue;
-            }
-            float ior = index_of(kind == KIND_SHEET ? place.object : after, channel) / index_of(before, channel);
-            bool enters = kind == KIND_SHEET || place.object == after;
-            // Textures are read where a ray first meets an object; farther on it counts as the same all over.
-            bool as_first = place.object == seen.object;
-            float roughness = as_first ? seen.finish.roughness : body.roughness;
-            float transmission = as_first ? seen.finish.transmission : body.transmission;
-            vec3 tint = as_first ? seen.finish.color : body.color;
-            float alpha = roughness * roughness;
-#if CLEAR_COAT
-            vec3 coat_normal = smooth_normal;
-            bool polished = roughness == 0.0;
-#endif
-#if ROUGH
-            vec3 facet, facet_normal;
-            float facet_alpha = 0.0, full_alpha = 0.0;
-            if (roughness > 0.0 && blurred_share < 1.0) {
-                facet_alpha = sqrt(1.0 - blurred_share) * alpha;
-                full_alpha = alpha;
-                alpha *= sqrt(blurred_share);
-                facet = microfacet_normal(smooth_normal, ray.direction, facet_alpha, microfacet_shares(ray.met, ray.turns));
-                facet_normal = smooth_normal;
-                smooth_normal = facet;
-                roughness = 0.0;
-            }
-#endif
-            float cosine = clamp(-dot(smooth_normal, ray.direction), 0.0, 1.0);
-            float reflectance = interface_reflectance(cosine, ior, roughness);
-            vec3 share_back = vec3(reflectance);
-            vec3 share_on = vec3(1.0 - reflectance);
-#if THIN_FILM
-            vec3 filmed = filmed_reflectance(body.film, reflectance, cosine, ior, index_of(before, channel));
-            share_back = filmed;
-            share_on = 1.0 - filmed;
-#endif
-            vec3 on_way = ray.direction;
-            if (kind == KIND_SHEET) {
-                float through = 1.0 / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
-                vec3 depth = body.extinction * through;
-#if EMISSION
-                // What a sheet emits goes back and forth in it, too.
-                vec3 leaving = (1.0 - reflectance) / max(1.0 - reflectance * transmittance(depth), vec3(1e-6));
-#if THIN_FILM
-                vec3 mirrored_on = reflectance * transmittance(depth);
-                leaving = (1.0 - filmed) * (1.0 + mirrored_on) / max(1.0 - filmed * transmittance(depth) * mirrored_on, vec3(1e-6));
-#endif
-                sum.light += ray.share * leaving * emitted_radiance(body.emission, body.extinction, through);
-#endif
-#if THIN_FILM
-                share_back = film_slab_reflectance(filmed, reflectance, depth);
-                share_on = film_slab_transmittance(filmed, reflectance, depth);
-#else
-                share_back = slab_reflectance(reflectance, depth);
-                share_on = slab_transmittance(reflectance, depth);
-#endif
-            } else {
-                on_way = kept_on_side(refracted_direction(ray.direction, smooth_normal, ior), -face_normal);
-            }
-#if ROUGH
-            if (facet_alpha > 0.0) {
-                float towards = -dot(facet_normal, ray.direction);
-                vec3 mirrored_way = reflected_direction(ray.direction, facet);
-                share_back *= masking_ratio(towards, dot(facet_normal, mirrored_way), full_alpha);
-                share_on *= kind == KIND_SHEET ? 1.0 : masking_ratio(towards, -dot(facet_normal, on_way), full_alpha);
-            }
-#endif
-            vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
-#if CLEAR_COAT
-            if (body.clearcoat > 0.0 && (outside || kind == KIND_SHEET)) {
-                float coated = coated_share(vec2(body.clearcoat, body.clearcoat_roughness), clamp(-dot(coat_normal, ray.direction), 0.0, 1.0));
-                share_back *= 1.0 - coated;
-                share_on *= 1.0 - coated;
-                if (polished && body.clearcoat_roughness == 0.0) {
-                    share_back += coated;
-                } else {
-                    float coat_alpha = body.clearcoat_roughness * body.clearcoat_roughness;
-                    vec3 coat_way = kept_on_side(reflected_direction(ray.direction, coat_normal), face_normal);
-                    sum.light += (first ? seen.finish.unoccluded : 1.0) * coated * ray.share
-                        * environment_seen(point, coat_way, true, ray.blur + coat_alpha * coat_alpha);
-                }
-            }
-#endif
-#if PAINTED
-            if (transmission < 1.0 && enters) {
-                Finish finish = seen.finish;
-                if (!as_first) {
-                    finish = finish_of(vec4(float(place.object), roughness, transmission, 0.0));
-                    finish.color = tint;
-                }
-                sum.light += ray.share * share_on * (1.0 - transmission) * paint(finish, point, smooth_normal);
-            }
-#endif
-            if (enters) { share_on *= transmission * tint; }
-            float ior_inside = max(ior, 1.0 / ior);
-            float occlusion = first ? seen.finish.unoccluded : 1.0;
-#if FOOTPRINTS
-            ray.footprint.point = onto_plane(ray.footprint.point, ray.direction, face_normal);
-            mat2x3 normals = normal_differentials(hit, ray.footprint.point, smooth_normal);
-#endif
-            Ray back = Ray(point, 0.0, back_way, occlusion * ray.share * share_back, ray.record, ray.met + 1,
-                ray.met == 0 ? 0 : ray.forks, true, ray.blur + alpha * alpha * (outside ? 1.0 : ior_inside * ior_inside),
-                ray.turns * 2 + 1, -smooth_normal
-#if FOOTPRINTS
-                , Footprint(ray.footprint.point, reflected_differentials(ray.footprint.direction, normals, ray.direction, smooth_normal))
-#endif
-            );
-            Ray on = Ray(point, 0.0, on_way, ray.share * share_on, place.record, ray.met + 1, ray.forks, ray.reflected,
-                ray.blur + alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0), ray.turns * 2, smooth_normal
-#if FOOTPRINTS
-                , Footprint(ray.footprint.point, kind == KIND_SHEET ? ray.footprint.direction
-                    : refracted_differentials(ray.footprint.direction, normals, ray.direction, smooth_normal, ior))
-#endif
-            );
-            leave(back, point, face_normal);
-            leave(on, ray.origin + place.path * ray.direction, face_normal);
-            bool on_stronger = strength(on.share) >= strength(back.share);
-            bool last = ray.met + 1 >= most_interfaces || step > 3 * MOST_STEPS / 4;
-            Ray weaker = back;
-            vec3 arrival = ray.direction;
-            bool arrived_reflected = ray.reflected;
-            vec3 again = outside ? vec3(1.0) : passed;
-#if LAYERED
-            // Light that scatters on the way comes out all the same where media give it back.
-            if (before != AIR && surface_table_row(before).scatters_much > 0.5) { again = vec3(1.0); }
-#endif
-            ray = on;
-            if (!on_stronger) {
-                weaker = on;
-                ray = back;
-            }
-#if FORKS > 0
-            weaker.forks -= ray.met == 1 ? 0 : 1;
-            if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > faintest_share) {
-                waiting[waits++] = weaker;
-            } else
-#endif
-            if (strength(weaker.share) > 0.0) {
-                vec3 share = (on_stronger ? again : vec3(1.0)) * weaker.share;
-                glimpses[ended++] = seen_ahead(weaker, weaker.direction, share, weaker.reflected);
-            }
-            if (last || strength(ray.share) < faintest_share) {
-                // What is mirrored totally is looked up as if it left straight on: mirrored on, it would most often leave there, too.
-                bool total = reflectance == 1.0;
-                vec3 share = (on_stronger ? vec3(1.0) : again) * ray.share;
-                glimpses[ended++] = seen_ahead(ray, total ? arrival : ray.direction, share, total ? arrived_reflected : ray.reflected);
-                ends = true;
-            }
+            ends = follow(ray, primary, reach, channel, step > 3 * MOST_STEPS / 4);
         }
-        while (ended > 0) {
-            --ended;
-            sum.light += glimpses[ended].share * light_at(glimpses[ended]);
+        while (escapes > 0) {
+            --escapes;
+            traced_radiance += escaped[escapes].throughput * escaped_radiance(escaped[escapes]);
         }
-    } while (step < MOST_STEPS && !(ends && waits == 0));
+    } while (step < MOST_STEPS && !(ends && stacked == 0));
     // Not all has been followed after too many steps, or where a driver cuts long loops short: Mesa does after 65,535 turns.
-    if (!(ends && waits == 0 && ended == 0)) { sum.lost = 1.0; }
-    return sum;
+    if (!(ends && stacked == 0 && escapes == 0)) { traced_lost = 1.0; }
 }
 
 #if MIRROR
@@ -389,31 +338,43 @@ const int mirrored = 0;
 #endif
 
 // The first ray of a pixel, which starts a little before what the rasterizer has found, and how far it looks for that.
-void begin(vec2 pixel, vec3 direction, vec4 front, vec4 surface, vec4 tint, bool starts_inside, out Ray ray, out Seen seen, out float reach) {
-    Finish finish = finish_of(surface);
-    finish.color = tint.rgb;
-    finish.unoccluded = tint.a;
-    seen = Seen(front.w < NOTHING ? int(surface.x + 0.5) : AIR, point_at(pixel, front.w), front.xyz, finish);
+void begin(vec2 pixel, vec3 direction, vec4 front, vec4 parameters, vec4 tint, bool starts_inside, out Ray ray, out PrimaryHit primary, out float reach) {
+    Surface surface = surface_of(parameters);
+    surface.color = tint.rgb;
+    surface.unoccluded = tint.a;
+    primary = PrimaryHit(front.w < NOTHING ? int(parameters.x + 0.5) : AIR, point_at(pixel, front.w), front.xyz, surface);
     vec3 eye = point_at(pixel, surface_eye_axial_depth);
-    float margin = min(1e-3 * surface_reach, distance(seen.point, eye));
-    ray = Ray(seen.point - margin * direction, 0.0, direction, vec3(1.0), uvec4(0u), 0, FORKS, false, 0.0, 0, -direction
-#if FOOTPRINTS
-        , footprint_of(pixel, front.w)
-#endif
-    );
+    float margin = min(1e-3 * surface_reach, distance(primary.point, eye));
+    ray = Ray(primary.point - margin * direction, 0.0, direction, vec3(1.0), uvec4(0u), 0, FORKS, false, 0.0, 0, -direction,
+        footprint_of(pixel, front.w));
     reach = margin + 1e-3 * surface_reach;
 #if FROM_EYE
     // Something may lie before the first interface.
     ray.origin = point_at(pixel, 0.0);
-#if FOOTPRINTS
     ray.footprint = footprint_of(pixel, starts_inside ? surface_eye_axial_depth : 0.0);
-#endif
     if (starts_inside) {
         ray.skipped = 2.0 * SURFACE_OFFSET * surface_reach;
         ray.origin = eye + ray.skipped * direction;
-        ray.record = record_at_eye(eye, direction, ray.skipped);
+        ray.interior = interior_at_eye(eye, direction, ray.skipped);
     }
     reach = NOTHING;
+#endif
+}
+
+// Traces a ray, in each channel for itself where indices differ.
+void trace_channels(Ray ray, PrimaryHit primary, float reach) {
+    trace(ray, primary, reach, 1);
+#if DISPERSION
+    if (mirrored == 1) { return; }
+    vec3 light = traced_radiance;
+    float lost = traced_lost;
+    trace(ray, primary, reach, 0);
+    light.r = traced_radiance.r;
+    lost += traced_lost;
+    trace(ray, primary, reach, 2);
+    light.b = traced_radiance.b;
+    traced_radiance = light;
+    traced_lost = (lost + traced_lost) / 3.0;
 #endif
 }
 
@@ -426,63 +387,53 @@ void main() {
     vec3 emitted = texelFetch(emitted_radiance_sum, here, 0).rgb;
     vec3 through = texelFetch(straight_transmittance, here, 0).rgb;
     vec4 front = texelFetch(entered, texel, 0);
-    out_transmittance = vec4(through, 1.0);  // alpha: share of the light that can be trusted
+    out_transmittance = vec4(through, 1.0);  // alpha: fraction of the light that can be trusted
 #if FROM_EYE
-    bool starts_inside = start_record.x != 0u;
+    bool starts_inside = start_interior.x != 0u;
 #else
     const bool starts_inside = false;
 #endif
     Ray ray;
-    Seen seen;
+    PrimaryHit primary;
     float reach = NOTHING;
-    vec4 surface = vec4(0.0);
+    vec4 parameters = vec4(0.0);
 #if MIRROR
-    vec3 mirrored_share;
+    vec3 reflectance;
     if (mirrored == 1) {
         out_radiance = out_transmittance = vec4(0.0);
-        if (front.w < NOTHING || !begin_in_mirror(pixel, texel, direction, ray, seen, mirrored_share)) { return; }
+        if (front.w < NOTHING || !begin_in_mirror(pixel, texel, direction, ray, primary, reflectance)) { return; }
     } else
 #endif
     if (front.w < NOTHING || starts_inside) {
-        surface = texelFetch(surface_finish, texel, 0);
-        begin(pixel, direction, front, surface, texelFetch(surface_color, texel, 0), starts_inside, ray, seen, reach);
+        parameters = texelFetch(surface_parameters, texel, 0);
+        begin(pixel, direction, front, parameters, texelFetch(surface_color, texel, 0), starts_inside, ray, primary, reach);
     } else {
         out_radiance = vec4(background(pixel, direction, texel) * through + emitted, 1.0);
         return;
     }
-    Sum sum = follow(ray, seen, reach, 1);
+    trace_channels(ray, primary, reach);
+    vec3 light = traced_radiance;
 #if MIRROR
     if (mirrored == 1) {
         vec3 without = environment_seen(ray.origin, ray.direction, true, ray.blur);
-        out_radiance = vec4(mirrored_share * through * (min(sum.light, vec3(NOTHING)) - without), 0.0);
-        out_transmittance.a = -strength(mirrored_share) / 3.0 * min(sum.lost, 1.0);
+        out_radiance = vec4(reflectance * through * (min(light, vec3(NOTHING)) - without), 0.0);
+        out_transmittance.a = -strength(reflectance) / 3.0 * min(traced_lost, 1.0);
         return;
     }
 #endif
-#if DISPERSION
-    Sum red = follow(ray, seen, reach, 0);
-    Sum blue = follow(ray, seen, reach, 2);
-    sum.light.rb = vec2(red.light.r, blue.light.b);
-    sum.lost = (sum.lost + red.lost + blue.lost) / 3.0;
-#endif
-    vec3 light = sum.light;
-    vec3 share = vec3(1.0);
+    vec3 entering = vec3(1.0);
     if (front.w < NOTHING && !starts_inside) {
+        Surface surface = primary.surface;
         float cosine = clamp(-dot(front.xyz, direction), 0.0, 1.0);
-        share = vec3(1.0 - interface_reflectance(cosine, seen.finish.ior, seen.finish.roughness)) * seen.finish.transmission * seen.finish.color;
-        vec3 glints = highlights(seen.point, front.xyz, direction, seen.finish, highlight_alpha(seen.finish.roughness, surface.w));
-#if CLEAR_COAT
-        float below = 1.0 - coated_share(seen.finish.clearcoat, cosine);
-        share *= below;
-        glints = below * glints + coat_highlights(seen.point, front.xyz, direction, seen.finish, surface.w);
-#endif
-        light += glints;
+        entering = vec3(1.0 - interface_reflectance(cosine, surface.ior, surface.roughness)) * surface.transmission * surface.color;
+        entering *= 1.0 - coat_reflectance(surface.clearcoat, cosine);
+        light += coated_highlights(primary.point, front.xyz, direction, surface, parameters.w);
     }
 #if !EMISSION
-    light += share * emitted;
+    light += entering * emitted;
 #endif
     out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);
-    out_transmittance.a = 1.0 - min(sum.lost, 1.0);
+    out_transmittance.a = 1.0 - min(traced_lost, 1.0);
     if (adaptive == 1) {
         float level = min(luminance(out_radiance.rgb), 1e15);
         out_transmittance.rgb = vec3(level * level, 0.0, 0.0);

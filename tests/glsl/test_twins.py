@@ -14,6 +14,7 @@ from translucent.gpu.probe import run_function, signatures
 
 #: Functions of these modules that are no formulas of light, and so have no twin.
 HOST_ONLY = {
+    "bsdf": {"below_coat", "interface_lobes", "sampled_branches", "smooth_lobes", "thin_wall_lobes"},
     "phase": {"parse_phase"},
     "color": {"to_hex"},
     "diffusion": {"haze_shares"},

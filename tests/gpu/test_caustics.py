@@ -137,6 +137,8 @@ TINTED = tl.Medium((0.2, 0.1, 0.05), ior=1.5)
 COARSE = Sphere().tessellate(24)
 COARSE_CORE = Sphere(radius=0.5).tessellate(16)
 PLATE = tl.Object(Box((-2.5, 0.0, -2.5), (0.9, 0.05, 0.6)).tessellate(), color=(0.6, 0.6, 0.6))
+#: Reflects a fifth to a third of the light.
+FILM_AND_COAT = tl.Surface(iridescence=1.0, iridescence_ior=2.4, iridescence_thickness=1.2e-7, clearcoat=1.0)
 #: Balls over a ground, and how far off the energy may be: with a plate in the light, pixels at its edges show one side.
 PAIRS = {
     "ball and core": (
@@ -151,6 +153,7 @@ PAIRS = {
         0.05,
     ),
     "rough": (scene(ball(TINTED, mesh=COARSE, surface=tl.Surface(roughness=0.4)), GROUND, light=LAMP), 0.01),
+    "film and coat": (scene(ball(CLEAR, mesh=COARSE, surface=FILM_AND_COAT), GROUND, light=SUN), 0.01),
     "dispersive": (scene(ball(CLEAR, mesh=COARSE, surface=tl.Surface(dispersion=2.0)), GROUND, light=SUN), 0.01),
 }
 

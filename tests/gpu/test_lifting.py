@@ -161,7 +161,7 @@ def test_every_stage_is_there_for_vulkan(name: str) -> None:
 
 
 def test_for_vulkan_everything_has_its_place() -> None:
-    name = "shade/paint.frag"
+    name = "shade/receiver.frag"
     text = lift(name, dict.fromkeys(switches(name), 1), "vulkan").text
     assert text.startswith(f"#version {VULKAN} core\n")
     code = re.sub(r"//.*", "", text)

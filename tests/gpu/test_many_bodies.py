@@ -13,7 +13,7 @@ from tests.work import calls
 from translucent.gpu import shadow_cameras
 from translucent.gpu.balance import face_counts
 from translucent.gpu.body_uniforms import BodyRoles, body_records, clip_rows
-from translucent.gpu.constants import RECORD_SIZE
+from translucent.gpu.constants import INTERIOR_SIZE
 from translucent.gpu.light_cameras import support_of
 from translucent.gpu.placement import PlacedScene, SampleView
 from translucent.gpu.shadow_cameras import ShadowThrowers
@@ -110,8 +110,8 @@ def test_tiles_beyond_those_that_are_compared_throw_shadows(monkeypatch: pytest.
 
 def test_more_bodies_over_one_another_than_traced_rays_know_of_are_named(renderer: tl.Renderer) -> None:
     at = trimesh.transformations.translation_matrix
-    boxes = [tl.Object(BOX, tl.Medium(absorption=1.0, ior=1.5), at((0, 0, 0.01 * i))) for i in range(RECORD_SIZE + 1)]
-    with pytest.warns(tl.TranslucentWarning, match=f"more than {RECORD_SIZE} bodies over one another"):
+    boxes = [tl.Object(BOX, tl.Medium(absorption=1.0, ior=1.5), at((0, 0, 0.01 * i))) for i in range(INTERIOR_SIZE + 1)]
+    with pytest.warns(tl.TranslucentWarning, match=f"more than {INTERIOR_SIZE} bodies over one another"):
         renderer.render(tl.Scene(boxes, tl.Camera.look_at((0.3, 0.2, 5), (0, 0, 0))), (8, 8))
     renderer.render(tl.Scene(boxes[1:], tl.Camera.look_at((0.3, 0.2, 5), (0, 0, 0))), (8, 8))
 

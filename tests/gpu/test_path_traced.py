@@ -31,6 +31,14 @@ SKY = tl.Environment.gradient((1.0, 0.5, 0.2), (0.1, 0.5, 1.0))
 SPECTRAL = tl.Medium(0.1, (0.2, 2.0, 4.0), (0.05, 0.1, 0.2), anisotropy=0.8)
 GLASS = tl.Medium((0.1, 0.3, 0.6), ior=1.5)
 FROSTED = tl.Surface(roughness=0.6)
+COATED = tl.Surface(
+    iridescence=1.0,
+    iridescence_ior=2.0,
+    iridescence_thickness=3e-7,
+    clearcoat=1.0,
+    transmission=0.6,
+    color=(0.8, 0.4, 0.3),
+)
 
 
 def ball(medium: tl.Medium, surface: tl.Surface | None = None, *, mesh: tl.Mesh = BALL, priority: int = 0) -> tl.Object:
@@ -61,6 +69,7 @@ SCENES = {
         ),
         60,
     ),
+    "film, coat and base": (tl.Scene([ball(GLASS, COATED)], CAMERA, [], SKY), 120),
     "a cloud": (tl.Scene([ball(tl.Medium(0.0, 3.0, phase=tl.WaterDroplets(2e-5)))], CAMERA, [SUN], SKY), 80),
     "two smokes, of two shapes": (
         tl.Scene(

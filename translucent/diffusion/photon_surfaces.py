@@ -11,14 +11,15 @@ import numpy.typing as npt
 from translucent.arrays import Array, Integers, Mask
 from translucent.diffusion.dimming import embree_mesh
 from translucent.formulas import optics
-from translucent.formulas.interface import (
-    channel_iors,
-    ggx_visible_normal,
-    reflected_direction,
-    refracted_direction,
-    slab_reflectance,
-    slab_transmittance,
+from translucent.formulas.bsdf import (
+    Lobes,
+    below_coat,
+    interface_lobes,
+    kept_on_side,
+    microfacet_normal,
+    sampled_branches,
 )
+from translucent.formulas.interface import CLEARCOAT_IOR, channel_iors, reflected_direction, refracted_direction
 from translucent.geometry.embree import STEP, starts
 from translucent.geometry.normals import drawn_normals
 from translucent.media.medium import Medium
@@ -120,6 +121,8 @@ class PhotonSurfaces:
         self._iors = np.vstack([iors, np.ones(3)])
         self._plain = np.array([*(item.plain for item in objects), True])
         self._alpha = np.array([look.roughness for look in looks]) ** 2
+        self._films = np.array([(s.iridescence, s.iridescence_ior, s.iridescence_thickness) for s in looks], np.float64)
+        self._coats = np.array([look.clearcoat for look in looks])
         self._tint = np.array([look.transmission * np.asarray(look.color, np.float64) for look in looks])
         self._transmission = np.array([look.transmission for look in looks])
         self.disperses = any(look.dispersion > 0.0 for look, own in zip(looks, ~self._opaque, strict=True) if own)
@@ -228,36 +231,32 @@ class PhotonSurfaces:
         other = np.where(sheet, item, after[own])
         ior = self._iors[other, channel[own]] / self._iors[before[own], channel[own]]
         facets = _facets(smooth, way, np.where(sheet | (ior == 1.0), 0.0, self._alpha[item]), rng)
-        cosine = np.clip(-(facets * way).sum(axis=1), 0.0, 1.0)
-        share = optics.fresnel_dielectric(cosine, ior)
-        chance = 1.0 - share
-        factor_on, factor_back = np.ones((2, len(own), 3))
-        if sheet.any():
-            slabs = self._slabs(item[sheet], share[sheet], cosine[sheet], ior[sheet], found.power[own[sheet]])
-            factor_on[sheet], factor_back[sheet], chance[sheet] = slabs
-        passes = rng.random(len(own)) < chance
-        tint = np.where((sheet | (item == other))[:, None], self._tint[item], self._transmission[item, None])
-        found.power[own] *= np.where(passes[:, None], factor_on * tint, factor_back)
+        enters = sheet | (item == other)
+        lobes = self._lobes(item, facets, way, ior, self._iors[before[own], channel[own]], sheet, enters)
+        tint = np.where(enters[:, None], self._tint[item], self._transmission[item, None])
+        lobes = Lobes(lobes.reflection, lobes.transmission * tint)
+        passes, weight = sampled_branches(lobes, found.power[own], 1.0 - rng.random(len(own)))
+        found.power[own] *= weight
         refracted = np.where(sheet[:, None], way, refracted_direction(way, facets, ior))
         onward = np.where(passes[:, None], refracted, reflected_direction(way, facets))
-        side = np.where(passes[:, None], -flat, flat)
-        onward -= 2.0 * np.minimum((onward * side).sum(axis=1), 0.0)[:, None] * side
+        onward = kept_on_side(onward, np.where(passes[:, None], -flat, flat))
         found.directions[own] = onward / np.linalg.norm(onward, axis=1, keepdims=True)
         found.passes[own] = passes
         found.straight[own] = passes & (sheet | (ior == 1.0))
         found.bent[own] = ~found.straight[own]
 
-    def _slabs(
-        self, item: Integers, share: Array, cosine: Array, ior: Array, power: Array
-    ) -> tuple[Array, Array, Array]:
-        """Factors (k, 3) of the power beyond sheets and back from them, and the chances (k,) of the first."""
+    def _lobes(
+        self, item: Integers, facets: Array, way: Array, ior: Array, ior_before: Array, sheet: Mask, enters: Mask
+    ) -> Lobes:
+        """Lobes of interfaces at microfacets, with their films and, from outside, their clear coats."""
+        cosine = np.clip(-(facets * way).sum(axis=1), 0.0, 1.0)
+        bare = np.where(sheet & ~self._walls[item], 0.0, optics.fresnel_dielectric(cosine, ior))
         path = optics.thin_layer_thickness(self._metres[item], cosine, ior)
         depth = self._sheet_extinction[item] * path[:, None]
-        mirrored = np.where(self._walls[item], share, 0.0)[:, None]
-        on, back = slab_transmittance(mirrored, depth), slab_reflectance(mirrored, depth)
-        through, all_of_it = (power * on).sum(axis=1), (power * (on + back)).sum(axis=1)
-        chance = through / np.maximum(all_of_it, np.finfo(np.float64).tiny)
-        return on / np.maximum(chance, 1e-30)[:, None], back / np.maximum(1.0 - chance, 1e-30)[:, None], chance
+        lobes, _ = interface_lobes(bare, cosine, ior, self._films[item], ior_before, sheet, depth)
+        coat = np.where(enters, self._coats[item], 0.0) * optics.fresnel_dielectric(cosine, CLEARCOAT_IOR)
+        below = below_coat(lobes, coat[:, None])
+        return Lobes(below.reflection + coat[:, None], below.transmission)
 
     def _normals(self, item: Integers, face: Integers, points: Array, way: Array) -> tuple[Array, Array]:
         """Unit normals (k, 3) towards where photons come from: of smooth surfaces, and of their faces."""
@@ -351,12 +350,6 @@ def _facets(normals: Array, way: Array, alpha: Array, rng: np.random.Generator) 
     rough = np.flatnonzero(alpha > 0.0)
     found = normals.copy()
     if rough.size:
-        normal, light = normals[rough], way[rough]
-        aside = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-        right = np.cross(normal, aside)
-        right /= np.linalg.norm(right, axis=1, keepdims=True)
-        frame = np.stack([right, np.cross(normal, right), normal], axis=1)
-        towards = -np.einsum("kij,kj->ki", frame, light)
-        facets = ggx_visible_normal(towards, alpha[rough], rng.random((rough.size, 2)))
-        found[rough] = np.einsum("kij,ki->kj", frame, facets)
+        shares = rng.random((rough.size, 2))
+        found[rough] = microfacet_normal(normals[rough], way[rough], alpha[rough], shares)
     return found

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from translucent.formulas.sampling import sample_shifts
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, record_at_eye
+from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, interior_at_eye
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import read_floats
@@ -121,7 +121,7 @@ def is_adaptive(job: FrameJob, samples: int) -> bool:
     return (
         samples >= FEW_SAMPLES
         and job.features.last_pass == PassName.TRACED
-        and not any(record_at_eye(job))
+        and not any(interior_at_eye(job))
         and not any(surface.roughness > 0 for surface in surfaces)
     )
 

@@ -33,7 +33,7 @@ from translucent.formulas.tone import (
     NEUTRAL_F90,
     NEUTRAL_START,
 )
-from translucent.planning.interfaces.traced import RECORD_SIZE
+from translucent.planning.interfaces.traced import INTERIOR_SIZE
 from translucent.planning.methods.ray_marched import LEAST_SEEN, Quadrature
 
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
@@ -121,7 +121,7 @@ CONSTANTS: dict[str, str] = {
     "FILM_ORDERS": str(FILM_ORDERS),
     "HIERARCHY_WIDTH_BITS": str(HIERARCHY_WIDTH_BITS),
     "HIERARCHY_STEPS": "32767.5",  # of the grid of bounds, from the middle of a hierarchy to its end
-    "RECORD_SIZE": str(RECORD_SIZE),
+    "INTERIOR_SIZE": str(INTERIOR_SIZE),
     "MIRROR_TOLERANCE": "1e-3",  # from a ground to where a rasterizer may see it, as a share of the scene
     "MIRROR_MARGIN": "1e-4",  # from a ground to where its mirrored rays start, as a share of the scene
     "PHOTON_WIDTH": f"{PHOTON_WIDTH}u",

@@ -172,7 +172,7 @@ class SceneHierarchies:
             "not_closed": float(not opaque and not body.mesh.diagnosis.solid),
             "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
             "emission": metres * np.asarray(medium.emission),
-            "kind": _kind(body, sheet),
+            "type": _type(body, sheet),
             "color": body.base_color if opaque else np.asarray(surface.color),
             "transmission": surface.transmission,
             "ior": surface.ior if opaque else medium.ior,
@@ -221,8 +221,8 @@ class HierarchyCache:
             self._held = None
 
 
-def _kind(body: Object, sheet: float | None) -> float:
-    """Kind of an object, as ``shaders/transport/traced_interfaces.frag`` numbers them."""
+def _type(body: Object, sheet: float | None) -> float:
+    """Type of an object, as ``shaders/transport/surface_hit.glsl`` numbers them."""
     if body.medium is None:
         return 2.0
     if body.covers:

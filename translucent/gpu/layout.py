@@ -260,7 +260,7 @@ TRACED_BODY = PackedTable(
         ("extinction", "f4", (3,)),  # of a sheet: times its thickness, as is its emission
         ("outwards", "f4", ()),  # 1, or -1 where the normals of its faces point inwards
         ("emission", "f4", (3,)),
-        ("kind", "f4", ()),
+        ("type", "f4", ()),  # as ``transport/surface_hit.glsl`` numbers them
         ("color", "f4", (3,)),
         ("transmission", "f4", ()),
         ("ior", "f4", ()),

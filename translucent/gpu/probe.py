@@ -31,9 +31,11 @@ class Signature:
 
 
 def signatures(path: Path) -> dict[str, Signature]:
-    """The functions that a library file defines, by name."""
+    """The functions of numbers that a library file defines, by name: those of structures are left out."""
     found = {}
     for returns, name, parameters in _SIGNATURE.findall(path.read_text(encoding="utf-8")):
+        if re.search(r"\b[A-Z]\w* \w+", parameters):
+            continue
         parts = tuple((kind, part, int(length or 0)) for kind, part, length in _PARAMETER.findall(parameters))
         found[name] = Signature(name, returns, parts)
     return found

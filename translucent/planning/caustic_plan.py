@@ -156,7 +156,4 @@ def _left_out(scene: Scene, lit: tuple[int, ...], fogs: tuple[int, ...], opengl:
         texts.append("photons that media scatter")
     if aside := tuple(i for i in fogs if i in uneven):
         texts.append(f"directions in which {_names(scene, aside)} scatters caustics: alike in all")
-    surfaces = [body.surface for body in scene.bodies if body.surface is not None]
-    if any(surface.iridescence or surface.clearcoat for surface in surfaces):
-        texts.append("what thin films and clear coats change in caustics")
     return tuple(Note(NoteKind.CAUSTICS, text) for text in texts)

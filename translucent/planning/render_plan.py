@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from translucent.arguments import checked
 from translucent.planning.caustics import Caustics
 from translucent.planning.interfaces import Interfaces, TracedInterfaces
-from translucent.planning.interfaces.traced import RECORD_SIZE
+from translucent.planning.interfaces.traced import INTERIOR_SIZE
 from translucent.planning.methods import Method, PathTraced
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
@@ -199,7 +199,7 @@ class RenderPlan:
         """Warning of so many pixels that cannot be trusted."""
         unbalanced = "a surface that does not balance"
         if isinstance(self.interfaces, TracedInterfaces):
-            unbalanced += f", or more than {RECORD_SIZE} bodies over one another, where rays are traced"
+            unbalanced += f", or more than {INTERIOR_SIZE} bodies over one another, where rays are traced"
         why = "; ".join(map(str, self.limits)) or unbalanced
         return f"{invalid} pixels are not valid ({covered} are covered): {why}"
 

@@ -51,12 +51,12 @@ class CausticsPass:
         self._photons = Variants(gl, "geometry/fullscreen.vert", "transport/photons.frag", **_TRACED)
         self._spread = Variants(gl, "geometry/fullscreen.vert", "shade/photon_spread.frag", **_RECEIVED)
         self._shade = Variants(
-            gl, "geometry/fullscreen.vert", "shade/caustics.frag", photon_spread=3, paint=4, **_RECEIVED
+            gl, "geometry/fullscreen.vert", "shade/caustics.frag", photon_spread=3, receiver_base=4, **_RECEIVED
         )
         self._known = Variants(gl, "geometry/fullscreen.vert", "shade/known_photons.frag", photon_light=0)
         self._opaque = OpaquePass(gl)
-        self._plain = Variants(gl, "geometry/body.vert", "shade/paint.frag", **FINISH_UNITS)
-        self._finished = Variants(gl, "geometry/interface.vert", "shade/paint.frag", **FINISH_UNITS)
+        self._plain = Variants(gl, "geometry/body.vert", "shade/receiver.frag", **FINISH_UNITS)
+        self._finished = Variants(gl, "geometry/interface.vert", "shade/receiver.frag", **FINISH_UNITS)
         self._maps = FinishMaps(gl)
         self._splat: moderngl.VertexArray | None = None
 
@@ -116,6 +116,7 @@ class CausticsPass:
             LIGHTS=False,
             ROUGH=any(surface.roughness > 0 for surface in surfaces),
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
+            **coat_switches(scene.bodies),
         )
         hierarchies = job.resources.hierarchies.of(scene)
         rows, frame = hierarchies.place(scene, media_center(scene), job.features.sheets)
@@ -146,7 +147,7 @@ class CausticsPass:
             "aim_right": tuple(aim.right),
             "aim_up": tuple(aim.up),
             "photon_power": tuple(aim.flux * (job.samples / aim.photons)),
-            "light_record": tuple(low | high << 16 for low, high in zip(entries[::2], entries[1::2], strict=True)),
+            "light_interior": tuple(low | high << 16 for low, high in zip(entries[::2], entries[1::2], strict=True)),
         }
         for name, value in values.items():
             set_uniform(program, name, value)

@@ -128,7 +128,7 @@ class FinishMaps:
         view.resources.textures.bind(surface, program, _FIRST_TEXTURE)
         passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
         finish = surface.metallic, surface.roughness, surface.ior, hole_below
-        set_uniform(program, "opaque_finish", finish)
+        set_uniform(program, "opaque_parameters", finish)
         values = {
             "opaque_emissive": tuple(np.asarray(surface.emissive)),
             "opaque_passed": (*passed, surface.double_sided),

@@ -15,16 +15,16 @@ from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import interface_shadow_switches
-from translucent.gpu.passes.traced_interfaces import all_closed, bodies_radius, record_at_eye
+from translucent.gpu.passes.traced_interfaces import all_closed, bodies_radius, interior_at_eye
 from translucent.gpu.passes.variants import Variants, coat_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import media_center
 from translucent.planning.passes import PassSpec
 
-_STATE = ("path_origin", "path_direction", "path_light", "path_record", "path_counts", "path_mean", "path_spread")
+_STATE = ("path_origin", "path_direction", "path_light", "path_interior", "path_counts", "path_mean", "path_spread")
 _COUNTS = _STATE.index("path_counts")
-_UNSIGNED = ("path_record", "path_counts")
+_UNSIGNED = ("path_interior", "path_counts")
 _UNITS = {
     name: unit
     for unit, name in enumerate(
@@ -237,7 +237,7 @@ class PathTracer:
         values = {
             "seed": job.plan.paths.seed,
             "all_closed": all_closed(job.scene),
-            "start_record": record_at_eye(job),
+            "start_interior": interior_at_eye(job),
             "object_nodes": hierarchies.object_nodes,
             "objects_frame": frame,
             "bodies_radius": bodies_radius(job.scene),

@@ -28,7 +28,7 @@ _SAMPLERS = (
     "emitted_radiance_sum",
     "straight_transmittance",
     "entered",
-    "surface_finish",
+    "surface_parameters",
     "surface_color",
     "opaque_axial_depth",
     "opaque_radiance",
@@ -45,7 +45,7 @@ _SAMPLERS = (
     "shadow_sums",
     "shadow_ends",
 )
-_ENTERED = ("entered", "surface_finish", "surface_color")
+_ENTERED = ("entered", "surface_parameters", "surface_color")
 _UNITS = {name: unit for unit, name in enumerate(_SAMPLERS)}
 
 
@@ -81,7 +81,7 @@ class TracedInterfacesPass:
         blending = moderngl.BLEND if sums else moderngl.NOTHING
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
-        record = record_at_eye(job)
+        record = interior_at_eye(job)
         gl.enable_only(blending)
         mirror = mirror_of(job.scene) if job.features.has_opaque else None
         if not any(record):
@@ -108,7 +108,7 @@ class TracedInterfacesPass:
             "faintest_share": faintest_share(forks),
             "most_interfaces": depth,
             "all_closed": all_closed(job.scene),
-            "start_record": record,
+            "start_interior": record,
             "sample_number": job.sample,
             "blurred_share": blurred_share(job.samples),
             "object_nodes": hierarchies.object_nodes,
@@ -146,7 +146,7 @@ class TracedInterfacesPass:
         assert surface is not None
         height = mirror.height - float(mirror.normal @ media_center(job.scene))
         finish = surface.roughness, surface.ior
-        _set(program, {"mirrored": 1, "mirror_plane": (*mirror.normal, height), "mirror_finish": finish})
+        _set(program, {"mirrored": 1, "mirror_plane": (*mirror.normal, height), "mirror_surface": finish})
         twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
         width, rows = job.targets.size
         boxes, radii = np.array([twin.bounds for twin in twins]), np.array([twin.radius for twin in twins])
@@ -184,7 +184,7 @@ class TracedInterfacesPass:
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
             DIMMED=job.features.dims_interfaces,
-            PAINTED=any(surface.transmission < 1 or surface.transmission_texture is not None for surface in surfaces),
+            DIFFUSE_BASE=any(s.transmission < 1 or s.transmission_texture is not None for s in surfaces),
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,
@@ -270,7 +270,7 @@ def bodies_radius(scene: Scene) -> float:
     return 0.5 * float(np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)))
 
 
-def record_at_eye(job: FrameJob) -> tuple[int, int, int, int]:
+def interior_at_eye(job: FrameJob) -> tuple[int, int, int, int]:
     """The bodies that contain the eye, as the shader keeps them."""
     entries = [
         number + 1

@@ -20,7 +20,7 @@ from translucent.scene.scene import Scene, object_names
 MAX_DEPTH = 64
 
 #: Bodies that a traced ray can be in at once.
-RECORD_SIZE = 8
+INTERIOR_SIZE = 8
 
 #: Largest number of forks: rays multiply with each.
 MAX_FORKS = 4

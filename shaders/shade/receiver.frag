@@ -1,4 +1,4 @@
-// Share of the light on opaque objects that they reflect diffusely towards the eye: what photons that land there light.
+// Albedo of the diffuse base of opaque objects towards the eye: what photons that land there light.
 
 #include <constants>
 #include <View>
@@ -22,13 +22,13 @@ const vec4 vertex_color = vec4(1.0);
 #endif
 #endif
 
-layout(location = 0) out vec4 paint;
+layout(location = 0) out vec4 receiver_base;
 layout(location = 1) out vec4 receiver_normal;  // unit, to the side that the mesh calls outside
 
 void main() {
 #if SURFACE
-    OpaqueFinish finish = opaque_finish_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
-    if (finish.is_hole || (opaque_passed.w == 0.0 && !gl_FrontFacing)) { discard; }
+    OpaqueSurface surface = opaque_surface_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
+    if (surface.is_hole || (opaque_passed.w == 0.0 && !gl_FrontFacing)) { discard; }
 #endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture
     receiver_normal = vec4(normalize(world_normal), 0.0);
@@ -36,12 +36,10 @@ void main() {
 #if SURFACE
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
     vec3 ray = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
-    float cos_view = clamp(abs(dot(finish.normal, ray)), 1e-3, 1.0);
-    vec2 table = textureLod(reflectance_table, reflectance_coordinate(cos_view, finish.roughness), 0.0).rg;
-    float step_in_ior = (finish.ior - 1.0) / (finish.ior + 1.0);
-    float beneath = (1.0 - finish.metallic) * (1.0 - layer_of(vec3(step_in_ior * step_in_ior), table).mirrored.r);
-    paint = vec4(beneath * (1.0 - finish.passed_share) * finish.base, 1.0);
+    float cos_view = clamp(abs(dot(surface.normal, ray)), 1e-3, 1.0);
+    OpaqueBsdf bsdf = opaque_bsdf(surface, cos_view);
+    receiver_base = vec4((1.0 - bsdf.coated) * bsdf.base, 1.0);
 #else
-    paint = vec4(color.rgb, 1.0);
+    receiver_base = vec4(color.rgb, 1.0);
 #endif
 }

@@ -1,6 +1,5 @@
-// What branches of a tree of rays see where they end: the environment, or an opaque object. Needs <View>, <Surfaces>,
-// <TracedBody>, shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl, opaque_objects.glsl and
-// footprint.glsl.
+// Radiance at the ends of rays: of the environment, or of an opaque object. Needs <View>, <Surfaces>, <TracedBody>,
+// shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl, opaque_objects.glsl and footprint.glsl.
 
 vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
 #if MICROFACETS
@@ -13,19 +12,18 @@ vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
 #endif
 }
 
-// The end of a branch: what is seen there is found for all rays of a group together, apart from following them.
-struct Glimpse {
+// A ray that has left the scene, or ended at an opaque object: its radiance is found for all rays of a group together, apart from
+// following them.
+struct EscapedRay {
     int object;        // that is opaque; AIR for the environment
     vec3 normal;       // of the object
-    vec3 origin;       // of the ray
+    vec3 origin;
     vec3 point;        // of the object
     vec3 direction;
-    vec3 share;        // of the light that reaches the eye
+    vec3 throughput;
     bool reflected;
     float blur;
-#if FOOTPRINTS
     Ellipse ellipse;
-#endif
 };
 
 #if OPAQUE
@@ -39,7 +37,7 @@ float depth_within_pixel(vec3 point, vec3 normal) {
 }
 
 // Opaque objects as the picture shows them: with their textures, and blurred behind rough interfaces. False where it does not.
-bool opaque_shown(Glimpse end, out vec3 light) {
+bool opaque_in_picture(EscapedRay end, out vec3 light) {
     vec3 shown = seen_at(end.point);
     if (!in_picture(shown.xy)) { return false; }
     ivec2 texel = stored(texel_of(shown.xy));
@@ -58,14 +56,25 @@ bool opaque_shown(Glimpse end, out vec3 light) {
 }
 #endif
 
-vec3 light_at(Glimpse end) {
+// The environment averaged over what the pixel sees of it. False for rays that see it as a background, or no picture.
+bool environment_in_footprint(EscapedRay end, out vec3 light) {
 #if FOOTPRINTS
-    if (end.object == AIR && (end.reflected || SEEN_LIGHTS == 1)) { return averaged_environment(end.direction, end.blur, end.ellipse); }
+    if (end.reflected || SEEN_LIGHTS == 1) {
+        light = averaged_environment(end.direction, end.blur, end.ellipse);
+        return true;
+    }
 #endif
-    if (end.object == AIR) { return environment_seen(end.origin, end.direction, end.reflected, end.blur); }
-#if OPAQUE
+    return false;
+}
+
+vec3 escaped_radiance(EscapedRay end) {
     vec3 light;
-    if (opaque_shown(end, light)) { return light; }
+    if (end.object == AIR) {
+        if (environment_in_footprint(end, light)) { return light; }
+        return environment_seen(end.origin, end.direction, end.reflected, end.blur);
+    }
+#if OPAQUE
+    if (opaque_in_picture(end, light)) { return light; }
 #endif
     return opaque_light(traced_body(end.object), end.normal, end.direction, end.point);
 }

@@ -1,0 +1,223 @@
+"""Bsdfs of interfaces in float64: smooth and rough dielectrics, thin walls and films, clear coats, a diffuse base.
+
+Functions of numbers have twins of the same name in ``shaders/lib/bsdf.glsl``. All are pure and broadcast. Reflectances
+and transmittances are fractions of the light at an interface, by channel; a cosine is that of the direction which the
+light comes from; ``ior`` is the index of the other side relative to this one. Directions (..., 3) are unit vectors in
+which light travels; a normal looks to the side that the light comes from.
+
+References
+----------
+Walter et al. 2007, "Microfacet models for refraction through rough surfaces"; Heitz 2014, "Understanding the masking-
+shadowing function in microfacet-based BRDFs"; Belcour & Barla 2017, "A practical extension to microfacet theory for the
+modeling of varying iridescence"; Schlick 1994, "An inexpensive BRDF model for physically-based rendering".
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array, Mask
+from translucent.formulas import interface, optics
+from translucent.formulas.thin_film import film_slab_reflectance, film_slab_transmittance, thin_film_reflectance
+
+
+class Lobes(NamedTuple):
+    """The two lobes of interfaces: fractions (..., 3) of the light that they send back, and that go on."""
+
+    reflection: Array
+    transmission: Array
+
+
+def filmed_reflectance(
+    bare: npt.ArrayLike, cosine: npt.ArrayLike, ior: npt.ArrayLike, film: npt.ArrayLike, ior_before: npt.ArrayLike
+) -> Array:
+    """Reflectance (..., 3) of interfaces that reflect `bare` (...) without the films on them.
+
+    Parameters
+    ----------
+    bare, cosine, ior : array_like (...)
+    film : array_like (..., 3)
+        Share of the interface that has it, its index of refraction, and metres.
+    ior_before : array_like (...)
+        Index of the side that light comes from.
+    """
+    film = np.asarray(film, np.float64)
+    scalars = np.broadcast_arrays(*(np.asarray(v, np.float64) for v in (bare, cosine, ior, ior_before)), film[..., 0])
+    share, metres = scalars[4], np.broadcast_to(film[..., 2], scalars[0].shape)
+    index = np.broadcast_to(film[..., 1], scalars[0].shape)
+    found = np.repeat(scalars[0][..., None], 3, axis=-1)
+    some = share > 0.0
+    if some.any():
+        _, at, relative, before, _ = (values[some] for values in scalars)
+        colored = thin_film_reflectance(at, relative, index[some] / before, index[some] * metres[some])
+        found[some] += share[some, None] * (colored - found[some])
+    return found
+
+
+def smooth_lobes(reflectance: Array) -> Lobes:
+    """Lobes of a smooth interface."""
+    return Lobes(reflectance, 1.0 - reflectance)
+
+
+@np.errstate(over="ignore", under="ignore")
+def thin_wall_lobes(front: Array, back: Array, optical_depth: Array) -> Lobes:
+    """Lobes of both sides of a thin wall at once, with all reflections between them.
+
+    Parameters
+    ----------
+    front : (..., 3)
+        Reflectance of the side towards the light.
+    back : (...)
+        Of the other side.
+    optical_depth : (..., 3)
+        Of one passage.
+    """
+    return Lobes(film_slab_reflectance(front, back, optical_depth), film_slab_transmittance(front, back, optical_depth))
+
+
+@np.errstate(over="ignore", under="ignore")
+def thin_wall_exitance(front: npt.ArrayLike, back: npt.ArrayLike, optical_depth: npt.ArrayLike) -> Array:
+    """Fraction of what a thin wall emits that leaves through its front, as it goes back and forth in it, too."""
+    front, back = np.asarray(front, np.float64), np.asarray(back, np.float64)[..., None]
+    depth = np.asarray(optical_depth, np.float64)
+    kept = (1.0 - front) + front * ((1.0 - back) + back * optics.opacity(2.0 * depth))
+    return np.asarray((1.0 - front) / np.maximum(kept, 1e-300) * (1.0 + back * optics.transmittance(depth)))
+
+
+def below_coat(lobes: Lobes, coat: Array) -> Lobes:
+    """What clear coats that reflect a fraction (..., 1) of the light leave of lobes, without their own reflection."""
+    return Lobes((1.0 - coat) * lobes.reflection, (1.0 - coat) * lobes.transmission)
+
+
+def interface_lobes(
+    bare: Array, cosine: Array, ior: Array, film: Array, ior_before: Array, thin_walled: Mask, optical_depth: Array
+) -> tuple[Lobes, Array]:
+    """Lobes of interfaces that reflect `bare` (k,) without films, and the reflectance (k, 3) of their fronts alone.
+
+    Parameters
+    ----------
+    bare, cosine, ior, film, ior_before
+        See `filmed_reflectance`.
+    thin_walled : (k,) bool
+    optical_depth : (k, 3)
+        Of one passage through a thin wall.
+    """
+    front = filmed_reflectance(bare, cosine, ior, film, ior_before)
+    smooth = smooth_lobes(front)
+    if not thin_walled.any():
+        return smooth, front
+    wall, thin = thin_wall_lobes(front, bare, optical_depth), thin_walled[:, None]
+    return Lobes(*(np.where(thin, both, one) for both, one in zip(wall, smooth, strict=True))), front
+
+
+def sampled_branches(lobes: Lobes, throughput: Array, share: Array) -> tuple[Mask, Array]:
+    """Branches of light at interfaces, one each, as likely as the light that it carries.
+
+    Parameters
+    ----------
+    lobes : Lobes
+        (k, 3) each.
+    throughput : (k, 3)
+        What of the light has come as far.
+    share : (k,)
+        Random numbers, 0 to 1.
+
+    Returns
+    -------
+    transmitted : (k,) bool
+    weight : (k, 3)
+        Factor of the throughput.
+    """
+    with np.errstate(under="ignore"):
+        back, on = ((throughput * lobe).sum(axis=-1) for lobe in lobes)
+        chance = back / np.maximum(back + on, np.finfo(np.float64).tiny)
+    transmitted = share >= chance
+    likely = np.where(transmitted, 1.0 - chance, np.maximum(chance, 1e-30))
+    return transmitted, np.where(transmitted[:, None], lobes.transmission, lobes.reflection) / likely[:, None]
+
+
+def microfacet_normal(
+    normal: npt.ArrayLike, direction: npt.ArrayLike, alpha: npt.ArrayLike, shares: npt.ArrayLike
+) -> Array:
+    """Normal (..., 3) of a microfacet as light sees it, for two random numbers `shares` (..., 2), 0 to 1."""
+    n, d = np.asarray(normal, np.float64), np.asarray(direction, np.float64)
+    axis = np.where(np.abs(n[..., :1]) < 0.7, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    aside = np.cross(n, axis)
+    aside /= np.linalg.norm(aside, axis=-1, keepdims=True)
+    frame = np.stack([aside, np.cross(n, aside), n], axis=-2)
+    local = interface.ggx_visible_normal(-np.einsum("...ij,...j->...i", frame, d), alpha, shares)
+    return np.asarray(np.einsum("...ij,...i->...j", frame, local))
+
+
+def masking_ratio(cos_in: npt.ArrayLike, cos_out: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
+    """Fraction of the light on a microfacet that leaves the surface: G2 / G1 of Smith's masking, heights correlated."""
+    into, out = interface.smith_lambda(cos_in, alpha), interface.smith_lambda(cos_out, alpha)
+    return np.where(np.asarray(cos_out) > 0.0, (1.0 + into) / (1.0 + into + out), 0.0)
+
+
+def kept_on_side(direction: npt.ArrayLike, side: npt.ArrayLike) -> Array:
+    """Directions (..., 3), mirrored to the `side` (..., 3) of a face from which smooth normals turn them away."""
+    d, s = np.asarray(direction, np.float64), np.asarray(side, np.float64)
+    across = np.minimum(np.sum(d * s, axis=-1, keepdims=True), 0.0)
+    return np.asarray(d - 2.0 * across * s)
+
+
+def diffuse_radiance(
+    front: npt.ArrayLike,
+    back: npt.ArrayLike,
+    color: npt.ArrayLike,
+    passed: npt.ArrayLike,
+    passed_share: npt.ArrayLike,
+) -> Array:
+    """Radiance (..., 3) of a diffuse base, for the irradiance on its front and on its back (..., 3).
+
+    Parameters
+    ----------
+    front, back, color : array_like (..., 3)
+    passed : array_like (..., 3)
+        Fraction of the light that passes to the other side, with its color.
+    passed_share : array_like (...)
+        Without.
+    """
+    reflected = np.asarray(color) * (1.0 - np.asarray(passed_share, np.float64)[..., None])
+    with np.errstate(under="ignore"):
+        return np.asarray((reflected * np.asarray(front) + np.asarray(passed) * np.asarray(back)) / np.pi)
+
+
+def filmed_facing(film: npt.ArrayLike, facing: npt.ArrayLike, cos_view: npt.ArrayLike) -> Array:
+    """Reflectance face-on (..., 3) of what reflects as much at an angle as an interface under a film (Schlick 1994).
+
+    Parameters
+    ----------
+    film : array_like (..., 3)
+        See `filmed_reflectance`.
+    facing : array_like (..., 3)
+        Reflectance face-on without the film.
+    cos_view : array_like (...)
+    """
+    film, facing = np.asarray(film, np.float64), np.asarray(facing, np.float64)
+    cosine = np.asarray(cos_view, np.float64)
+    root = np.sqrt(np.minimum(facing, 0.9999))
+    ior = (1.0 + root) / (1.0 - root)
+    path = film[..., 1] * film[..., 2]
+    reflected = np.stack(
+        [thin_film_reflectance(cosine, ior[..., c], film[..., 1], path)[..., c] for c in range(3)], axis=-1
+    )
+    with np.errstate(under="ignore"):
+        away = np.minimum((1.0 - cosine) ** 5, 0.99)[..., None]
+    found = np.clip((reflected - away) / (1.0 - away), 0.0, 1.0)
+    return np.asarray(facing + film[..., :1] * (found - facing))
+
+
+def microfacet_value(
+    cos_half: npt.ArrayLike, cos_light: npt.ArrayLike, cos_view: npt.ArrayLike, alpha: npt.ArrayLike
+) -> Array:
+    """Density of microfacets that reflect one direction into the other, times what of them is not masked.
+
+    A bsdf is this times their reflectance.
+    """
+    density = interface.ggx_distribution(np.minimum(cos_half, 1.0), alpha)
+    return np.asarray(density * interface.ggx_visibility(cos_light, cos_view, alpha))
