@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import subprocess
 import sys
+import weakref
 from typing import Any
 
 import pytest
@@ -30,6 +32,7 @@ from translucent.planning.assembly import COSTS
 from translucent.planning.methods import METHODS
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
+from translucent.planning.rendered import occluder_scene, occluders
 
 ONCE = tl.SingleScattering()
 
@@ -313,3 +316,40 @@ assert not found, found
 def test_every_cost_is_above_zero() -> None:
     assert min(COSTS.values()) > 0
     assert all(method.cost > 0 for method in METHODS.values())
+
+
+@pytest.mark.parametrize("medium", [GLASS, MILK, tl.Medium(scattering=5.0, ior=1.4)], ids=["glass", "fog", "wax"])
+def test_a_plan_does_not_keep_the_scene_that_it_is_for(medium: tl.Medium) -> None:
+    """Renderers keep plans for as long as scenes live."""
+    given = scene(body(medium), body(None, TORUS, x=3), lights=[tl.DirectionalLight((0, -1, 0), 1.0)])
+    found, alive = plan(given), weakref.ref(given)
+    del given
+    gc.collect()
+    assert alive() is None
+    assert len(found.scene.objects) == 2
+
+
+def test_maps_of_shadows_are_planned_for_those_objects_that_end_them() -> None:
+    """As if each map had been planned by itself."""
+    sun = tl.DirectionalLight((0, -1, 0), 1.0)
+    given = scene(body(None, x=-3), body(GLASS, OPEN), body(None, x=3), body(WINE, x=6), lights=[sun])
+    (maps,) = plan(given).maps
+    for opaque in ({0, 2}, {0}, {2}, set[int]()):
+        found = maps.of(given, opaque)
+        alone = plan(occluder_scene(given, occluders(given, opaque)))
+        assert [(step.name, step.objects) for step in found.passes] == [
+            (step.name, step.objects) for step in alone.passes
+        ]
+        assert (found.method, found.spectral) == (alone.method, alone.spectral)
+        assert [item.mesh for item in found.scene.objects] == [item.mesh for item in alone.scene.objects]
+        assert not any(item.has_interface for item in found.scene.objects)
+    bent = scene(body(tl.Medium(ior=1.5)), body(None, TORUS, x=3), lights=[sun])
+    assert len(plan(bent).maps) == 1
+    assert len(plan(bent, caustics=tl.Caustics(10)).maps) == 2  # bodies are dark to lights, and clear to the sky
+    assert plan(scene(body())).maps == ()
+
+
+def test_shadows_on_a_backdrop_are_as_requested() -> None:
+    lit = scene(body(), lights=[tl.DirectionalLight((0, -1, 0), 1.0)])
+    assert plan_over_backdrop(lit, shadows=tl.ShadowMaps(256)).shadows == tl.ShadowMaps(256)
+    assert plan_over_backdrop(lit).shadows == tl.ShadowMaps()

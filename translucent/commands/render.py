@@ -372,11 +372,11 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
     seen = frame.coverage & frame.valid
     if not seen.any():
         return
-    from translucent.planning.darkness import given_back
+    from translucent.planning.darkness import scattered_back
 
     passed = float(frame.transmittance[seen].mean())
     media = [body.medium for body in scene.bodies if body.medium is not None and body.has_interface]
-    if passed >= NEARLY_BLACK or any(given_back(scene, one) >= HARDLY_LIT for one in media if one.scatters):
+    if passed >= NEARLY_BLACK or any(scattered_back(scene, one) >= HARDLY_LIT for one in media if one.scatters):
         return
     depth = frame.optical_depth[seen].astype(np.float64)
     low, high = (

@@ -33,7 +33,7 @@ def black_bodies(scene: Scene) -> tuple[Note, ...]:
     for bodies in by_medium.values():
         medium = bodies[0].medium
         # As thick as the whole scene: if anything passes that, no body is black.
-        if medium is None or medium.emits or _passes(medium, scene.diagonal) + given_back(scene, medium) >= BLACK:
+        if medium is None or medium.emits or _passes(medium, scene.diagonal) + scattered_back(scene, medium) >= BLACK:
             continue
         with np.errstate(under="ignore"):
             shares = luminance(medium.transmittance([_chord(body) for body in bodies])).tolist()
@@ -52,7 +52,7 @@ def black_bodies(scene: Scene) -> tuple[Note, ...]:
     return (Note(NoteKind.BLACK, text),)
 
 
-def given_back(scene: Scene, medium: Medium) -> float:
+def scattered_back(scene: Scene, medium: Medium) -> float:
     """Luminance of white light that a body as large as the scene scatters back."""
     if not medium.scatters:
         return 0.0

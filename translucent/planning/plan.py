@@ -131,6 +131,8 @@ def _treatments(scene: Scene, request: RenderRequest, machine: Capabilities) -> 
 
 def _scatters_ambient(scene: Scene, treatments: Treatments) -> bool:
     """True if a medium in which light does not diffuse scatters ambient radiance, which counts as emitted there."""
+    if not scene.scatters_ambient:
+        return False
     media = (
         item.medium
         for i, item in enumerate(scene.objects)

@@ -18,6 +18,15 @@ MAX_SAMPLES = 4096
 #: Names that configurations of interfaces had, and what to write instead.
 _OLD_NAMES = {"both": ScreenInterfaces(), "front": FrontInterface()}
 
+#: Choices, their types, what these are called, and examples.
+_TYPES: tuple[tuple[str, type, str, tuple[object, ...]], ...] = (
+    ("method", Method, "a thickness method", ("SignedDepth()",)),
+    ("interfaces", Interfaces, "a choice of interfaces", (TracedInterfaces(), ScreenInterfaces(), FrontInterface())),
+    ("scattering", Scattering, "a choice of scattering", (Diffusion(), ScatteringLayer(), SingleScattering())),
+    ("caustics", Caustics, "tl.Caustics", ("Caustics(photons=1_000_000)",)),
+    ("shadows", ShadowMaps, "a choice of shadows", ("ShadowMaps(size=2048)",)),
+)
+
 
 @dataclass(frozen=True)
 class RenderRequest:
@@ -55,28 +64,14 @@ class RenderRequest:
         if not isinstance(self.samples, int) or not 1 <= self.samples <= MAX_SAMPLES:
             asked, found = f"samples {brief(self.samples)}", f"not a whole number in 1 to {MAX_SAMPLES}"
             raise InputError(asked, found, "give for example 16")
-        ways = TracedInterfaces(), ScreenInterfaces(), FrontInterface()
-        known: tuple[tuple[str, type, str, str], ...] = (
-            ("method", Method, "a thickness method", "give for example tl.SignedDepth()"),
-            ("interfaces", Interfaces, "a choice of interfaces", _one_of(*ways)),
-            ("scattering", Scattering, "a choice of scattering", _one_of(*(one() for one in _SCATTERINGS))),
-            ("caustics", Caustics, "tl.Caustics", "give for example tl.Caustics(photons=1_000_000)"),
-            ("shadows", ShadowMaps, "a choice of shadows", "give for example tl.ShadowMaps(size=2048)"),
-        )
-        for name, kind, what, do in known:
+        for name, kind, what, examples in _TYPES:
             value = getattr(self, name)
             if value is not None and not isinstance(value, kind):
+                *others, last = (f"tl.{example}" for example in examples)
+                do = f"give {', '.join(others)} or {last}" if others else f"give for example {last}"
                 if name == "interfaces" and isinstance(value, str) and value in _OLD_NAMES:
                     do = f"write interfaces=tl.{_OLD_NAMES[value]}"
                 raise InputError(f"{name} {brief(value)}", f"not {what}", do)
         if self.over_backdrop and self.caustics is not None:
             found = "what is drawn elsewhere has no mesh that light could land on"
             raise InputError("caustics before a backdrop", found, "leave out one of the two")
-
-
-_SCATTERINGS = Diffusion, ScatteringLayer, SingleScattering
-
-
-def _one_of(*values: object) -> str:
-    *others, last = (f"tl.{value}" for value in values)
-    return f"give {', '.join(others)} or {last}"

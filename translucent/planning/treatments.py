@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -120,7 +121,9 @@ def rendered_scene(scene: Scene, treatments: Treatments) -> Scene:
             objects[i] = treated(item, treatment, replace(medium, emission=scene.source(item)))
         elif treatment is not Treatment.SINGLE:
             objects[i] = treated(item, treatment, medium)
-    # A new scene, lest a plan keep the one that it is for.
+    # A scene of its own in any case, lest plans that are kept for a scene keep it.
+    if all(item is given for item, given in zip(objects, scene.objects, strict=True)):
+        return copy.copy(scene)
     return replace(scene, objects=objects, ambient=(0.0, 0.0, 0.0))
 
 
