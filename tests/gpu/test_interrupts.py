@@ -129,7 +129,7 @@ def test_what_was_interrupted_says_so() -> None:
         with interrupted_at(8), pytest.raises(KeyboardInterrupt):
             picture(renderer)
         with pytest.raises(tl.RenderError, match=r"^rendering; it was interrupted; make a new one$"):
-            engine.render(SCENE, SIZE, renderer.plan(SCENE), 1)
+            engine.render(renderer.plan(SCENE), SIZE)
         assert renderer.gpu is not engine
 
 
