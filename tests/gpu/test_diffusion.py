@@ -105,7 +105,7 @@ def test_silhouettes_of_dense_bodies_vanish_in_white_light(renderer: tl.Renderer
     with tl.Renderer(backend="cpu") as other:
         frames = [one.render(scene, (128, 128)) for one in (renderer, other)]
     for frame in frames:
-        assert frame.plan.given_back.diffused == (0,)
+        assert frame.plan.treated(Treatment.DIFFUSION) == (0,)
         assert ((frame.transmittance > 0.1) & (frame.transmittance < 0.99)).all(axis=2).sum() > 20
         assert np.abs(frame.radiance - 1.0).max() < 0.01
 

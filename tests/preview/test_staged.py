@@ -15,6 +15,7 @@ from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.cli import main
 from translucent.gpu.compile_budget import PostponedError
 from translucent.gpu.passes import shadow_maps
+from translucent.planning.request import RenderRequest
 from translucent.preview import quality
 from translucent.preview.actions import ChoosePreset, SetField, Turn
 from translucent.preview.document import AUTO, Document, Look, Model, framed, orbit_of
@@ -192,8 +193,14 @@ def told_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         drawn.append((scene, size, ways["samples"]))
         return Drawn()
 
+    def render_requested(
+        renderer: tl.Renderer, scene: tl.Scene, size: tuple[int, int], request: RenderRequest, **_: object
+    ) -> Drawn:
+        return render(renderer, scene, size, samples=request.samples)
+
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(tl.Renderer, "render", render)
+    monkeypatch.setattr(tl.Renderer, "render_requested", render_requested)
 
 
 def assert_alike(scene: tl.Scene, expected: tl.Scene) -> None:

@@ -30,7 +30,7 @@ from translucent.preview.actions import (
 from translucent.preview.document import RANGES, Document, Material, Model, Orbit
 from translucent.preview.panels import material as numbers
 from translucent.preview.quality import FrameBudget, StepTimes
-from translucent.preview.scenes import Loaded, material_of, medium_of, scattering_of, scene_of
+from translucent.preview.scenes import Loaded, material_of, medium_of, request_of, scene_of
 from translucent.preview.script import read_script
 from translucent.preview.session import load_session, save_session
 from translucent.preview.tasks import Task
@@ -187,8 +187,8 @@ def test_sessions_with_the_former_switch_of_the_material_are_read(tmp_path: Path
 
 def test_the_way_of_scattering_is_one_of_those_of_the_planner() -> None:
     chosen = apply(Document(), SetField("display.scattering", "layer"))
-    assert scattering_of(chosen.display.scattering) == tl.ScatteringLayer()
-    assert scattering_of(Document().display.scattering) is None
+    assert request_of(chosen).scattering == tl.ScatteringLayer()
+    assert request_of(Document()).scattering is None
     with pytest.raises(tl.InputError, match="use auto, diffusion, layer, single"):
         apply(Document(), SetField("display.scattering", "many"))
 

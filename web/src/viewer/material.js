@@ -148,7 +148,7 @@ export class Materials {
     const medium = this.#editable(object);
     if (medium == null) return;
     const { ior, roughness } = this.media[medium];
-    const metres = row.kind[0] === 1 || row.kind[0] === 4 ? this.page.scene.objects[object].sheet ?? 1 : 1;
+    const metres = row.type[0] === 1 || row.type[0] === 4 ? this.page.scene.objects[object].sheet ?? 1 : 1;
     row.extinction.set(this.#bounded(medium).map((x) => metres * x));
     row.ior[0] = ior;
     if (this.media[medium].changed) row.roughness[0] = roughness;
