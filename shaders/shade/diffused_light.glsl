@@ -1,4 +1,4 @@
-// Subsurface light: what leaves bodies in which light has diffused. Needs <SurfaceRow>. DIFFUSED: there are such bodies.
+// Subsurface light: what leaves bodies in which light has diffused. Needs <ObjectRow>. DIFFUSED: there are such bodies.
 
 #if DIFFUSED
 #include "lib/diffusion.glsl"
@@ -8,7 +8,7 @@ uniform sampler3D diffused_light;    // grids of all bodies: below, the fluence 
 // Basic radiance L / n^2 inside an object, below a point of its surface and towards it; cosine: of the direction there;
 // optical_depth: of the way back through the object, on which it has been scattered.
 vec3 subsurface_exitance(int object, vec3 point, float cosine, vec3 optical_depth) {
-    SurfaceRow row = surface_table_row(object);
+    ObjectRow row = object_table_row(object);
     if (row.diffuses < 0.5) { return vec3(0.0); }
     vec3 texels = vec3(textureSize(diffused_light, 0));
     vec3 at = clamp((point - row.grid_low) * row.cells_per_metre, vec3(0.5), row.grid_size - 0.5);
@@ -31,7 +31,7 @@ vec3 subsurface_exitance(int object, vec3 point, float cosine, vec3 optical_dept
 // takes for unscattered: of the optical depth on the ray the part by such events does not count. From the environment
 // behind, blurred, and as much as is mirrored on its way out from the other side.
 vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) {
-    SurfaceRow row = surface_table_row(object);
+    ObjectRow row = object_table_row(object);
     vec3 hazy = transmittance((1.0 - row.ahead) * optical_depth) - transmittance(optical_depth);
     if (max(hazy.r, max(hazy.g, hazy.b)) <= 0.0) { return vec3(0.0); }
     vec3 far = row.haze_far * environment_light(direction, HAZE_ROUGHNESS);

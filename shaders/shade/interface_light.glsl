@@ -1,5 +1,5 @@
 // Light that interfaces of bodies reflect from lights, and the radiance of their diffuse base and of layers that scatter many
-// times. Needs <constants>, <View>, <Surfaces>, <SurfaceRow> and environment_light.glsl. SINGLE_SCATTERING: light of lights that
+// times. Needs <constants>, <View>, <Surfaces>, <ObjectRow> and environment_light.glsl. SINGLE_SCATTERING: light of lights that
 // is scattered once is found elsewhere. Who includes it has light_passed, as in transport/light_passed.glsl.
 
 #include "lib/two_stream.glsl"
@@ -31,9 +31,9 @@ struct Surface {
 
 // parameters: object, roughness, transmission.
 Surface surface_of(vec4 parameters) {
-    SurfaceRow row = surface_table_row(int(parameters.x + 0.5));
-    return Surface(row.ior, row.dispersion, row.is_sheet > 0.5, row.scatters_much > 0.5, row.sheet_depth, row.painted_through,
-        row.painted_share, row.stream_absorption, row.stream_scattering, row.inner_mirror, row.longest, parameters.y, parameters.z,
+    ObjectRow row = object_table_row(int(parameters.x + 0.5));
+    return Surface(row.ior, row.dispersion, int(row.type) == TYPE_THIN_WALL, row.scatters_much > 0.5, row.extinction, row.passed,
+        row.passed_share, row.stream_absorption, row.stream_scattering, row.inner_mirror, row.longest, parameters.y, parameters.z,
         vec3(1.0), 1.0, row.film, vec2(row.clearcoat, row.clearcoat_roughness));
 }
 

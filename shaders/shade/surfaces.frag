@@ -7,7 +7,7 @@
 #include <View>
 #include <Environment>
 #include <Surfaces>
-#include <SurfaceRow>
+#include <ObjectRow>
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
 #include "lib/two_stream.glsl"

@@ -1,4 +1,4 @@
-// Radiance at the ends of rays: of the environment, or of an opaque object. Needs <View>, <Surfaces>, <TracedBody>,
+// Radiance at the ends of rays: of the environment, or of an opaque object. Needs <View>, <Surfaces>, <ObjectRow>,
 // shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl, opaque_objects.glsl and footprint.glsl.
 
 vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {

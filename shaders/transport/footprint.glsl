@@ -52,7 +52,7 @@ mat2x3 onto_plane(mat2x3 point, vec3 direction, vec3 face_normal) {
 
 // Differentials of the smooth normal where a ray has hit, turned as that is: corner normals are interpolated over a face.
 mat2x3 normal_differentials(Hit hit, mat2x3 point, vec3 smooth_normal) {
-    TracedBody body = traced_body(hit.object);
+    ObjectRow body = traced_body(hit.object);
     uvec4 a = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle), 0);
     uvec4 b = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle + 1), 0);
     uvec4 c = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle + 2), 0);

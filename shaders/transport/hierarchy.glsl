@@ -1,7 +1,7 @@
 // The nearest surface on a ray, by bounding volume hierarchies: one of each mesh, in coordinates of its own, under one of
 // the objects. Nodes lie depth-first with skip links (Smits 1998), so that no stack is needed; their bounds are counted in
 // steps of a grid of 16 bits, rounded outwards. Triangles are tested watertight against shared edges (Woop, Benthin &
-// Wald 2013, "Watertight Ray/Triangle Intersection"). Written by gpu/hierarchies.py. Needs <constants> and <TracedBody>.
+// Wald 2013, "Watertight Ray/Triangle Intersection"). Written by gpu/hierarchies.py. Needs <constants> and <ObjectRow>.
 
 uniform usampler2D hierarchy_nodes;      // bounds, and link: where to go on, or the triangles of a leaf
 uniform usampler2D hierarchy_triangles;  // three texels each: corners, and their normals packed
@@ -9,12 +9,12 @@ uniform int object_nodes;                // nodes of the hierarchy of objects, i
 uniform vec4 objects_frame;              // center and scale of its coordinates
 
 #if ONE_OBJECT
-TracedBody only_body;  // read once for all rays of a pixel
-void read_bodies() { only_body = traced_bodies_row(0); }
-TracedBody traced_body(int object) { return only_body; }
+ObjectRow only_body;  // read once for all rays of a pixel
+void read_bodies() { only_body = object_table_row(0); }
+ObjectRow traced_body(int object) { return only_body; }
 #else
 void read_bodies() {}
-TracedBody traced_body(int object) { return traced_bodies_row(object); }
+ObjectRow traced_body(int object) { return object_table_row(object); }
 #endif
 
 // Half sides of a mesh beyond which a ray starts where it is nearest to the middle instead: farther off, its start is rounded
@@ -87,7 +87,7 @@ void meet_triangle(int triangle, int object, vec3 origin, vec3 shear, int axis, 
 }
 
 void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit hit) {
-    TracedBody place = traced_body(object);
+    ObjectRow place = traced_body(object);
     vec3 along = vec3(dot(place.local_x.xyz, direction), dot(place.local_y.xyz, direction), dot(place.local_z.xyz, direction));
     // From the middle of the mesh before anything is multiplied: near a tiny body far from the center little is rounded.
     vec3 offset = origin - vec3(place.local_x.w, place.local_y.w, place.local_z.w);
@@ -170,7 +170,7 @@ vec3 unpacked_normal(uint packed_normal) {
 
 // Unit normals outwards where a ray has hit: of the smooth surface and of the face.
 void hit_normals(Hit hit, out vec3 smooth_normal, out vec3 face_normal) {
-    TracedBody place = traced_body(hit.object);
+    ObjectRow place = traced_body(hit.object);
     uvec4 a = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle), 0);
     uvec4 b = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle + 1), 0);
     uvec4 c = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle + 2), 0);

@@ -1,5 +1,5 @@
 // The interaction of a ray with an interface: where it is, and the lobes of the bsdf there. What follows rays is built on it: the
-// tree of traced interfaces, random paths and photons. Needs <constants>, <Surfaces>, <TracedBody>, interior_list.glsl,
+// tree of traced interfaces, random paths and photons. Needs <constants>, <Surfaces>, <ObjectRow>, interior_list.glsl,
 // surface_hit.glsl and shade/interface_bsdf.glsl.
 
 const float EDGE_ON = 1e-3;
@@ -27,7 +27,7 @@ vec3 facing_normal(vec3 normal, vec3 direction) {
 }
 
 // normal: for shading; before, after: bodies on both sides that decide on the medium.
-Interaction interaction_at(SurfaceHit hit, TracedBody body, vec3 point, vec3 direction, vec3 normal, int before, int after, int channel) {
+Interaction interaction_at(SurfaceHit hit, ObjectRow body, vec3 point, vec3 direction, vec3 normal, int before, int after, int channel) {
     bool thin_walled = int(body.type) == TYPE_THIN_WALL;
     float ior_before = index_of(before, channel);
     float ior = index_of(thin_walled ? hit.object : after, channel) / ior_before;
@@ -46,7 +46,7 @@ vec3 passing_base(Interaction at) {
 
 // Lobes of an interface that reflects `bare` without a film on it, without its clear coat and its base. emitted: radiance that
 // a thin wall emits towards the ray.
-Lobes interface_lobes(Interaction at, TracedBody body, float bare, out vec3 emitted) {
+Lobes interface_lobes(Interaction at, ObjectRow body, float bare, out vec3 emitted) {
     float cosine = cosine_of(at);
     vec3 front = film_over(body.film, bare, cosine, at.ior, at.ior_before);
     emitted = vec3(0.0);

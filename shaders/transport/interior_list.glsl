@@ -1,7 +1,7 @@
 // Interior list of a ray: the bodies that it is inside, in the order of entering; a body stands in it once for each winding. It
 // decides the medium at each point of nested dielectrics (Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images"):
 // the effective medium is that of the body with the highest priority, of equal ones of the one entered last. Needs <constants>,
-// <TracedBody>. PRIORITY: only that body absorbs and emits; UNION: each medium does once, however many bodies of it overlap.
+// <ObjectRow>. PRIORITY: only that body absorbs and emits; UNION: each medium does once, however many bodies of it overlap.
 
 const int AIR = -1;
 
@@ -106,7 +106,7 @@ Medium medium_in(uvec4 interior, int effective) {
     Medium sum = Medium(vec3(0.0), vec3(0.0), vec3(0.0));
 #if ONE_OBJECT || PRIORITY
     if (effective != AIR) {
-        TracedBody body = traced_body(effective);
+        ObjectRow body = traced_body(effective);
         sum = Medium(body.extinction, body.emission, body.scattering);
     }
 #if ONE_OBJECT && !PRIORITY && !UNION
@@ -121,7 +121,7 @@ Medium medium_in(uvec4 interior, int effective) {
     uvec4 rest = interior;
     for (int i = 0; rest.x != 0u; ++i, rest = next_entries(rest)) {
         if (!fills(interior, i)) { continue; }
-        TracedBody body = traced_body(int(rest.x & 0xffffu) - 1);
+        ObjectRow body = traced_body(int(rest.x & 0xffffu) - 1);
         sum.extinction += body.extinction;
         sum.emission += body.emission;
         sum.scattering += body.scattering;

@@ -28,7 +28,7 @@ vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m) {
         if (arrives || passed == vec3(0.0)) { break; }
         if (lit) {
             passed *= found.transmittance;
-            TracedBody body = traced_body(found.object);
+            ObjectRow body = traced_body(found.object);
             vec3 emitted = vec3(0.0);
             if (int(body.type) == TYPE_THIN_WALL) { pass_absorber(body, dot(found.face_normal, towards), emitted, passed); }
         }

@@ -1,7 +1,7 @@
-// Opaque objects as rays see them. Needs <View>, <Surfaces>, <TracedBody>, shade/opaque_light.glsl, and surface_hit.glsl.
+// Opaque objects as rays see them. Needs <View>, <Surfaces>, <ObjectRow>, shade/opaque_light.glsl, and surface_hit.glsl.
 
 // Radiance of an opaque object along a ray, lit as where it is seen directly, but without its textures.
-vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
+vec3 opaque_light(ObjectRow body, vec3 normal, vec3 direction, vec3 point) {
     // What has no surface is a diffuse base alone.
     float ior = body.plain == 1.0 ? 1.0 : body.ior;
     OpaqueSurface surface = OpaqueSurface(base_color(body, point), body.metallic, body.roughness, ior, body.passed, body.passed_share,

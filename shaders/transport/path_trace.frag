@@ -8,7 +8,7 @@
 #include <View>
 #include <Environment>
 #include <Surfaces>
-#include <TracedBody>
+#include <ObjectRow>
 #include "lib/optics.glsl"
 #include "lib/phase.glsl"
 #include "lib/ray.glsl"
@@ -97,7 +97,7 @@ vec3 phase_of(uvec4 interior, int effective, vec3 scattering, float cosine) {
         uint entry = interior_entry(interior, i);
         if (entry == 0u) { break; }
         if (!fills(interior, i)) { continue; }
-        TracedBody body = traced_body(int(entry) - 1);
+        ObjectRow body = traced_body(int(entry) - 1);
         sum += body.scattering * phase_value(body.phase, cosine);
     }
     return sum / max(scattering, vec3(1e-30));
@@ -116,7 +116,7 @@ vec4 chosen_phase(uvec4 interior, int effective, vec3 scattering, vec3 carried, 
         uint entry = interior_entry(interior, i);
         if (entry == 0u) { break; }
         if (!fills(interior, i)) { continue; }
-        TracedBody body = traced_body(int(entry) - 1);
+        ObjectRow body = traced_body(int(entry) - 1);
         float own = dot(each, body.scattering);
         if (own > 0.0) { phase = body.phase; }
         left -= own;
@@ -195,7 +195,7 @@ void add_light_at_facets(inout Path path, Interaction at, SurfaceHit surface, Li
 }
 
 // Adds the radiance of the diffuse base, for the fraction of the light that comes to it: whatever the path does next.
-void add_base(inout Path path, Interaction at, TracedBody body, vec3 arriving) {
+void add_base(inout Path path, Interaction at, ObjectRow body, vec3 arriving) {
     if (at.transmission == 1.0 || arriving == vec3(0.0)) { return; }
     vec3 base = diffuse_radiance(unblocked_irradiance(at.point, at.normal), unblocked_irradiance(at.point, -at.normal), at.color,
         body.passed, body.passed_share);
@@ -203,7 +203,7 @@ void add_base(inout Path path, Interaction at, TracedBody body, vec3 arriving) {
 }
 
 // The interaction of a path with an interface: one branch, by chance.
-void interact(inout Path path, SurfaceHit surface, TracedBody body, int before, int after, inout Draws draws) {
+void interact(inout Path path, SurfaceHit surface, ObjectRow body, int before, int after, inout Draws draws) {
     vec3 normal = facing_normal(surface.smooth_normal, path.direction);
     vec3 point = path.origin + surface.path * path.direction;
     Interaction at = interaction_at(surface, body, point, path.direction, normal, before, after, CHANNEL);
@@ -265,7 +265,7 @@ float drawn_flight(Path path, Medium medium, inout Draws draws, out int channel)
 }
 
 // Ends a path at an opaque object.
-void end_at_object(inout Path path, SurfaceHit surface, TracedBody body, vec3 point, vec2 pixel, ivec2 texel) {
+void end_at_object(inout Path path, SurfaceHit surface, ObjectRow body, vec3 point, vec2 pixel, ivec2 texel) {
     path.ends = true;
 #if OPAQUE
     if ((path.flags & FLAG_BENT) == 0u) {
@@ -321,7 +321,7 @@ void follow(inout Path path, vec2 pixel, ivec2 texel, inout Draws draws) {
     }
     bool sound = true;
     SurfaceHit surface = surface_hit(path.origin, path.direction, path.interior, 0.0, hit, before, CHANNEL, sound);
-    TracedBody body = traced_body(surface.object);
+    ObjectRow body = traced_body(surface.object);
     path.lost = !sound && (all_closed == 0 || is_full(path.interior));
     path.light += path.throughput * surface.emitted;
     path.throughput *= surface.transmittance;

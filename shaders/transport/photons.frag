@@ -5,7 +5,7 @@
 #include <constants>
 #include <View>
 #include <Surfaces>
-#include <TracedBody>
+#include <ObjectRow>
 #include "lib/light.glsl"
 #include "lib/optics.glsl"
 #include "shade/interface_bsdf.glsl"
@@ -80,7 +80,7 @@ Photon begun(uint number, out vec3 power) {
 }
 
 // The interaction of a photon with an interface: one branch, by chance.
-void interact(inout Photon photon, SurfaceHit surface, TracedBody body, int before, int after, int channel, inout Draws draws) {
+void interact(inout Photon photon, SurfaceHit surface, ObjectRow body, int before, int after, int channel, inout Draws draws) {
     vec3 normal = facing_normal(surface.smooth_normal, photon.direction);
     vec3 point = photon.origin + surface.path * photon.direction;
     Interaction at = interaction_at(surface, body, point, photon.direction, normal, before, after, channel);
@@ -108,7 +108,7 @@ bool follow(inout Photon photon, vec3 power, int channel, inout Draws draws) {
     bool sound = true;
     SurfaceHit surface = surface_hit(photon.origin, photon.direction, photon.interior, 0.0, hit, before, channel, sound);
     if (!sound && (all_closed == 0 || is_full(surface.interior))) { return false; }
-    TracedBody body = traced_body(surface.object);
+    ObjectRow body = traced_body(surface.object);
     photon.throughput *= surface.transmittance;
     if (photon.throughput == vec3(0.0)) { return false; }
     if (int(body.type) == TYPE_OPAQUE && (surface.outside || body.one_sided == 0.0)) {

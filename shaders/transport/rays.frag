@@ -1,7 +1,7 @@
 // The nearest surface on each of many rays: a texel is a ray. Used to check and to measure hierarchies.
 
 #include <constants>
-#include <TracedBody>
+#include <ObjectRow>
 #include "transport/hierarchy.glsl"
 
 uniform sampler2D ray_origins;     // from the center of the bodies; w: where the ray starts

@@ -18,7 +18,7 @@ bool is_rough(Interaction at) {
 }
 
 // Lobes of an interface whose roughness is left out, with a polished clear coat, and the radiance that a thin wall emits.
-Lobes polished_lobes(Interaction at, TracedBody body, out vec3 emitted) {
+Lobes polished_lobes(Interaction at, ObjectRow body, out vec3 emitted) {
     float cosine = cosine_of(at);
     Lobes lobes = interface_lobes(at, body, fresnel_dielectric(cosine, at.ior), emitted);
     float coat = at.outside || at.thin_walled ? polished_coat_reflectance(body.clearcoat, cosine) : 0.0;

@@ -17,7 +17,7 @@ vec3 straight_transmittance(vec3 origin, float skipped, uvec4 interior, vec3 tow
         if (passed == vec3(0.0)) { return passed; }
         bool sound = true;
         SurfaceHit found = surface_hit(origin, towards, interior, 0.0, hit, before, channel, sound);
-        TracedBody body = traced_body(found.object);
+        ObjectRow body = traced_body(found.object);
         int type = int(body.type);
         passed *= found.transmittance;
         if (type == TYPE_OPAQUE && (found.outside || body.one_sided == 0.0)) { return vec3(0.0); }

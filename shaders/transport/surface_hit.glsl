@@ -1,4 +1,4 @@
-// Surfaces that a ray hits in one place: of solids, thin walls and opaque objects. Needs <constants>, <Surfaces>, <TracedBody>,
+// Surfaces that a ray hits in one place: of solids, thin walls and opaque objects. Needs <constants>, <Surfaces>, <ObjectRow>,
 // lib/optics.glsl, lib/interface.glsl, hierarchy.glsl and interior_list.glsl. FROM_EYE: rays may start inside bodies, or before
 // others without an interface.
 
@@ -6,11 +6,6 @@
 uniform uvec4 start_interior;  // the bodies that the eye is in
 #endif
 
-const int TYPE_SOLID = 0;
-const int TYPE_THIN_WALL = 1;
-const int TYPE_OPAQUE = 2;
-const int TYPE_UNSEEN = 3;    // drawn over the picture, or from its back
-const int TYPE_ABSORBER = 4;  // a thin wall that only absorbs and emits
 const int MOST_STEPS = 512;
 
 // Metres along a ray within which surfaces lie in one place.
@@ -18,7 +13,7 @@ float path_within(vec3 direction, vec3 face_normal) {
     return SURFACE_OFFSET * surface_reach / max(abs(dot(direction, face_normal)), 1e-2);
 }
 
-float body_index(TracedBody body, int channel) {
+float body_index(ObjectRow body, int channel) {
 #if DISPERSION
     return channel_iors(body.ior, body.dispersion)[channel];
 #else
@@ -32,7 +27,7 @@ float index_of(int body, int channel) {
 }
 
 // Base color of an opaque object at a point, as far as it is no texture's.
-vec3 base_color(TracedBody body, vec3 point) {
+vec3 base_color(ObjectRow body, vec3 point) {
     if (body.fading.z == 0.0) { return body.color; }
     vec3 offset = point - vec3(body.local_x.w, body.local_y.w, body.local_z.w);
     float radius = length(vec3(dot(body.local_x.xyz, offset), dot(body.local_y.xyz, offset), dot(body.local_z.xyz, offset)));
@@ -75,13 +70,13 @@ bool alters_light(int before, int after, int channel) {
     float ior = 1.0;
     bool plain = true;
     if (before != AIR) {
-        TracedBody body = traced_body(before);
+        ObjectRow body = traced_body(before);
         ior = body_index(body, channel);
         plain = body.plain != 0.0;
     }
     float ior_after = 1.0;
     if (after != AIR) {
-        TracedBody body = traced_body(after);
+        ObjectRow body = traced_body(after);
         ior_after = body_index(body, channel);
         plain = plain && body.plain != 0.0;
     }
@@ -89,7 +84,7 @@ bool alters_light(int before, int after, int channel) {
 }
 
 // Thin wall that only absorbs and emits.
-void pass_absorber(TracedBody wall, float cosine, inout vec3 emitted, inout vec3 throughput) {
+void pass_absorber(ObjectRow wall, float cosine, inout vec3 emitted, inout vec3 throughput) {
     float through = 1.0 / max(refracted_cosine(cosine, wall.ior), MIN_THIN_LAYER_COSINE);
 #if EMISSION
     emitted += throughput * emitted_radiance(wall.emission, wall.extinction, through);
@@ -121,7 +116,7 @@ SurfaceHit surface_hit(vec3 origin, vec3 direction, uvec4 interior, float start,
         if (surface == 0) { first = hit; }
 #endif
         if (hit.object < 0) { break; }
-        TracedBody body = traced_body(hit.object);
+        ObjectRow body = traced_body(hit.object);
         int type = int(body.type);
         vec3 smooth_normal, face_normal;
         bool outside;

@@ -8,8 +8,7 @@
 #include <View>
 #include <Environment>
 #include <Surfaces>
-#include <SurfaceRow>
-#include <TracedBody>
+#include <ObjectRow>
 #include "lib/color.glsl"
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
@@ -111,7 +110,7 @@ void terminate(Ray ray, vec3 direction, vec3 throughput, bool reflected) {
 // Whether light that is scattered in a body leaves it as from a layer.
 bool is_layer(int body) {
 #if LAYERED
-    return body != AIR && surface_table_row(body).scatters_much > 0.5;
+    return body != AIR && object_table_row(body).scatters_much > 0.5;
 #else
     return false;
 #endif
@@ -148,7 +147,7 @@ void pass_on(inout Ray ray, vec3 point, vec3 face_normal, uvec4 interior, vec3 n
 }
 
 // Before the first interface a ray is in no body; it started a little before what the rasterizer has found.
-bool starts_within(Ray ray, TracedBody body, bool outside) {
+bool starts_within(Ray ray, ObjectRow body, bool outside) {
 #if FROM_EYE
     return false;
 #else
@@ -158,7 +157,7 @@ bool starts_within(Ray ray, TracedBody body, bool outside) {
 
 // A clear coat: takes its part of the lobes and of what is emitted below, and reflects it as the interface below does, or adds
 // what a rougher one sees. normal: of the surface; polished: the interface below is.
-void add_coat(Ray ray, Interaction at, TracedBody body, vec3 normal, bool polished, float unoccluded, inout Lobes lobes, inout vec3 emitted) {
+void add_coat(Ray ray, Interaction at, ObjectRow body, vec3 normal, bool polished, float unoccluded, inout Lobes lobes, inout vec3 emitted) {
 #if CLEAR_COAT
     if (body.clearcoat == 0.0 || !(at.outside || at.thin_walled)) { return; }
     float coat = coat_reflectance(vec2(body.clearcoat, body.clearcoat_roughness), clamp(-dot(normal, at.direction), 0.0, 1.0));
@@ -216,7 +215,7 @@ bool branch(inout Ray ray, Ray back, Ray on, vec3 again, bool total, bool last) 
 }
 
 // The interaction of a ray with an interface; returns whether the ray ends there. again, last: as for `branch`.
-bool interact(inout Ray ray, Interaction at, TracedBody body, Hit hit, SurfaceHit surface, PrimaryHit primary, float unoccluded, vec3 again, bool last) {
+bool interact(inout Ray ray, Interaction at, ObjectRow body, Hit hit, SurfaceHit surface, PrimaryHit primary, float unoccluded, vec3 again, bool last) {
     // Textures are read where a ray first hits an object; farther on it counts as the same all over.
     if (at.object == primary.object) {
         at.roughness = primary.surface.roughness;
@@ -276,7 +275,7 @@ bool follow(inout Ray ray, PrimaryHit primary, inout float reach, int channel, b
     }
     vec3 point = ray.origin + hit.path * ray.direction;
     advance(ray.footprint, hit.path);
-    TracedBody body = traced_body(surface.object);
+    ObjectRow body = traced_body(surface.object);
     int type = int(body.type);
     if (starts_within(ray, body, surface.outside)) {
         ray.origin = origin_beside(point, surface.face_normal, ray.direction, ray.skipped);

@@ -157,5 +157,5 @@ def test_a_record_of_a_table_reads_as_it_was_packed(renderer: tl.Renderer, table
 
 
 def test_a_record_wants_all_its_fields() -> None:
-    with pytest.raises(KeyError, match=r"packed table SurfaceRow: .*'sheet_depth'"):
-        TABLES["SurfaceRow"].pack([{"ior": 1.5}])
+    with pytest.raises(KeyError, match=r"packed table ObjectRow: .*'extinction'"):
+        TABLES["ObjectRow"].pack([{"ior": 1.5}])

@@ -21,7 +21,7 @@ from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import hierarchies as module
 from translucent.gpu import packed_meshes
 from translucent.gpu.hierarchies import HierarchyCache, SceneHierarchies
-from translucent.gpu.layout import TRACED_BODY
+from translucent.gpu.layout import OBJECT_ROW
 from translucent.gpu.packed_meshes import packed_mesh
 from translucent.gpu.ray_probe import RayProbe
 from translucent.gpu.textures import unlike_powers
@@ -288,11 +288,11 @@ def test_memory_is_not_underestimated() -> None:
 
 
 def test_numbers_of_nodes_survive_float32() -> None:
-    names = TRACED_BODY.dtype.names or ()
+    names = OBJECT_ROW.dtype.names or ()
     for number in (4095, 4096, (1 << 24) + 1, (1 << 28) - 1):
-        record = {name: np.zeros(TRACED_BODY.dtype[name].shape) for name in names}
+        record = {name: np.zeros(OBJECT_ROW.dtype[name].shape) for name in names}
         record["first_node"] = divmod(number, 1 << 12)
-        packed = TRACED_BODY.pack([record]).ravel().view(TRACED_BODY.dtype)["first_node"][0]
+        packed = OBJECT_ROW.pack([record]).ravel().view(OBJECT_ROW.dtype)["first_node"][0]
         assert int(packed[0]) << 12 | int(packed[1]) == number
 
 

@@ -61,8 +61,13 @@ HIERARCHY_WIDTH_BITS = 12
 #: Width of the textures that hold photons, in texels.
 PHOTON_WIDTH = 512
 
+#: Types of objects, in the order of their numbers: an absorber is a thin wall that only absorbs and emits, and what is
+#: unseen is drawn over the picture, or from its back.
+OBJECT_TYPES = ("SOLID", "THIN_WALL", "OPAQUE", "UNSEEN", "ABSORBER")
+
 #: Values of the constants by their names in GLSL.
 CONSTANTS: dict[str, str] = {
+    **{f"TYPE_{name}": str(number) for number, name in enumerate(OBJECT_TYPES)},
     "PI": "3.14159265358979",
     "LUMINANCE_WEIGHTS": f"vec3{LUMINANCE_WEIGHTS}",
     "MIN_THIN_LAYER_COSINE": repr(MIN_THIN_LAYER_COSINE),

@@ -58,7 +58,7 @@ class DiffusedLight:
 
     @np.errstate(under="ignore")
     def rows(self, center: Array) -> dict[int, dict[str, npt.ArrayLike]]:
-        """Fields of a `SURFACE_ROW` of each object, for positions that count from `center`."""
+        """Fields of a `OBJECT_ROW` of each object, for positions that count from `center`."""
         return {
             number: {
                 "diffuses": 1.0,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 import weakref
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import moderngl
@@ -19,16 +19,13 @@ from translucent.errors import RenderError, TranslucentWarning
 from translucent.files.reading import size_text
 from translucent.geometry.bvh import BLOCK, LEAF_SIZE, Floats, build_hierarchy
 from translucent.geometry.mesh import Mesh
-from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.compile_budget import before_making
 from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
-from translucent.gpu.layout import TRACED_BODY
+from translucent.gpu.object_table import Fields
 from translucent.gpu.packed_meshes import FIRST_BITS, Words, frame, has_packed, packed_mesh, packed_nodes
 from translucent.gpu.textures import unlike_powers
-from translucent.media.medium import VACUUM, Medium
 from translucent.scene.falloff import Falloff
 from translucent.scene.scene import Object, Scene
-from translucent.scene.surface import SMOOTH
 
 _WIDTH = 1 << HIERARCHY_WIDTH_BITS
 
@@ -93,30 +90,24 @@ class SceneHierarchies:
             _check_texels(gl, texels)
         self.nodes, self.triangles = _texture(gl, first, nodes), _texture(gl, 3 * triangle, triangles)
         self.object_nodes = 0
-        self._placed: tuple[Hashable, npt.NDArray[np.float32], tuple[float, float, float, float]] | None = None
+        self._placed: tuple[Hashable, tuple[Fields, ...], tuple[float, float, float, float]] | None = None
 
-    def place(
-        self, scene: Scene, center: Array, sheets: Mapping[int, float]
-    ) -> tuple[npt.NDArray[np.float32], tuple[float, float, float, float]]:
+    def place(self, scene: Scene, center: Array) -> tuple[tuple[Fields, ...], tuple[float, float, float, float]]:
         """Write the hierarchy of objects where they are.
-
-        `sheets`: thickness in metres of those objects that are drawn without an inside, by their numbers.
 
         Returns
         -------
-        rows : (objects, texels, 4) float32
-            A `TRACED_BODY` of each object.
+        placements : tuple of dict
+            Placement of each object, for the table of objects.
         frame : (4,) floats
             Center and scale of the coordinates of the hierarchy of objects; positions count from `center`.
         """
-        asked = weakref.ref(scene), center.tobytes(), tuple(sheets.items())
+        asked = weakref.ref(scene), center.tobytes()
         if self._placed is None or self._placed[0] != asked:  # else as for the last sample of the frame
-            self._placed = asked, *self._place(scene, center, sheets)
+            self._placed = asked, *self._place(scene, center)
         return self._placed[1:]
 
-    def _place(
-        self, scene: Scene, center: Array, sheets: Mapping[int, float]
-    ) -> tuple[npt.NDArray[np.float32], tuple[float, float, float, float]]:
+    def _place(self, scene: Scene, center: Array) -> tuple[tuple[Fields, ...], tuple[float, float, float, float]]:
         boxes = scene.boxes - center
         low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
         middle, scale = frame(low, high)
@@ -132,14 +123,7 @@ class SceneHierarchies:
         reserved = np.zeros((self._rows * _WIDTH, 4), np.uint32)
         reserved[: len(nodes)] = nodes
         self.nodes.write(reserved, viewport=(0, 0, _WIDTH, self._rows))
-        ranks = np.unique([body.priority for body in scene.objects], return_inverse=True)[1] + 1.0
-        media = _media_numbers(scene)
-        rows = []
-        for i, body in enumerate(scene.objects):
-            decides = i not in sheets and _decides(scene, body)
-            own = {"rank": ranks[i] if decides else 0.0, "slot": media[i]}
-            rows.append({**self._row(scene, body, center, sheets.get(i)), **own})
-        return TRACED_BODY.pack(rows), (*middle, scale)
+        return tuple(self._placement(body, center) for body in scene.objects), (*middle, scale)
 
     def faces(self, scene: Scene, objects: Integers, triangles: npt.NDArray[np.integer]) -> Integers:
         """(n,): faces of the meshes of objects (n,), by the numbers of their triangles; -1 where the object is -1."""
@@ -149,45 +133,18 @@ class SceneHierarchies:
             found[own] = packed_mesh(body.mesh).faces[triangles[own] - self._spans[id(body.mesh)].triangle]
         return found
 
-    def _row(self, scene: Scene, body: Object, center: Array, sheet: float | None) -> Mapping[str, npt.ArrayLike]:
+    def _placement(self, body: Object, center: Array) -> Fields:
         packed, span = packed_mesh(body.mesh), self._spans[id(body.mesh)]
         linear = body.matrix[:3, :3]
         middle = linear @ packed.center + (body.matrix[:3, 3] - center)
         rows = np.column_stack([packed.scale * np.linalg.inv(linear), middle])
-        medium, surface = body.medium or VACUUM, body.surface or SMOOTH
-        metres = 1.0 if sheet is None else sheet
-        opaque = body.medium is None
-        extinction = bounded_extinction(medium, scene.diagonal)
-        with np.errstate(under="ignore"):
-            albedo = medium.scattering / np.where(medium.extinction > 0, medium.extinction, 1.0)
         return {
             "local_x": rows[0],
             "local_y": rows[1],
             "local_z": rows[2],
             "first_node": divmod(span.first, 1 << 12),
             "node_count": divmod(span.count, 1 << 12),
-            "extinction": metres * extinction,
-            "scattering": metres * extinction * albedo,
-            "phase": medium.phase_function.parameters,
-            "not_closed": float(not opaque and not body.mesh.diagnosis.solid),
-            "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
-            "emission": metres * np.asarray(medium.emission),
-            "type": _type(body, sheet),
-            "color": body.base_color if opaque else np.asarray(surface.color),
-            "transmission": surface.transmission,
-            "ior": surface.ior if opaque else medium.ior,
-            "dispersion": surface.dispersion,
-            "roughness": surface.roughness,
-            "plain": float(body.surface is None if opaque else body.plain),
-            "passed": surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color),
-            "passed_share": surface.diffuse_transmission,
-            "emissive": np.asarray(surface.emissive),
-            "metallic": surface.metallic,
-            "one_sided": float(not surface.double_sided),
-            "fading": _fading(body, packed.scale) if opaque else (0.0, 0.0, 0.0),
-            "film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
-            "clearcoat": surface.clearcoat,
-            "clearcoat_roughness": surface.clearcoat_roughness,
+            "fading": _fading(body, packed.scale) if body.medium is None else (0.0, 0.0, 0.0),
         }
 
     def release(self) -> None:
@@ -221,17 +178,8 @@ class HierarchyCache:
             self._held = None
 
 
-def _type(body: Object, sheet: float | None) -> float:
-    """Type of an object, as ``shaders/transport/surface_hit.glsl`` numbers them."""
-    if body.medium is None:
-        return 2.0
-    if body.covers:
-        return 3.0
-    return 0.0 if sheet is None else 1.0 if body.has_interface else 4.0
-
-
 def _fading(body: Object, scale: float) -> tuple[float, float, float]:
-    """Radii in coordinates of the hierarchy between which paint loses a share of its color, and this share."""
+    """Radii in coordinates of the hierarchy between which the base color loses a share, and this share."""
     falloff, mesh = body.surface and body.surface.color_texture, body.mesh
     if not isinstance(falloff, Falloff) or mesh.uv is None:
         return 0.0, 0.0, 0.0
@@ -239,17 +187,6 @@ def _fading(body: Object, scale: float) -> tuple[float, float, float]:
     unit = scale * float(np.linalg.norm(mesh.vertices[one] - mesh.vertices[other]))
     unit /= float(np.linalg.norm(mesh.uv[one] - mesh.uv[other]))
     return falloff.start * unit, 0.5 * unit, 1.0 - falloff.far
-
-
-def _decides(scene: Scene, body: Object) -> bool:
-    """True if a body determines the index of refraction of the rays in it."""
-    return body.medium is not None and (body.has_interface or scene.overlap == "priority")
-
-
-def _media_numbers(scene: Scene) -> list[float]:
-    """A number for each object, the same for those of one medium."""
-    numbers: dict[Medium | None, int] = {}
-    return [float(numbers.setdefault(body.medium, len(numbers))) for body in scene.objects]
 
 
 def _require_room(gl: moderngl.Context, meshes: Sequence[Mesh]) -> None:

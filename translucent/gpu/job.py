@@ -19,6 +19,7 @@ from translucent.gpu.diffusion import DiffusedLight
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES
 from translucent.gpu.light_cameras import media_sphere
+from translucent.gpu.object_table import Fields, object_rows, packed_objects
 from translucent.gpu.placement import PlacedScene, SampleView, depth_range
 from translucent.gpu.resources import Resources
 from translucent.gpu.scene_view import CameraView
@@ -32,7 +33,6 @@ from translucent.gpu.uniforms import (
     media_uniforms,
     scatter_uniforms,
     shade_uniforms,
-    surface_table,
     surface_uniforms,
 )
 from translucent.planning.passes import PassSpec
@@ -134,6 +134,7 @@ class FrameJob(CameraView):
         super().__init__(gl, placed, self.roles_of(counts), contents, targets, resources)
         self._cleared: set[str] = set()
         self._lit = False
+        self._packed: tuple[tuple[Fields, ...] | None, npt.NDArray[np.float32]] | None = None
         self._extents = extents(scene.boxes, scene.radii, scene.camera, targets.size)
         self._in_view = frozenset(np.flatnonzero(self._extents[:, 2] > self._extents[:, 0]).tolist())
         if self.features.marches and not self.features.scatters:
@@ -151,14 +152,21 @@ class FrameJob(CameraView):
 
     @property
     def diffused_rows(self) -> dict[int, dict[str, npt.ArrayLike]]:
-        """Fields of the objects in which light diffuses, for the table of surfaces."""
+        """Fields of the objects in which light diffuses, for the table of objects."""
         light = self.diffused_light
         return {} if light is None else light.rows(media_center(self.scene))
 
     @cached_property
-    def surface_rows(self) -> npt.NDArray[np.float32]:
-        """Table of the surfaces of all objects, the same for all samples."""
-        return surface_table(self.scene, self.features.sheets, self.diffused_rows)
+    def object_rows(self) -> tuple[Fields, ...]:
+        """Media and surfaces of all objects, the same for all samples."""
+        return object_rows(self.scene, self.features.sheets, self.diffused_rows)
+
+    def object_table(self, placements: tuple[Fields, ...] | None = None) -> moderngl.Texture:
+        """Table of the objects, with their placements where rays are traced; the caller releases it."""
+        if self._packed is None or self._packed[0] is not placements:  # else as for the last sample of the frame
+            self._packed = placements, packed_objects(self.object_rows, placements)
+        table = self._packed[1]
+        return self.gl.texture(table.shape[1::-1], 4, table, dtype="f4")
 
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""

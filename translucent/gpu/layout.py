@@ -208,82 +208,63 @@ BLOCKS = {
     for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, DENSITY, SURFACES, SHADOWS, SKY_SHADOWS)
 }
 
-#: Surface parameters that do not vary over an object: a record for each object.
-SURFACE_ROW = PackedTable(
-    "SurfaceRow",
-    "surface_table",
+#: Objects: their placement, media and surfaces, as far as these do not vary over an object; a record for each.
+#: Positions count from the center of the media.
+OBJECT_ROW = PackedTable(
+    "ObjectRow",
+    "object_table",
     (
-        ("ior", "f4", ()),
-        ("dispersion", "f4", ()),
-        ("is_sheet", "f4", ()),  # 1 where it is drawn without an inside
-        ("scatters_much", "f4", ()),  # 1 where what is scattered more than once leaves as from a layer
-        ("sheet_depth", "f4", (3,)),  # optical depth straight through a sheet
-        ("longest", "f4", ()),  # metres across the body
-        ("painted_through", "f4", (3,)),  # share of light on the paint that passes to the other side, with its color,
-        ("painted_share", "f4", ()),  # and without
-        ("stream_absorption", "f4", (3,)),
-        ("inner_mirror", "f4", ()),  # share of diffuse light from inside that its interface mirrors
-        ("stream_scattering", "f4", (3,)),
-        ("diffuses", "f4", ()),  # 1 where light diffuses in it
-        ("grid_low", "f4", (3,)),  # corner of the grid of its diffused light, from the center of the media
-        ("cells_per_metre", "f4", ()),
-        ("grid_size", "f4", (3,)),  # cells along each axis
-        ("first_layer", "f4", ()),  # of the grid in the texture of all grids
-        ("albedo", "f4", (3,)),
-        ("conductance", "f4", ()),
-        ("emergent_fluxes", "f4", (4,)),
-        ("exit_share", "f4", ()),
-        ("mean_cosine", "f4", ()),
-        ("clearcoat", "f4", ()),
-        ("clearcoat_roughness", "f4", ()),
-        ("ahead", "f4", (3,)),  # share of its extinction by light that is scattered ahead
-        ("haze_far", "f4", (3,)),  # share of that light which leaves where a ray does,
-        ("haze_near", "f4", (3,)),  # and on the other side
-        ("film", "f4", (3,)),  # share of the surface that has it, its ior, and metres
-    ),
-)
-
-#: Objects that rays are traced through: a record for each. Positions count from the center of the media.
-TRACED_BODY = PackedTable(
-    "TracedBody",
-    "traced_bodies",
-    (
-        (
-            "local_x",
-            "f4",
-            (4,),
-        ),  # rows of the transform of a position, less that in w, to its hierarchy
+        # Rows of the transform of a position, less that in w, to its hierarchy.
+        ("local_x", "f4", (4,)),
         ("local_y", "f4", (4,)),
         ("local_z", "f4", (4,)),
         ("first_node", "f4", (2,)),  # of its hierarchy, and how many in each order: multiples of 4096, and the rest
         ("node_count", "f4", (2,)),
-        ("extinction", "f4", (3,)),  # of a sheet: times its thickness, as is its emission
+        ("extinction", "f4", (3,)),  # of a thin wall: times its thickness, as is its emission
         ("outwards", "f4", ()),  # 1, or -1 where the normals of its faces point inwards
         ("emission", "f4", (3,)),
-        ("type", "f4", ()),  # as ``transport/surface_hit.glsl`` numbers them
+        ("type", "f4", ()),  # one of the constants ``TYPE_``
         ("color", "f4", (3,)),
         ("transmission", "f4", ()),
         ("ior", "f4", ()),
         ("dispersion", "f4", ()),
         ("roughness", "f4", ()),
-        ("plain", "f4", ()),  # 1 where its surface only bends and mirrors light; of what is opaque: has none
-        ("passed", "f4", (3,)),  # of what is opaque: share of light on the paint that passes, with its color,
+        ("plain", "f4", ()),  # 1 where its surface only refracts and reflects light; of what is opaque: has none
+        ("passed", "f4", (3,)),  # fraction of the light on the base that passes to the other side, with its color,
         ("passed_share", "f4", ()),  # and without
         ("emissive", "f4", (3,)),
         ("metallic", "f4", ()),
         ("one_sided", "f4", ()),
         ("rank", "f4", ()),  # the higher, the more it decides on the medium of a ray; 0: not at all
         ("not_closed", "f4", ()),  # 1 for a solid with holes
-        ("scattering", "f4", (3,)),
         ("slot", "f4", ()),  # the same for objects of one medium
-        ("phase", "f4", (4,)),  # parameters of the phase function
-        # Of paint around the middle of the mesh, in coordinates of the hierarchy: where it begins to get darker, where
-        # it ends to, and how much of it is lost there; 0 for none.
-        ("fading", "f4", (3,)),
+        ("scattering", "f4", (3,)),
         ("clearcoat", "f4", ()),
-        ("film", "f4", (3,)),  # as in `SURFACE_ROW`
+        ("phase", "f4", (4,)),  # parameters of the phase function
+        # Of base color around the middle of the mesh, in coordinates of the hierarchy: where it begins to get darker,
+        # where it ends to, and how much of it is lost there; 0 for none.
+        ("fading", "f4", (3,)),
         ("clearcoat_roughness", "f4", ()),
+        ("film", "f4", (3,)),  # share of the surface that has it, its ior, and metres
+        ("scatters_much", "f4", ()),  # 1 where what is scattered more than once leaves as from a layer
+        ("stream_absorption", "f4", (3,)),
+        ("longest", "f4", ()),  # metres across the body
+        ("stream_scattering", "f4", (3,)),
+        ("inner_mirror", "f4", ()),  # fraction of diffuse light from inside that its interface reflects
+        ("grid_low", "f4", (3,)),  # corner of the grid of its diffused light, from the center of the media
+        ("diffuses", "f4", ()),  # 1 where light diffuses in it
+        ("grid_size", "f4", (3,)),  # cells along each axis
+        ("cells_per_metre", "f4", ()),
+        ("albedo", "f4", (3,)),
+        ("first_layer", "f4", ()),  # of the grid in the texture of all grids
+        ("emergent_fluxes", "f4", (4,)),
+        ("conductance", "f4", ()),
+        ("exit_share", "f4", ()),
+        ("mean_cosine", "f4", ()),
+        ("ahead", "f4", (3,)),  # share of its extinction by light that is scattered ahead
+        ("haze_far", "f4", (3,)),  # share of that light which leaves where a ray does,
+        ("haze_near", "f4", (3,)),  # and on the other side
     ),
 )
 
-TABLES = {table.name: table for table in (SURFACE_ROW, TRACED_BODY)}
+TABLES = {OBJECT_ROW.name: OBJECT_ROW}

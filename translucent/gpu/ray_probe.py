@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 from translucent.gpu.hierarchies import SceneHierarchies
+from translucent.gpu.object_table import object_rows, packed_objects
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.scene.scene import Scene
@@ -20,7 +21,7 @@ from translucent.scene.scene import Scene
 _UNITS = {
     name: unit
     for unit, name in enumerate(
-        ("ray_origins", "ray_directions", "traced_bodies", "hierarchy_nodes", "hierarchy_triangles")
+        ("ray_origins", "ray_directions", "object_table", "hierarchy_nodes", "hierarchy_triangles")
     )
 }
 
@@ -90,7 +91,8 @@ class RayProbe:
             rays = np.zeros((2, size[0] * size[1], 4), np.float32)
             rays[0, :count, :3], rays[1, :count, :3] = origins - center, directions
             rays[0, :count, 3], rays[1, :count, 3] = start, end
-            rows, frame = hierarchies.place(scene, center, {})
+            placements, frame = hierarchies.place(scene, center)
+        rows = packed_objects(object_rows(scene, {}), placements)
         made = [self._gl.texture(size, 4, part, dtype="f4") for part in rays]
         made.append(self._gl.texture(rows.shape[1::-1], 4, rows, dtype="f4"))
         found = self._gl.texture(size, 4, dtype="i4")

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
-from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.light import ALL_AROUND
-from translucent.formulas.two_stream import two_stream_absorption, two_stream_scattering
 from translucent.gpu.balance import Balance
-from translucent.gpu.body_uniforms import MAX_SCENE_OPTICAL_DEPTH, bounded_extinction
+from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import (
     ENVIRONMENT,
@@ -24,21 +20,17 @@ from translucent.gpu.layout import (
     MEDIA,
     SCATTER,
     SHADE,
-    SURFACE_ROW,
     SURFACES,
     VIEW,
 )
 from translucent.gpu.placement import PlacedScene, SampleView
-from translucent.media.medium import VACUUM
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
-from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import PositionalLight
-from translucent.scene.scene import Object, Scene
-from translucent.scene.surface import SMOOTH
+from translucent.scene.scene import Scene
 
 #: Optical depth, across the scene, of what stops the straight light of lamps.
 STOPPING = 1e5
@@ -268,59 +260,3 @@ def surface_uniforms(placed: PlacedScene, size: tuple[int, int]) -> bytes:
         surface_reach=scene.diagonal,
         surface_eye_axial_depth=-media.near / media.length,
     )
-
-
-def surface_table(
-    scene: Scene, sheets: Mapping[int, float], diffused: Mapping[int, Mapping[str, npt.ArrayLike]] | None = None
-) -> npt.NDArray[np.float32]:
-    """(objects, texels, 4): a `SURFACE_ROW` of each object; that of an opaque one is not read.
-
-    `sheets`: thickness in metres of those objects that are drawn without an inside, by their numbers; `diffused`:
-    fields of those in which light diffuses.
-    """
-    fields = diffused or {}
-    rows = [_surface_row(scene, body, sheets.get(i), fields.get(i)) for i, body in enumerate(scene.objects)]
-    return SURFACE_ROW.pack(rows)
-
-
-#: Fields of a body in which no light diffuses.
-_NO_DIFFUSION: dict[str, npt.ArrayLike] = {
-    "diffuses": 0.0,
-    "grid_low": 0.0,
-    "cells_per_metre": 0.0,
-    "grid_size": 1.0,
-    "first_layer": 0.0,
-    "albedo": 0.0,
-    "conductance": 0.0,
-    "emergent_fluxes": 0.0,
-    "exit_share": 0.0,
-    "mean_cosine": 1.0,
-    "ahead": 0.0,
-    "haze_far": 0.0,
-    "haze_near": 0.0,
-}
-
-
-def _surface_row(
-    scene: Scene, body: Object, sheet: float | None, diffused: Mapping[str, npt.ArrayLike] | None
-) -> dict[str, npt.ArrayLike]:
-    medium, surface = body.medium or VACUUM, body.surface or SMOOTH
-    stream = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
-    limit = MAX_SCENE_OPTICAL_DEPTH / max(scene.diagonal, float(np.finfo(np.float64).tiny))
-    return {
-        "ior": medium.ior,
-        "dispersion": surface.dispersion,
-        "is_sheet": sheet is not None,
-        "scatters_much": treatment_of(body) is Treatment.LAYER,
-        "sheet_depth": bounded_extinction(medium, scene.diagonal) * (sheet or 0.0),
-        "longest": np.linalg.norm(body.bounds[1] - body.bounds[0]),
-        "painted_through": surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color),
-        "painted_share": surface.diffuse_transmission,
-        "stream_absorption": np.minimum(stream[0], limit),
-        "inner_mirror": diffuse_interface(medium.ior).reflected,
-        "stream_scattering": np.minimum(stream[1], limit),
-        "film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
-        "clearcoat": surface.clearcoat,
-        "clearcoat_roughness": surface.clearcoat_roughness,
-        **(_NO_DIFFUSION if diffused is None else diffused),
-    }

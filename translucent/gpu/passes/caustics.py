@@ -21,7 +21,7 @@ from translucent.gpu.uniforms import media_center
 from translucent.planning.passes import PassSpec
 from translucent.planning.photon_aims import PhotonAim, photon_aims
 
-_TRACED = {name: unit for unit, name in enumerate(("traced_bodies", "hierarchy_nodes", "hierarchy_triangles"))}
+_TRACED = {name: unit for unit, name in enumerate(("object_table", "hierarchy_nodes", "hierarchy_triangles"))}
 _LANDED = ("landed_point", "landed_power", "landed_normal")
 _RECEIVED = {"photon_irradiance": 0, "opaque_axial_depth": 1, "receiver_normal": 2}
 _SPLAT = {name: unit for unit, name in enumerate((*_LANDED, "opaque_axial_depth"))}
@@ -119,8 +119,8 @@ class CausticsPass:
             **coat_switches(scene.bodies),
         )
         hierarchies = job.resources.hierarchies.of(scene)
-        rows, frame = hierarchies.place(scene, media_center(scene), job.features.sheets)
-        bodies = self._gl.texture(rows.shape[1::-1], 4, rows, dtype="f4")
+        placements, frame = hierarchies.place(scene, media_center(scene))
+        bodies = job.object_table(placements)
         stack.callback(bodies.release)
         assert job.plan.caustics is not None
         values = {

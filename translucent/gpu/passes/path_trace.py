@@ -30,7 +30,7 @@ _UNITS = {
     for unit, name in enumerate(
         (
             *_STATE,
-            "traced_bodies",
+            "object_table",
             "hierarchy_nodes",
             "hierarchy_triangles",
             "light_map",
@@ -230,8 +230,8 @@ class PathTracer:
     def _bodies(self, stack: ExitStack, job: FrameJob) -> tuple[moderngl.Texture, SceneHierarchies, dict[str, object]]:
         """Texture of the objects, hierarchies of their meshes, and the uniforms that are the same for all passes."""
         hierarchies = job.resources.hierarchies.of(job.scene)
-        rows, frame = hierarchies.place(job.scene, media_center(job.scene), job.features.sheets)
-        bodies = self._gl.texture(rows.shape[1::-1], 4, rows, dtype="f4")
+        placements, frame = hierarchies.place(job.scene, media_center(job.scene))
+        bodies = job.object_table(placements)
         stack.callback(bodies.release)
         assert job.plan.paths is not None
         values = {
@@ -276,7 +276,7 @@ class PathTracer:
         maps = environments.light(environment)
         textures = {
             **dict(zip(_STATE, source.color_attachments, strict=True)),
-            "traced_bodies": scene[0],
+            "object_table": scene[0],
             "hierarchy_nodes": scene[1].nodes,
             "hierarchy_triangles": scene[1].triangles,
             "light_map": environments.sharp(environment),

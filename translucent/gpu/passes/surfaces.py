@@ -24,7 +24,7 @@ _SAMPLERS = (
     "left_parameters",
     "opaque_axial_depth",
     "opaque_radiance",
-    "surface_table",
+    "object_table",
     "reflectance_table",
     "light_map",
     "light_levels",
@@ -94,10 +94,9 @@ class SurfacesPass:
         """Bind surfaces and lights; returns the texture of surfaces, which the caller releases."""
         environment = job.scene.environment
         maps = job.resources.environments.light(environment)
-        table = job.surface_rows
         if job.diffused_light is not None:
             job.diffused_light.texture.use(_UNITS["diffused_light"])
-        finishes = job.gl.texture(table.shape[1::-1], 4, table, dtype="f4")
+        finishes = job.object_table()
         rest = (
             finishes,
             self._reflectance,
@@ -105,6 +104,6 @@ class SurfacesPass:
             maps.levels,
             maps.irradiance,
         )
-        for unit, item in enumerate(rest, _UNITS["surface_table"]):
+        for unit, item in enumerate(rest, _UNITS["object_table"]):
             item.use(unit)
         return finishes

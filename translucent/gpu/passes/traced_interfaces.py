@@ -32,8 +32,7 @@ _SAMPLERS = (
     "surface_color",
     "opaque_axial_depth",
     "opaque_radiance",
-    "surface_table",
-    "traced_bodies",
+    "object_table",
     "hierarchy_nodes",
     "hierarchy_triangles",
     "reflectance_table",
@@ -92,11 +91,10 @@ class TracedInterfacesPass:
             if not job.covered or (job.bent_apart and not job.bending and mirror is None):
                 return
         hierarchies = job.resources.hierarchies.of(job.scene)
-        rows, frame = hierarchies.place(job.scene, media_center(job.scene), job.features.sheets)
+        placements, frame = hierarchies.place(job.scene, media_center(job.scene))
         diffused = job.diffused_light
-        contents = job.surface_rows, rows
-        tables = [gl.texture(table.shape[1::-1], 4, table, dtype="f4") for table in contents]
-        self._bind(job, hierarchies, *tables)
+        table = job.object_table(placements)
+        self._bind(job, hierarchies, table)
         if diffused is not None:
             diffused.texture.use(_UNITS["diffused_light"])
         job.resources.shadows.use(_UNITS)
@@ -126,8 +124,7 @@ class TracedInterfacesPass:
         if mirror is not None and not job.bending:
             self._draw_mirrored(job, mirror, framebuffer, program)
         gl.enable_only(blending)
-        for table in tables:
-            table.release()
+        table.release()
 
     def _mark_unsettled(self, job: FrameJob, framebuffer: moderngl.Framebuffer) -> None:
         """Leave a depth test that passes where an interface is seen in a pixel that needs more samples."""
@@ -196,8 +193,7 @@ class TracedInterfacesPass:
         self,
         job: FrameJob,
         hierarchies: SceneHierarchies,
-        surface_rows: moderngl.Texture,
-        traced_rows: moderngl.Texture,
+        table: moderngl.Texture,
     ) -> None:
         environment = job.scene.environment
         environments = job.resources.environments
@@ -207,8 +203,7 @@ class TracedInterfacesPass:
             "emitted_radiance_sum": emitted,
             "straight_transmittance": through,
             **dict(zip(_ENTERED, job.targets.entered().color_attachments, strict=True)),
-            "surface_table": surface_rows,
-            "traced_bodies": traced_rows,
+            "object_table": table,
             "hierarchy_nodes": hierarchies.nodes,
             "hierarchy_triangles": hierarchies.triangles,
             "reflectance_table": self._reflectance,

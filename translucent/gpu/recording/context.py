@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from translucent.geometry.mesh import Mesh
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.layout import BLOCKS, BODY, SURFACE_ROW
+from translucent.gpu.layout import BLOCKS, BODY
 from translucent.gpu.lifting import lift
 from translucent.gpu.recording.objects import (
     RecordedArray,
@@ -268,8 +268,7 @@ def _es(text: str) -> tuple[str, tuple[str, ...]]:
 def _merged(text: str, defines: Mapping[str, int]) -> tuple[str, tuple[str, ...]]:
     """A shader whose textures of one kind are put together, and the names of those that follow others.
 
-    Triangles follow the nodes of hierarchies, bodies the surfaces in a row of their table; and an environment that is
-    seen is the one that lights, where it is.
+    Triangles follow the nodes of hierarchies; and an environment that is seen is the one that lights, where it is.
     """
     merged: list[str] = []
     if _declares(text, "hierarchy_triangles"):
@@ -277,15 +276,6 @@ def _merged(text: str, defines: Mapping[str, int]) -> tuple[str, tuple[str, ...]
         text = re.sub(r"^uniform usampler2D hierarchy_triangles;", _TRIANGLE_ROW, text, flags=re.MULTILINE)
         found = "texelFetch(hierarchy_triangles, "
         text = text.replace(found, "texelFetch(hierarchy_nodes, ivec2(0, hierarchy_triangle_row) + ")
-    if _declares(text, "traced_bodies") and _declares(text, "surface_table"):
-        merged.append("traced_bodies")
-        texels = SURFACE_ROW.dtype.itemsize // 16
-        text = _declared_first(_without(text, "traced_bodies"), "surface_table")
-        text = re.sub(
-            r"texelFetch\(traced_bodies, ivec2\((\d+), row\), 0\)",
-            lambda found: f"texelFetch(surface_table, ivec2({int(found[1]) + texels}, row), 0)",
-            text,
-        )
     if defines.get("SEEN_LIGHTS") and _declares(text, "light_map") and _declares(text, "seen_map"):
         text = _declared_first(_without(text, "seen_map"), "light_map", "#define seen_map light_map\n")
     return text, tuple(merged)

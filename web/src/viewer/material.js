@@ -2,6 +2,8 @@
 
 const BLACKEST = 1e-5;
 const MOST_DEPTH = 1e30;
+/** Types of objects, as the table of objects numbers them. */
+const THIN_WALL = 1, ABSORBER = 4;
 const USUAL_IOR = 1.5, USUAL_ROUGHNESS = 0.5;
 
 const linearOf = (x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
@@ -123,17 +125,18 @@ export class Materials {
     if (medium != null) fields.extinction.set(this.#bounded(medium));
   }
 
-  /** Write an object's row of the table of surfaces. */
-  writeSurface(row, object) {
+  /** Write an object's row of the table of objects. */
+  writeObject(row, object) {
     const medium = this.#editable(object);
     if (medium == null) return;
-    const { ior } = this.media[medium];
+    const { ior, roughness, changed } = this.media[medium];
     const sigma = this.#bounded(medium);
-    const sheet = this.page.scene.objects[object].sheet ?? 0;
+    const metres = row.type[0] === THIN_WALL || row.type[0] === ABSORBER ? this.page.scene.objects[object].sheet ?? 1 : 1;
+    row.extinction.set(sigma.map((x) => metres * x));
     row.ior[0] = ior;
-    if (row.is_sheet[0]) row.sheet_depth.set(sigma.map((x) => x * sheet));
     row.stream_absorption.set(sigma.map((x) => 2 * x));
     row.inner_mirror[0] = this.#innerMirror(ior);
+    if (changed) row.roughness[0] = roughness;
   }
 
   #innerMirror(ior) {
@@ -141,17 +144,6 @@ export class Materials {
     const at = ((ior - 1) / 2) * (values.length - 1);
     const i = Math.min(Math.floor(at), values.length - 2);
     return values[i] + (at - i) * (values[i + 1] - values[i]);
-  }
-
-  /** Write an object's row of the table of bodies that rays are traced through. */
-  writeTraced(row, object) {
-    const medium = this.#editable(object);
-    if (medium == null) return;
-    const { ior, roughness } = this.media[medium];
-    const metres = row.type[0] === 1 || row.type[0] === 4 ? this.page.scene.objects[object].sheet ?? 1 : 1;
-    row.extinction.set(this.#bounded(medium).map((x) => metres * x));
-    row.ior[0] = ior;
-    if (this.media[medium].changed) row.roughness[0] = roughness;
   }
 }
 

@@ -192,7 +192,7 @@ export class Player {
       gl.activeTexture(gl.TEXTURE0 + unit);
       if (name === "hierarchy_nodes" && step.merged.hierarchy_triangles != null) {
         gl.bindTexture(gl.TEXTURE_2D, this.#hierarchies(number).texture);
-      } else if (name === "surface_table") {
+      } else if (name === "object_table") {
         gl.bindTexture(gl.TEXTURE_2D, this.#table(step, key, material));
       } else {
         gl.bindTexture(this.#bindingOf(number), this.#texture(number, size));
@@ -398,35 +398,27 @@ export class Player {
     return (this.tree = { number, texture, triangleRow, spans });
   }
 
-  /** Table of the surfaces, and of the bodies that rays are traced through, if they are, beside it. */
+  /** Table of the objects, with the places of their hierarchies where rays are traced. */
   #table(step, key, material) {
     const { gl, page } = this;
-    const traced = step.merged.traced_bodies;
-    const surfaces = page.textures[step.textures.surface_table];
-    const bodies = traced == null ? null : page.textures[traced];
-    const name = `table ${step.textures.surface_table} ${traced} ${material.tableKey}`;
+    const number = step.textures.object_table, traced = step.textures.hierarchy_nodes != null;
+    const name = `table ${number} ${traced} ${material.tableKey}`;
     if (this.table?.name === name) return this.table.texture;
     if (this.table) gl.deleteTexture(this.table.texture);
-    const [texels, rows] = surfaces.size;
-    const width = texels + (bodies ? bodies.size[0] : 0);
-    const joined = new Float32Array(4 * width * rows);
-    const left = page.sections[surfaces.content], right = bodies && page.sections[bodies.content];
+    const { size: [width, rows], content } = page.textures[number];
+    const table = Float32Array.from(page.sections[content]);
     for (let row = 0; row < rows; row++) {
-      joined.set(left.subarray(4 * texels * row, 4 * texels * (row + 1)), 4 * width * row);
-      const own = fieldsOf(page.layout.tables.SurfaceRow, joined.buffer, 16 * width * row);
-      material.writeSurface(own, row);
-      if (!bodies) continue;
-      joined.set(right.subarray(4 * bodies.size[0] * row, 4 * bodies.size[0] * (row + 1)), 4 * (width * row + texels));
-      const body = fieldsOf(page.layout.tables.TracedBody, joined.buffer, 16 * (width * row + texels));
+      const fields = fieldsOf(page.layout.tables.ObjectRow, table.buffer, 16 * width * row);
+      material.writeObject(fields, row);
+      if (!traced) continue;
       const span = this.#hierarchies(step.textures.hierarchy_nodes).spans[page.hierarchies.meshes.indexOf(page.scene.objects[row].mesh)];
-      body.first_node.set([Math.floor(span.first / 4096), span.first % 4096]);
-      body.node_count.set([Math.floor(span.count / 4096), span.count % 4096]);
-      material.writeTraced(body, row);
+      fields.first_node.set([Math.floor(span.first / 4096), span.first % 4096]);
+      fields.node_count.set([Math.floor(span.count / 4096), span.count % 4096]);
     }
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, width, rows);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, rows, gl.RGBA, gl.FLOAT, joined);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, rows, gl.RGBA, gl.FLOAT, table);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     this.table = { name, texture };
