@@ -24,6 +24,9 @@ from translucent.assets import mesh_path
 from translucent.errors import TranslucentError
 from translucent.geometry.solids import Box, Sphere, Torus
 
+#: Scenes that frames go through again and again when memory is measured: each has its programs, which stay.
+DISTINCT = 40
+
 #: Largest difference between pictures of one scene, as a share of the largest value of the array.
 SAME = 1e-7
 
@@ -231,7 +234,7 @@ def grow(frames: int, renderers: int, backend: str | None) -> None:
     """Print the memory over frames of one renderer, and over renderers."""
     with tl.Renderer(backend) as renderer:
         for number in range(frames):
-            random = np.random.default_rng((1, number % 500))
+            random = np.random.default_rng((1, number % DISTINCT))
             draw(renderer, random_scene(random), random_options(random))
             if (number + 1) % 500 == 0:
                 print(f"{number + 1} frames: {memory():.0f} MB", flush=True)
