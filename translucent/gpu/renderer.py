@@ -231,6 +231,11 @@ class GpuRenderer:
                 self._passes.clear()
                 self._present = self._adaptive = None
                 self.context.drain()
+        elif self.context.owned:
+            # Released while a query runs, or while its threads draw, the context of llvmpipe corrupts the heap.
+            with self.context.current():
+                self._timer.stop()
+                self.context.gl.finish()
         if self._abandoned is not None:
             self._abandoned()
 
