@@ -133,6 +133,94 @@ Path path_of(vec2 sum, float advance) {
 #endif
 #endif
 
+// What passes before have found along a ray.
+struct Found {
+    Path path;
+    vec3 emitted;  // radiance
+    bool valid;
+    bool covered;  // a medium was crossed
+};
+
+Found found_along(ivec2 texel, float advance) {
+    Found found;
+    found.emitted = vec3(0.0);
+#if ACCUMULATED
+    found.path = PATH_OF(accumulated, accumulated_path);
+#else
+    found.path = Path(0.0, vec3(0.0), 0.0);
+#endif
+#if ORDERED
+    vec4 ordered = texelFetch(ordered_depth, texel, 0);
+    vec4 emitted_and_thickness = texelFetch(ordered_emitted, texel, 0);
+    // Thin walls have no place in the order: they dim all of it.
+    found.emitted = emitted_and_thickness.rgb * transmittance(found.path.optical_depth);
+    found.path.optical_depth += ordered.rgb;
+    found.path.thickness += emitted_and_thickness.a;
+    bool balanced = ordered.a == 1.0 && texelFetch(ordered_layers, texel, 0).b <= rounding;
+    float misplaced = 0.0;
+#else
+    bool balanced = is_balanced(found.path.count);
+    float misplaced = misplaced_length(found.path.count, advance);
+#endif
+    found.valid = balanced && is_length(found.path.thickness, misplaced);
+    found.covered = found.path.thickness > coverage_floor || !found.valid;
+    if (!found.valid) {
+#if FALLBACK
+        found.path = PATH_OF(fallback, fallback_path);
+#else
+        found.path = Path(0.0, vec3(0.0), 0.0);
+#endif
+        found.emitted = vec3(0.0);
+    }
+    found.path.thickness = max(found.path.thickness, 0.0);
+    found.path.optical_depth = max(found.path.optical_depth, vec3(0.0));
+    return found;
+}
+
+#if MAP
+void write(Found found, vec2 pixel, vec3 ray, ivec2 texel, float advance) {
+#if OPAQUE
+    float end = texelFetch(opaque_axial_depth, texel, 0).r;
+#else
+    const float end = NOTHING;
+#endif
+    out_sums = vec4(found.path.optical_depth / advance, 0.0);
+    out_end = end < NOTHING ? corner_and_ahead.z + end * corner_and_ahead.w : NOTHING;
+}
+#else
+void write(Found found, vec2 pixel, vec3 ray, ivec2 texel, float advance) {
+    Path path = found.path;
+    vec3 through = transmittance(path.optical_depth), emitted = found.emitted;
+#if EMISSION
+    emitted = emitted_radiance(emission.rgb, extinction.rgb, path.thickness);
+#endif
+#if SURFACES
+    // What is behind is added where rays are refracted.
+    out_radiance = vec4(emitted, 1.0);
+#else
+    out_radiance = vec4(background(pixel, ray, texel) * through + emitted, 1.0);
+#endif
+#if COMPACT
+    // The larger of -0 and 0 may be either.
+    out_marked_thickness = uintBitsToFloat((floatBitsToUint(path.thickness) & 0x7fffffffu) | (found.valid ? 0u : 0x80000000u));
+#if SPECTRAL
+    out_optical_depth = vec4(path.optical_depth, 1.0);
+#endif
+#else
+    out_transmittance = vec4(through, 1.0);
+#if !AVERAGE
+    out_optical_depth = vec4(path.optical_depth, 1.0);
+    out_thickness = path.thickness;
+#if UNLIT
+    // Thickness and transmittance are as right as ever, and stay; radiance is not.
+    found.valid = found.valid && PATH_OF(unlit, unlit_path).thickness <= coverage_floor;
+#endif
+    out_flags = ((found.covered ? FLAG_COVERED : 0.0) + (found.valid ? FLAG_VALID : 0.0)) / 255.0;
+#endif
+#endif
+}
+#endif
+
 void main() {
 #if MAP
     vec2 place = gl_FragCoord.xy - corner_and_ahead.xy;
@@ -149,76 +237,5 @@ void main() {
 #else
     float advance = length(ray);
 #endif
-
-#if ACCUMULATED
-    Path path = PATH_OF(accumulated, accumulated_path);
-#else
-    Path path = Path(0.0, vec3(0.0), 0.0);
-#endif
-    vec3 emitted = vec3(0.0);
-#if ORDERED
-    vec4 ordered = texelFetch(ordered_depth, texel, 0);
-    vec4 emitted_and_thickness = texelFetch(ordered_emitted, texel, 0);
-    // Sheets have no place in the order: they dim all of it.
-    emitted = emitted_and_thickness.rgb * transmittance(path.optical_depth);
-    path.optical_depth += ordered.rgb;
-    path.thickness += emitted_and_thickness.a;
-    bool balanced = ordered.a == 1.0 && texelFetch(ordered_layers, texel, 0).b <= rounding;
-    float misplaced = 0.0;
-#else
-    bool balanced = is_balanced(path.count);
-    float misplaced = misplaced_length(path.count, advance);
-#endif
-    bool valid = balanced && is_length(path.thickness, misplaced);
-    bool covered = path.thickness > coverage_floor || !valid;
-    if (!valid) {
-#if FALLBACK
-        path = PATH_OF(fallback, fallback_path);
-#else
-        path = Path(0.0, vec3(0.0), 0.0);
-#endif
-        emitted = vec3(0.0);
-    }
-    path.thickness = max(path.thickness, 0.0);
-    path.optical_depth = max(path.optical_depth, vec3(0.0));
-
-#if MAP
-#if OPAQUE
-    float end = texelFetch(opaque_axial_depth, texel, 0).r;
-#else
-    const float end = NOTHING;
-#endif
-    out_sums = vec4(path.optical_depth / advance, 0.0);
-    out_end = end < NOTHING ? corner_and_ahead.z + end * corner_and_ahead.w : NOTHING;
-#else
-    vec3 through = transmittance(path.optical_depth);
-#if EMISSION
-    emitted = emitted_radiance(emission.rgb, extinction.rgb, path.thickness);
-#endif
-#if SURFACES
-    // What is behind is added where rays are bent.
-    out_radiance = vec4(emitted, 1.0);
-#else
-    out_radiance = vec4(background(pixel, ray, texel) * through + emitted, 1.0);
-#endif
-#if COMPACT
-    // The larger of -0 and 0 may be either.
-    out_marked_thickness = uintBitsToFloat((floatBitsToUint(path.thickness) & 0x7fffffffu) | (valid ? 0u : 0x80000000u));
-#if SPECTRAL
-    out_optical_depth = vec4(path.optical_depth, 1.0);
-#endif
-#else
-    out_transmittance = vec4(through, 1.0);
-#if !AVERAGE
-    out_optical_depth = vec4(path.optical_depth, 1.0);
-    out_thickness = path.thickness;
-#if UNLIT
-    float in_the_dark = PATH_OF(unlit, unlit_path).thickness;
-    // Thickness and transmittance are as right as ever, and stay; radiance is not.
-    valid = valid && in_the_dark <= coverage_floor;
-#endif
-    out_flags = ((covered ? FLAG_COVERED : 0.0) + (valid ? FLAG_VALID : 0.0)) / 255.0;
-#endif
-#endif
-#endif
+    write(found_along(texel, advance), pixel, ray, texel, advance);
 }

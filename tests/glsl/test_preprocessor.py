@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -159,3 +160,10 @@ def test_a_record_of_a_table_reads_as_it_was_packed(renderer: tl.Renderer, table
 def test_a_record_wants_all_its_fields() -> None:
     with pytest.raises(KeyError, match=r"packed table ObjectRow: .*'extinction'"):
         TABLES["ObjectRow"].pack([{"ior": 1.5}])
+
+
+def test_no_function_of_a_shader_is_long() -> None:
+    """At most 80 lines: a formula, or a step of an algorithm."""
+    for path in sorted((Path(__file__).parents[2] / "shaders").rglob("*.*")):
+        for found in re.finditer(r"^\w+ (\w+)\([^)]*\) \{\n(.*?)^\}", path.read_text(), re.MULTILINE | re.DOTALL):
+            assert found[2].count("\n") < 79, f"{path.name}: {found[1]}"

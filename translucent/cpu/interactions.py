@@ -9,18 +9,20 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.caster import Caster, dot, unit
 from translucent.cpu.interior_list import Branches
 from translucent.formulas import optics
-from translucent.formulas.interface import (
-    CLEARCOAT_IOR,
-    ggx_distribution,
-    ggx_visibility,
-    reflected_direction,
-    refracted_direction,
+from translucent.formulas.bsdf import (
+    Lobes,
+    below_coat,
+    diffuse_radiance,
+    interface_lobes,
+    kept_on_side,
+    microfacet_value,
+    thin_wall_exitance,
 )
-from translucent.formulas.thin_film import film_slab_reflectance, film_slab_transmittance
+from translucent.formulas.interface import CLEARCOAT_IOR, reflected_direction, refracted_direction
 from translucent.reference.interfaces import EDGE_ON, Optics
 from translucent.reference.rays import Rays
 from translucent.reference.surface_light import SurfaceLight
@@ -206,6 +208,7 @@ class Interfaces:
         media = [body.medium for body in own.scene.objects]
         self.extinction = np.array([np.zeros(3) if m is None else m.extinction for m in media])
         self.emission = np.stack([own.scene.source(body) for body in own.scene.objects])
+        self.films = films_of(own)
 
     def interact(
         self, branches: Branches, places: InterfaceHits, pixel: Integers, spread: Spread | None
@@ -226,29 +229,25 @@ class Interfaces:
                 directions[rough], normals[rough], facets[rough], ior[rough], alpha[rough]
             )
         cosine = _facing(directions, facets)
-        bare, share = share[:, None], own.filmed(share, places.item, places.before, cosine, ior)
-        passed, emitted = 1.0 - share, np.zeros((len(branches), 3))
-        refracted = _towards(refracted_direction(directions, facets, ior), -flat)
-        chosen = np.flatnonzero(sheet)
-        if chosen.size:
-            share[chosen], passed[chosen], emitted[chosen] = self._slabs(
-                places.item[chosen], share[chosen], bare[chosen], cosine[chosen], ior[chosen]
-            )
-            refracted[chosen] = directions[chosen]
+        lobes, emitted = self._lobes(places, share, cosine, ior, sheet)
         enters = sheet | (places.item == places.after)
-        coated = own.coated(places.item, enters, _facing(directions, normals))[:, None]
-        share, passed, emitted = (1.0 - coated) * share, (1.0 - coated) * passed, (1.0 - coated) * emitted
+        coat = np.where(enters, own.coats[places.item], 0.0)
+        coated = (coat * optics.fresnel_dielectric(_facing(directions, normals), CLEARCOAT_IOR))[:, None]
+        lobes, emitted = below_coat(lobes, coated), (1.0 - coated) * emitted
         alike = self.coat_roughness[places.item] ** 2 == alpha
-        share = share + np.where(alike[:, None], coated, 0.0)
+        reflectance = lobes.reflection + np.where(alike[:, None], coated, 0.0)
         tint = np.where(enters[:, None], self.color[places.item], 1.0) * self.transmission[places.item, None]
-        reflected = _towards(reflected_direction(directions, facets), flat)
+        reflected = kept_on_side(reflected_direction(directions, facets), flat)
+        refracted = kept_on_side(refracted_direction(directions, facets, ior), -flat)
+        refracted = np.where(sheet[:, None], directions, refracted)
         blurred = (1.0 if spread is None else spread.blurred) * alpha * alpha
         # A facet turns a mirror image by twice its angle, which a ray that leaves magnifies; refraction, seen from
         # outside, turns it by n - 1 times that.
         wide = np.where(ior < 1.0, 1.0 / ior, 1.0)
         narrow = 0.5 * (np.maximum(ior, 1.0 / ior) - 1.0)
         # Light goes straight on through a sheet: its two interfaces do no more than to blur.
-        shares, narrow_blur = (share, passed, passed * tint, emitted), np.where(sheet, 2.0 * alpha * alpha, blurred)
+        shares = reflectance, lobes.transmission, lobes.transmission * tint, emitted
+        narrow_blur = np.where(sheet, 2.0 * alpha * alpha, blurred)
         return InterfaceInteractions(
             places.item,
             places.before,
@@ -261,27 +260,25 @@ class Interfaces:
             blurred * wide**2,
             narrow_blur * narrow**2,
             np.where(alike, 0.0, coated[:, 0]),
-            np.where(enters, own.coats[places.item], 0.0),
+            coat,
             self.coat_roughness[places.item],
         )
 
-    def _slabs(
-        self, item: Integers, front: Array, bare: Array, cosine: Array, ior: Array
-    ) -> tuple[Array, Array, Array]:
-        """Reflectance, transmittance and emitted radiance (k, 3) of sheets.
-
-        Their surfaces reflect `front` (k, 3), which has a film, and `bare` (k, 1).
-        """
+    def _lobes(self, places: InterfaceHits, bare: Array, cosine: Array, ior: Array, sheet: Mask) -> tuple[Lobes, Array]:
+        """Lobes of interfaces that reflect `bare` (k,), and the radiance (k, 3) that thin walls emit."""
+        item = places.item
         path = optics.thin_layer_thickness(self.metres[item], cosine, ior)[:, None]
         with np.errstate(over="ignore", under="ignore"):
             depth = self.extinction[item] * path
-            again = bare * optics.transmittance(depth)
-            kept = 1.0 - front * optics.transmittance(depth) * again
-            # What a sheet emits goes back and forth in it, too.
-            leaving = np.where(kept > 0.0, (1.0 - front) * (1.0 + again) / np.where(kept > 0.0, kept, 1.0), 0.0)
-            emitted = leaving * optics.emitted_radiance(self.emission[item], self.extinction[item], path)
-            back, on = (f(front, bare[:, 0], depth) for f in (film_slab_reflectance, film_slab_transmittance))
-        return back, on, emitted
+            lobes, front = interface_lobes(
+                bare, cosine, ior, self.films[item], self.own.iors[places.before], sheet, depth
+            )
+            emitted = np.zeros((len(item), 3))
+            if (wall := np.flatnonzero(sheet)).size:
+                leaving = thin_wall_exitance(front[wall], bare[wall], depth[wall])
+                own = optics.emitted_radiance(self.emission[item[wall]], self.extinction[item[wall]], path[wall])
+                emitted[wall] = leaving * own
+        return lobes, emitted
 
     def _normals(self, face: Integers, branches: Branches) -> tuple[Array, Array]:
         """Unit normals (k, 3) against the branches: for shading, and of the faces."""
@@ -329,10 +326,9 @@ def _facing(directions: Array, normals: Array) -> Array:
     return np.clip(-dot(normals, directions), 0.0, 1.0)
 
 
-def _towards(directions: Array, side: Array) -> Array:
-    """Directions (k, 3), reflected to the `side` (k, 3) of a face where other normals mislead them."""
-    across = np.minimum(dot(directions, side), 0.0)
-    return np.asarray(directions - 2.0 * across[:, None] * side)
+def films_of(own: Optics) -> Array:
+    """(objects, 3): thin films of the surfaces of a scene, as `filmed_reflectance` takes them."""
+    return np.array([(s.iridescence, s.iridescence_ior, s.iridescence_thickness) for s in own.surfaces], np.float64)
 
 
 class InterfaceLight:
@@ -361,6 +357,7 @@ class InterfaceLight:
             ]
         )
         self._is_sheet = np.array([metres is not None for metres in own.sheets])
+        self._films = films_of(own)
 
     def radiance(self, rays: Rays, met: InterfaceInteractions) -> Array:
         """(k, 3): radiance at the origins of rays, in metres from the eye, against their directions."""
@@ -380,11 +377,11 @@ class InterfaceLight:
         share = met.passed * self._diffuse[met.item, None]
         painted = np.flatnonzero((share > 0.0).any(axis=1))
         item, points, normals = met.item[painted], rays.origins[painted], met.normals[painted]
-        through = self._through[item, None]
+        through = self._through[item]
         front, back = (self.light.on_interfaces(points, side * normals) for side in (1.0, -1.0))
         with np.errstate(under="ignore"):
-            light = self._color[item] * (1.0 - through) * front + through * self._through_color[item] * back
-            found[painted] += share[painted] / np.pi * light
+            behind = through[:, None] * self._through_color[item]
+            found[painted] += share[painted] * diffuse_radiance(front, back, self._color[item], behind, through)
 
     def _add_highlights(
         self, found: Array, rays: Rays, met: InterfaceInteractions, rough: Integers, alpha: Array, below: Array | None
@@ -409,9 +406,9 @@ class InterfaceLight:
                 )
             else:
                 share = below[:, None] * self._mirrored(met, rough, cos_facet)
-            density, visible = ggx_distribution(cos_half, alpha), ggx_visibility(cos_light, cos_view, alpha)
+            value = microfacet_value(cos_half, cos_light, cos_view, alpha)
             with np.errstate(under="ignore"):
-                mirrored = share * (density * visible)[:, None] * light.irradiance_on(points, normals)
+                mirrored = share * value[:, None] * light.irradiance_on(points, normals)
                 lit = np.flatnonzero(mirrored.any(axis=1))
                 found[rough[lit]] += mirrored[lit] * self.light.to_interfaces(light, points[lit])
 
@@ -419,11 +416,11 @@ class InterfaceLight:
         """(k, 3): share of light that microfacets of `rough` interfaces mirror, those of sheets from both sides."""
         item, ior = met.item[rough], met.ior[rough]
         bare = optics.fresnel_dielectric(cosine, ior)
-        share = self.own.filmed(bare, item, met.before[rough], cosine, ior)
-        path = optics.thin_layer_thickness(1.0, cosine, ior)[:, None]
+        before = self.own.iors[met.before[rough]]
         with np.errstate(over="ignore"):
-            depth = self._depth[item] * path
-        return np.where(self._is_sheet[item, None], film_slab_reflectance(share, bare, depth), share)
+            depth = self._depth[item] * optics.thin_layer_thickness(1.0, cosine, ior)[:, None]
+        lobes, _ = interface_lobes(bare, cosine, ior, self._films[item], before, self._is_sheet[item], depth)
+        return lobes.reflection
 
 
 def _cosines(rays: Rays, met: InterfaceInteractions, chosen: Integers) -> Array:
