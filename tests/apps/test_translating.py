@@ -19,8 +19,8 @@ from tests import webgpu
 from tests.hosts import BODY, RESOLVE, SUM, Host
 from tests.twins import ARGUMENTS, assert_equals_twin
 from translucent.assets import shader_library
-from translucent.commands import shader
 from translucent.commands.shader import NAGA, Language, translate
+from translucent.gpu import lifting
 from translucent.gpu.layout import BLOCKS
 from translucent.gpu.lifting import lift
 from translucent.gpu.probe import signatures
@@ -239,7 +239,7 @@ def test_what_a_translator_refuses_is_told_in_its_words(
 ) -> None:
     glslang()
     wrong = dataclasses.replace(lift(*STAGES["full"], "vulkan"), text="#version 450 core\nvoid main() { nothing(); }\n")
-    monkeypatch.setattr(shader, "lift", lambda *_: wrong)
+    monkeypatch.setattr(lifting, "lift", lambda *_: wrong)
     with pytest.raises(tl.InputError, match=f"'a.frag' in (HLSL|WGSL); {said}.*; take another target"):
         translate("a.frag", {}, language)
 
