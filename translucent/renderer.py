@@ -22,7 +22,7 @@ from translucent.gpu.renderer import GpuRenderer
 from translucent.planning.caustics import Caustics
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
-from translucent.planning.notes import NoteKind
+from translucent.planning.passes import NoteKind
 from translucent.planning.plan import plan_scene
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.request import RenderRequest

@@ -23,7 +23,7 @@ from tests.command_line import Run, one_error_line, strict_json
 from translucent.gpu.recording.frames import FrameRecorder
 from translucent.page.payload import MAGIC, Container
 from translucent.page.plans import TEXTURE_UNITS, plan_page, simplified, triangles
-from translucent.planning.notes import NoteKind
+from translucent.planning.passes import NoteKind
 from translucent.planning.request import RenderRequest
 from translucent.scene.showcase import showcase
 

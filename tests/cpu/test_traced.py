@@ -19,7 +19,7 @@ from translucent.cpu.ray_tree import DiffusedLight, RayTree, TracedLight
 from translucent.cpu.renderer import CpuRenderer
 from translucent.formulas.interface import slab_reflectance, slab_transmittance
 from translucent.geometry.solids import Box, Sphere
-from translucent.planning.notes import NoteKind
+from translucent.planning.passes import NoteKind
 from translucent.planning.plan import plan_scene
 from translucent.planning.rendered import Treatment
 from translucent.planning.request import RenderRequest

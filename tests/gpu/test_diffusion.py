@@ -15,9 +15,9 @@ from translucent.assets import mesh_path
 from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.formulas.diffuse_interface import half_space_reflectance
 from translucent.geometry.solids import Box, Sphere, Torus
-from translucent.planning.notes import NoteKind
+from translucent.planning import scattering as diffusion
+from translucent.planning.passes import NoteKind
 from translucent.planning.rendered import Treatment
-from translucent.planning.scattering import diffusion
 
 BALL = Sphere().tessellate(48)
 CAMERA = tl.Camera.look_at((1.0, 0.8, 4.0), (0, 0, 0), fov_y=30.0)

@@ -9,7 +9,7 @@ import pytest
 
 import translucent as tl
 from translucent.geometry.solids import Box, Sphere
-from translucent.planning.photon_aims import photon_aims
+from translucent.planning.caustics import photon_aims
 
 CLEAR = tl.Medium(1.0, ior=1.5)
 SUN, LAMP = tl.DirectionalLight((0, -1, 0), (1.0, 2.0, 3.0)), tl.PointLight((0.5, 6, 0.5), 2.0)

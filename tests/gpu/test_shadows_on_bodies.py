@@ -13,7 +13,7 @@ import trimesh
 
 import translucent as tl
 from translucent.geometry.solids import Box, Sphere
-from translucent.planning.notes import NoteKind
+from translucent.planning.passes import NoteKind
 from translucent.planning.plan import plan
 
 SIZE = (48, 36)

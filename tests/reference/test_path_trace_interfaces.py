@@ -15,7 +15,7 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Sphere, Torus
 from translucent.media.density import LinearDensity
 from translucent.media.medium import Medium
-from translucent.planning.notes import NoteKind
+from translucent.planning.passes import NoteKind
 from translucent.reference import path_trace, refracted_light, render
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment

@@ -14,8 +14,8 @@ from tests.values.gltf_writer import Writer, glass
 from tests.values.plan_scenes import BOX, CAMERA, DIAMOND, GLASS, OPEN, WINE, body
 from tests.work import calls
 from translucent.geometry import mesh as meshes
+from translucent.planning.bodies import medium_slots
 from translucent.planning.plan import plan
-from translucent.planning.slots import medium_slots
 from translucent.scene import scene as overlaps
 from translucent.scene.scene import first_overlap
 from translucent.scene.showcase import filled

@@ -9,8 +9,7 @@ import pytest
 
 import translucent as tl
 from translucent.geometry.solids import Box
-from translucent.planning.notes import NoteKind
-from translucent.planning.passes import PassName
+from translucent.planning.passes import NoteKind, PassName
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
 from translucent.planning.rendered import Treatment

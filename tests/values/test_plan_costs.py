@@ -27,8 +27,7 @@ from tests.values.plan_scenes import (
 )
 from translucent.planning.assembly import COSTS
 from translucent.planning.methods import METHODS
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import RenderPlan
 

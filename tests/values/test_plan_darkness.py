@@ -10,7 +10,7 @@ import pytest
 import translucent as tl
 from tests.values.plan_scenes import BOX, body, scene
 from translucent.assets import mesh_path
-from translucent.planning.notes import NoteKind
+from translucent.planning.passes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
 

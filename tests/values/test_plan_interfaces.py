@@ -22,11 +22,8 @@ from tests.values.plan_scenes import (
     scene,
     sheet,
 )
-from translucent.planning.interfaces import INTERFACES, Interfaces
-from translucent.planning.interfaces.front import ONE_INTERFACE
-from translucent.planning.interfaces.traced import TRACE_COST
-from translucent.planning.notes import NoteKind
-from translucent.planning.passes import PassName
+from translucent.planning.interfaces import INTERFACES, ONE_INTERFACE, TRACE_COST, Interfaces
+from translucent.planning.passes import NoteKind, PassName
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
 

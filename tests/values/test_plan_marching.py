@@ -9,9 +9,9 @@ import pytest
 
 import translucent as tl
 from tests.values.plan_scenes import FIRE, NO_STORAGE, WINE, body, names, scene
+from translucent.planning.bodies import medium_slots
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
-from translucent.planning.slots import medium_slots
 
 
 def test_marching_goes_through_the_lists() -> None:

@@ -23,9 +23,8 @@ from tests.values.plan_scenes import (
     scene,
     sheet,
 )
-from translucent.planning.interfaces.front import ONE_INTERFACE
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName
+from translucent.planning.interfaces import ONE_INTERFACE
+from translucent.planning.passes import Note, NoteKind, PassName
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities, RenderPlan
 

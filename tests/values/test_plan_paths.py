@@ -10,8 +10,7 @@ import pytest
 import translucent as tl
 from tests.values.plan_scenes import plan_over_backdrop
 from translucent.geometry.solids import Box
-from translucent.planning.notes import NoteKind
-from translucent.planning.passes import PassName
+from translucent.planning.passes import NoteKind, PassName
 from translucent.planning.plan import plan
 from translucent.scene.surface import Surface
 

@@ -13,12 +13,12 @@ from tests.values.plan_scenes import BOX, GLASS, MILK, NO_STORAGE, OPEN, body, m
 from translucent.bench.shapes import joined
 from translucent.diffusion.keys import diffusion_key
 from translucent.geometry.solids import Box, Sphere
-from translucent.planning.notes import NoteKind
+from translucent.planning.bodies import MAX_SLOTS
+from translucent.planning.passes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
 from translucent.planning.rendered import Treatment, scatterer_of, treatment_of
-from translucent.planning.slots import MAX_SLOTS
-from translucent.planning.treatments import LEAST_DEPTH, MOST_CELL_DEPTH, MOST_DIFFUSED, choose_treatments
+from translucent.planning.scattering import LEAST_DEPTH, MOST_CELL_DEPTH, MOST_DIFFUSED, choose_treatments
 
 WAX = tl.Medium(absorption=0.1, scattering=5.0, ior=1.4)
 LIT = [tl.PointLight((0, 0, 5), (1, 1, 1))]

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 import translucent as tl
-from translucent.planning.slots import MAX_SLOTS, medium_slots, overlapping_pair, require_clear_priorities, same_medium
+from translucent.planning.bodies import MAX_SLOTS, medium_slots, overlapping_pair, require_clear_priorities, same_medium
 
 _BOX = trimesh.creation.box((1, 1, 1))
 BOX = tl.Mesh(_BOX.vertices, _BOX.faces, name="box")

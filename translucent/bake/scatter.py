@@ -45,7 +45,7 @@ from translucent.geometry.mesh import Mesh
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.file import GltfFile, write_gltf
 from translucent.media.medium import Medium
-from translucent.planning.treatments import LEAST_DEPTH
+from translucent.planning.scattering import LEAST_DEPTH
 from translucent.scene.scene import Object
 from translucent.scene.surface import Surface
 

@@ -34,8 +34,7 @@ from translucent.planning.methods import (
 )
 from translucent.planning.methods.depth_peeling import MAX_LAYERS
 from translucent.planning.methods.ray_marched import Quadrature
-from translucent.planning.notes import NoteKind
-from translucent.planning.passes import PassName
+from translucent.planning.passes import NoteKind, PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
 from translucent.renderer import Renderer

@@ -38,7 +38,7 @@ from translucent.media.density import DensityGrid
 from translucent.media.medium import Medium
 from translucent.planning.methods import DepthPeeling, FragmentLists, KBuffer, Method, SignedDepth
 from translucent.planning.methods.depth_peeling import MAX_LAYERS
-from translucent.planning.notes import NoteKind
+from translucent.planning.passes import NoteKind
 from translucent.renderer import Renderer
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment

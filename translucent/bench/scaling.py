@@ -26,9 +26,9 @@ from translucent.errors import TranslucentError
 from translucent.geometry.solids import Sphere
 from translucent.gpu.targets import Targets
 from translucent.media.medium import Medium
+from translucent.planning.bodies import MAX_SLOTS
 from translucent.planning.methods import DepthPeeling, FragmentLists, KBuffer, Method, SignedDepth
 from translucent.planning.methods.depth_peeling import MAX_LAYERS
-from translucent.planning.slots import MAX_SLOTS
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene

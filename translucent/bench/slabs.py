@@ -33,8 +33,7 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box
 from translucent.media.medium import Medium
 from translucent.planning.rendered import Treatment
-from translucent.planning.scattering import Diffusion
-from translucent.planning.treatments import choose_treatments
+from translucent.planning.scattering import Diffusion, choose_treatments
 from translucent.reference import slabs
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene

@@ -372,7 +372,7 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
     seen = frame.coverage & frame.valid
     if not seen.any():
         return
-    from translucent.planning.darkness import scattered_back
+    from translucent.planning.limits import scattered_back
 
     passed = float(frame.transmittance[seen].mean())
     media = [body.medium for body in scene.bodies if body.medium is not None and body.has_interface]

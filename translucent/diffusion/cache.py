@@ -22,7 +22,7 @@ from translucent.diffusion.photon_fluence import EnteringPhotons, FineCells, ben
 from translucent.diffusion.volume import DiffusingVolume, PhotonLight, VolumeField, VolumeGrid
 from translucent.geometry.embree import EmbreeMesh
 from translucent.media.medium import Medium
-from translucent.planning.caustic_plan import opaque_to_shadows
+from translucent.planning.caustics import opaque_to_shadows
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.scattering import Diffusion

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.media.medium import Medium
-from translucent.planning.caustic_plan import lit_by_photons
+from translucent.planning.caustics import lit_by_photons
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import Treatment, scatterer_of, treatment_of
 from translucent.scene.scene import Object, Scene

@@ -17,7 +17,7 @@ from translucent.diffusion.grid import plane_points
 from translucent.diffusion.photon_surfaces import AIR, Met, PhotonSurfaces
 from translucent.formulas import optics
 from translucent.formulas.light import cone_attenuation
-from translucent.planning.photon_aims import PhotonAim, photon_aims
+from translucent.planning.caustics import PhotonAim, photon_aims
 from translucent.scene.scene import Scene
 
 #: Photons that are followed together.

@@ -23,8 +23,8 @@ from translucent.formulas.interface import CLEARCOAT_IOR, channel_iors, reflecte
 from translucent.geometry.embree import STEP, starts
 from translucent.geometry.normals import drawn_normals
 from translucent.media.medium import Medium
+from translucent.planning.bodies import same_medium
 from translucent.planning.rendered import scatterer_of
-from translucent.planning.slots import same_medium
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
 

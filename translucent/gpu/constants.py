@@ -33,7 +33,7 @@ from translucent.formulas.tone import (
     NEUTRAL_F90,
     NEUTRAL_START,
 )
-from translucent.planning.interfaces.traced import INTERIOR_SIZE
+from translucent.planning.interfaces import INTERIOR_SIZE
 from translucent.planning.methods.ray_marched import LEAST_SEEN, Quadrature
 
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.

@@ -14,7 +14,7 @@ from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.diffusion import DiffusedLight, slot_grids
 from translucent.gpu.layout import DENSITY
 from translucent.media.density import DensityGrid, ExponentialDensity, LinearDensity
-from translucent.planning.slots import MAX_SLOTS, Slot
+from translucent.planning.bodies import MAX_SLOTS, Slot
 from translucent.scene.scene import Scene
 
 

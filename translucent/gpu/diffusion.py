@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.gpu.textures import unlike_powers
+from translucent.planning.bodies import MAX_SLOTS, Slot
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Diffusion
-from translucent.planning.slots import MAX_SLOTS, Slot
 
 if TYPE_CHECKING:
     from translucent.diffusion.cache import FieldCache, Fields

@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.planning.assembly import FALLBACK_SHEET
+from translucent.planning.bodies import Slot, medium_slots
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import Treatment
 from translucent.planning.shadow_maps import dims_interfaces
-from translucent.planning.slots import Slot, medium_slots
 from translucent.scene.scene import Scene
 
 #: Largest number of media whose paths are added up in textures of their own.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from translucent.gpu.std140 import PackedTable, UniformBlock
+from translucent.planning.bodies import MAX_SLOTS
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
-from translucent.planning.slots import MAX_SLOTS
 
 #: Largest number of lights that shine on opaque objects.
 MAX_LIGHTS = 32

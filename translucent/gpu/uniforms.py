@@ -24,9 +24,9 @@ from translucent.gpu.layout import (
     VIEW,
 )
 from translucent.gpu.placement import PlacedScene, SampleView
+from translucent.planning.bodies import MAX_SLOTS, Slot
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
-from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import PositionalLight

@@ -10,8 +10,7 @@ from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 from translucent.planning.interfaces import FrontInterface
 from translucent.planning.methods import DepthPeeling
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName
+from translucent.planning.passes import Note, NoteKind, PassName
 from translucent.planning.plan import plan_scene
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.request import RenderRequest

@@ -5,12 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 
 from translucent.errors import InputError
-from translucent.planning.bodies import count_of, indices, media_differ, open_bodies, scatters, sheets_of, solids_of
-from translucent.planning.effects import AMBIENT, unmodelled_effects, with_ambient
-from translucent.planning.interfaces import Interfaces
-from translucent.planning.interfaces.places import touching_interfaces, with_interfaces
-from translucent.planning.layers import layer_passes
+from translucent.planning.bodies import (
+    MAX_SLOTS,
+    count_of,
+    glowing_bodies,
+    indices,
+    media_differ,
+    medium_slots,
+    open_bodies,
+    scatters,
+    sheets_of,
+    solids_of,
+)
+from translucent.planning.interfaces import Interfaces, touching_interfaces, with_interfaces
 from translucent.planning.limits import (
+    AMBIENT,
     MAX_SCATTER_LIGHTS,
     UNLIT,
     layer_limits,
@@ -18,14 +27,14 @@ from translucent.planning.limits import (
     open_limits,
     scattering_limits,
     sheet_limits,
+    unmodelled_effects,
+    with_ambient,
 )
 from translucent.planning.methods import FragmentLists, Method, SignedDepth, ThinLayer
 from translucent.planning.methods.thin_layer import sheet_pass
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.shadow_maps import dims_interfaces
-from translucent.planning.slots import MAX_SLOTS, medium_slots
 from translucent.scene.scene import Scene, object_names
 
 #: Thickness, as a share of its diagonal, of the sheet that replaces an open mesh declared solid where it is not closed.
@@ -77,7 +86,7 @@ def assembled(
         *unlit,
         PassSpec(PassName.TRANSMITTANCE, _shading(scene, method, ambient=ambient), cost=COSTS["resolve"]),
         *found[1:],
-        *layer_passes(scene, COSTS["layers"]),
+        *_layer_passes(scene),
     )
     lit = any(step.name is PassName.LIGHT_VIEWS for step in passes)
     unmodelled = (
@@ -222,3 +231,17 @@ def _shading(scene: Scene, method: Method, *, ambient: bool) -> str:
     else:
         found = "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T)"
     return f"{found}; {AMBIENT}" if ambient else found
+
+
+def _layer_passes(scene: Scene) -> tuple[PassSpec, ...]:
+    """Pass that draws layers and the emission of interfaces; none where a scene has neither."""
+    layers, glowing = indices(scene, lambda item: item.covers), glowing_bodies(scene)
+    reasons = []
+    if layers:
+        names = object_names(scene.objects[i] for i in layers)
+        reasons.append(f"{names}: each covers a share of what is behind it, and shows its own light there")
+    if glowing:
+        reasons.append(f"{object_names(scene.objects[i] for i in glowing)}: the surface glows")
+    if not reasons:
+        return ()
+    return (PassSpec(PassName.LAYERS, "; ".join(reasons), tuple(sorted((*layers, *glowing))), 1, cost=COSTS["layers"]),)

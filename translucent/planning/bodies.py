@@ -1,11 +1,132 @@
-"""Classification of the bodies of a scene for planning: solids, sheets, and those that are not closed."""
+"""Bodies of a scene as plans class them: solids, sheets, open ones, and slots that share a winding number."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
 
-from translucent.planning.slots import same_medium
-from translucent.scene.scene import Object, Scene
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.media.medium import Medium
+from translucent.planning.rendered import Treatment, treatment_of
+from translucent.scene.scene import Object, Scene, first_overlap
+
+#: Largest number of winding numbers that a ray keeps apart.
+MAX_SLOTS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Slot:
+    """Group of bodies that share one winding number, as their intervals need not be told apart.
+
+    Attributes
+    ----------
+    objects : tuple of int
+        Indices into `Scene.objects`.
+    medium : Medium
+    priority : int
+    """
+
+    objects: tuple[int, ...]
+    medium: Medium
+    priority: int
+
+
+def medium_slots(scene: Scene, apart: Sequence[int] = ()) -> tuple[Slot, ...]:
+    """Slots of a scene, sorted by descending priority.
+
+    Closed bodies of one medium share a slot: their winding numbers are never negative, so the sum of them says how
+    often, and whether at all, the medium fills a point. An open body keeps a slot of its own, lest its holes cancel
+    those of another, and so does one whose density varies, or in which rays gather light. So do those that are to
+    be kept `apart`. With ``overlap="priority"`` only bodies of equal priority share one.
+    """
+    groups: dict[Hashable, list[int]] = {}
+    fillings = _fillings(scene)
+    for i, body in enumerate(scene.objects):
+        if body.medium is None or body.sheet_thickness is not None:
+            continue
+        own = i if i in apart or not _never_negative(body) else None
+        priority = body.priority if scene.overlap == "priority" else 0
+        groups.setdefault((own, priority, fillings[i]), []).append(i)
+    slots = []
+    for group in sorted(groups.values(), key=lambda group: -scene.objects[group[0]].priority):
+        first = scene.objects[group[0]]
+        assert first.medium is not None
+        slots.append(Slot(tuple(group), first.medium, first.priority))
+    return tuple(slots)
+
+
+def require_clear_priorities(scene: Scene) -> None:
+    """Raise `InputError` where bodies with different media and equal priority may overlap."""
+    bodies = [i for i, body in enumerate(scene.objects) if body.medium is not None and body.sheet_thickness is None]
+    priorities = np.unique([scene.objects[i].priority for i in bodies], return_inverse=True)[1]
+    known: dict[Hashable, int] = {}
+    keys = _fillings(scene)
+    fillings = np.array([known.setdefault(keys[i], len(known)) for i in bodies])
+    found = overlapping_pair(
+        [scene.objects[i] for i in bodies],
+        lambda one, other: (priorities[one] == priorities[other]) & (fillings[one] != fillings[other]),
+    )
+    if found is not None:
+        i, j = (bodies[index] for index in found)
+        earlier, later = scene.objects[i], scene.objects[j]
+        raise InputError(
+            'overlap="priority"',
+            f"objects {i} ({earlier.mesh.name!r}) and {j} ({later.mesh.name!r}) may overlap with different "
+            f"media, and both have priority {later.priority}",
+            "give the one that displaces the other a higher priority",
+        )
+
+
+def same_medium(a: Object, b: Object) -> bool:
+    """True if two bodies have the same medium, as far as thickness, absorption and emission go."""
+    if a.medium is None or b.medium is None or a.medium is b.medium:
+        return a.medium is b.medium
+    return np.array_equal(a.medium.extinction, b.medium.extinction) and np.array_equal(
+        a.medium.emission, b.medium.emission
+    )
+
+
+def overlapping_pair(
+    bodies: Sequence[Object],
+    matters: Callable[[npt.NDArray[np.intp], npt.NDArray[np.intp]], npt.NDArray[np.bool_]] | None = None,
+) -> tuple[int, int] | None:
+    """Positions of two bodies whose bounding boxes overlap in more than a face; touching bodies share no volume.
+
+    `matters` gets the indices of many pairs, and says which of them count; default: all.
+    """
+    if len(bodies) < 2:
+        return None
+    return first_overlap(np.stack([body.bounds for body in bodies]), matters)
+
+
+def _never_negative(body: Object) -> bool:
+    return body.mesh.diagnosis.sound
+
+
+def _fillings(scene: Scene) -> list[Hashable]:
+    """Key of each object's medium: equal for two objects where it makes no difference which of them fills a point."""
+    # Many bodies share a medium, and what is told of it.
+    media = {id(item.medium): item.medium for item in scene.objects}
+    told = {number: _told(medium, bool(scene.lights)) for number, medium in media.items()}
+    return [
+        i if (key := told[id(item.medium)]) is None or _is_like_no_other(item) else key
+        for i, item in enumerate(scene.objects)
+    ]
+
+
+def _is_like_no_other(item: Object) -> bool:
+    return item.density is not None or treatment_of(item) is Treatment.VOLUME
+
+
+def _told(medium: Medium | None, lit: bool) -> Hashable:
+    """Properties that matter of a medium that fills a point; None for none."""
+    if medium is None:
+        return None
+    told = (*medium.extinction.tolist(), *np.asarray(medium.emission).tolist())
+    return (*told, *np.asarray(medium.scattering).tolist(), medium.phase_function) if lit else told
 
 
 def indices(scene: Scene, keep: Callable[[Object], bool]) -> tuple[int, ...]:
@@ -26,6 +147,14 @@ def sheets_of(scene: Scene) -> tuple[int, ...]:
 def open_bodies(scene: Scene) -> tuple[int, ...]:
     """Indices of objects that are declared solid and are not closed."""
     return tuple(i for i in solids_of(scene) if not scene.objects[i].mesh.diagnosis.solid)
+
+
+def glowing_bodies(scene: Scene) -> tuple[int, ...]:
+    """Indices of bodies whose surfaces emit light; layers, which do so in their own color, apart."""
+    return indices(
+        scene,
+        lambda item: item.medium is not None and not item.covers and item.surface is not None and item.surface.glows,
+    )
 
 
 def media_differ(scene: Scene) -> bool:

@@ -1,12 +1,24 @@
-"""Caustics: photons from the lights, bent and mirrored by interfaces, where they land on opaque objects and media."""
+"""Caustics by photons: what is requested, the passes that carry them, and at what each light aims."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
+import numpy as np
+
 from translucent.arguments import checked
+from translucent.arrays import Array
+from translucent.errors import InputError
+from translucent.formulas.light import ALL_AROUND
+from translucent.formulas.phase import ISOTROPIC
+from translucent.planning.bodies import count_of, indices
+from translucent.planning.methods import Method
 from translucent.planning.methods.base import check_count
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
+from translucent.scene.lights import DirectionalLight, PositionalLight
+from translucent.scene.scene import Light, Object, Scene, object_names
 
 #: Largest number of photons of a frame: a software rasterizer follows so many in some minutes.
 MAX_PHOTONS = 1 << 30
@@ -64,3 +76,300 @@ class Caustics:
 
     def __str__(self) -> str:
         return f"Caustics(photons={self.photons}, seed={self.seed})"
+
+
+#: Time of a photon in media for each object of the scene, which are searched one after the other, in seconds of a
+#: processor core: through a ball of glass into fog, measured on two busy cores.
+SECONDS_OF_A_PHOTON = 2.5e-5
+
+#: Passes that show light of media, of which the first that a plan has tells of photons in them.
+_CARRYING = PassName.LIGHT_VIEWS, PassName.TRACED, PassName.SURFACES
+
+
+def opaque_to_shadows(scene: Scene) -> frozenset[int]:
+    """Numbers of the objects that stop the straight light of lamps where photons carry it: solids that bend it."""
+    return frozenset(i for i, body in enumerate(scene.objects) if _turns_light(body) and body.sheet_thickness is None)
+
+
+def lit_by_photons(scene: Scene, solved: Iterable[int]) -> tuple[int, ...]:
+    """Bodies in which light diffuses, by their numbers, into which others bend some."""
+    bending = opaque_to_shadows(scene)
+    return tuple(i for i in solved if bending - {i})
+
+
+def check_caustics(scene: Scene, method: Method | None, lit: tuple[int, ...]) -> None:
+    """Raise `InputError` if no photon could land, or the method that is requested follows none.
+
+    `lit`: numbers of the bodies into which photons carry light.
+    """
+    if method is not None and (method.follows_paths or method.makes_sheets):
+        found = (
+            "its paths meet opaque objects behind interfaces without the caustics on them"
+            if method.follows_paths
+            else "it takes every face for a sheet, which bends nothing"
+        )
+        raise InputError(f"caustics with {method}", found, "leave out one of the two")
+    _check_ways(scene, lit)
+
+
+def passes_with_caustics(
+    passes: tuple[PassSpec, ...], scene: Scene, caustics: Caustics, lit: tuple[int, ...]
+) -> tuple[PassSpec, ...]:
+    """The passes of a plan with those that photons need, in their order."""
+    names = [one.name for one in passes]
+    carries = next((name for name in _CARRYING if name in names), None)
+    steps: list[PassSpec] = []
+    for one in passes:
+        steps.append(_into_media(one, scene, lit, caustics) if lit and one.name is carries else one)
+        if one.name is PassName.OPAQUE:
+            steps.append(_onto_opaque(scene, caustics))
+        elif one.name is PassName.SHADE and scene.opaque:
+            steps[-1] = _shaded_with(steps[-1], scene, caustics)
+    return tuple(steps)
+
+
+def _onto_opaque(scene: Scene, caustics: Caustics) -> PassSpec:
+    """Pass of the photons that land on opaque objects."""
+    opaque, cost = indices(scene, lambda item: item.medium is None), caustics.cost_of_a_million * caustics.photons / 1e6
+    return PassSpec(PassName.CAUSTICS, _landing(scene, caustics), opaque, 1, cost=cost)
+
+
+def _shaded_with(step: PassSpec, scene: Scene, caustics: Caustics) -> PassSpec:
+    """Pass that shades opaque objects without OpenGL, with the photons that land on them."""
+    seconds = caustics.photons * SECONDS_OF_A_PHOTON * len(scene.objects)
+    told = f"{_landing(scene, caustics)}, followed on the processor, about {seconds:.2g} s"
+    return replace(step, reason=f"{step.reason}; {told}")
+
+
+def _landing(scene: Scene, caustics: Caustics) -> str:
+    return (
+        f"asked for: {caustics.photons:,} photons from {count_of(tuple(range(len(scene.lights))), 'light', 'lights')} "
+        f"through {_bending(scene)}, added to what opaque objects reflect diffusely"
+    )
+
+
+def _into_media(step: PassSpec, scene: Scene, lit: tuple[int, ...], caustics: Caustics) -> PassSpec:
+    """Pass that shows light of media, with the photons that carry it there."""
+    seconds = caustics.in_media * SECONDS_OF_A_PHOTON * len(scene.objects)
+    reason = (
+        f"{step.reason}; asked for: {caustics.in_media:,} photons, followed on the processor and again only where "
+        f"objects or lights change, carry what {_bending(scene)} bends into {_names(scene, lit)}, about "
+        f"{seconds:.2g} s"
+    )
+    return replace(step, reason=reason)
+
+
+def _bending(scene: Scene) -> str:
+    return _names(scene, indices(scene, _turns_light))
+
+
+def _names(scene: Scene, numbers: tuple[int, ...]) -> str:
+    return object_names([scene.objects[i] for i in numbers])
+
+
+def _turns_light(body: Object) -> bool:
+    """True if interfaces of an object bend or mirror light."""
+    return body.medium is not None and body.has_interface and body.medium.ior != 1.0
+
+
+def _check_ways(scene: Scene, lit: tuple[int, ...]) -> None:
+    """Refuse a scene in which no photon could land."""
+    if not scene.lights:
+        do = "add a tl.PointLight, tl.SpotLight or tl.DirectionalLight; light of the environment makes no caustics"
+        raise InputError("caustics", "the scene has no lights", do)
+    if not any(_turns_light(body) for body in scene.objects):
+        found = f"no interface of {object_names(scene.bodies)} bends or mirrors light"
+        raise InputError("caustics", found, "give a medium an index of refraction: ior=1.5")
+    if not scene.opaque and not lit:
+        found = "no opaque object that light could land on, and no other body in which light is scattered on"
+        raise InputError("caustics", found, "add a ground: tl.Object(mesh)")
+    if uneven := [body for body in scene.bodies if body.density is not None]:
+        found = f"the density of {object_names(uneven)} varies, and photons follow even media"
+        raise InputError("caustics", found, "leave out one of the two")
+    if rough := [
+        body
+        for body in scene.bodies
+        if body.sheet_thickness is not None and body.surface is not None and body.surface.roughness > 0.0
+    ]:
+        found = f"{object_names(rough)}: a sheet that is rough"
+        raise InputError("caustics", found, "give it an inside, or no roughness")
+
+
+def caustics_left_out(scene: Scene, lit: tuple[int, ...], fogs: tuple[int, ...], opengl: bool) -> tuple[Note, ...]:
+    """Notes on light that photons do not carry."""
+    texts = ["caustics of light of the environment"]
+    if opengl:
+        hidden = "which are out of the picture or hidden by what is opaque"
+        texts.append(f"caustics on receivers that interfaces alone show, {hidden}")
+    dark = indices(scene, lambda body: body.medium is not None and body.medium.scatters)
+    uneven = indices(scene, lambda body: body.medium is not None and body.medium.phase_function != ISOTROPIC)
+    if others := tuple(i for i in dark if i not in lit):
+        texts.append(f"caustics in media that scatter: {_names(scene, others)}")
+    if dark:
+        texts.append("photons that media scatter")
+    if aside := tuple(i for i in fogs if i in uneven):
+        texts.append(f"directions in which {_names(scene, aside)} scatters caustics: alike in all")
+    return tuple(Note(NoteKind.CAUSTICS, text) for text in texts)
+
+
+#: Factor by which a rectangle is larger than what it holds: of rounding.
+_MARGIN = 1.001
+
+#: Largest tangent of the angle off its axis at which a point light sees bodies for which rectangles are aimed at;
+#: beyond, as for a light among them, photons leave in all directions.
+_WIDEST = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class PhotonAim:
+    """Aim of a light at a rectangle; lengths in metres from the center of the media.
+
+    Attributes
+    ----------
+    light : (4,) float64
+        Position, and 1; or the direction in which light travels, and 0.
+    middle, right, up : (3,) float64
+        Of the rectangle, and half its sides; these are 0 where photons leave in all directions.
+    flux : (3,) float64
+        Of a directional light through the rectangle, or of a lamp as bright in all directions, in W; of a lamp
+        that aims at a rectangle, to be multiplied by the cosine over the squared distance.
+    weight : float
+        Share of the photons, up to a factor.
+    cone : (4,) float64
+        In which the light shines, as `translucent.formulas.light.cone_attenuation` takes it.
+    inside : tuple of int
+        Numbers of the bodies that the light is in.
+    photons : int
+        How many leave.
+    """
+
+    light: Array
+    middle: Array
+    right: Array
+    up: Array
+    flux: Array
+    weight: float
+    cone: Array = field(default_factory=lambda: np.array(ALL_AROUND))
+    inside: tuple[int, ...] = ()
+    photons: int = 0
+
+
+def photon_aims(scene: Scene, center: Array, photons: int) -> list[PhotonAim]:
+    """Aims of all lights at the bodies whose interfaces may turn light, with about so many photons in all.
+
+    Parameters
+    ----------
+    scene : Scene
+    center : (3,) float64
+        From which positions count, in metres.
+    photons : int
+        Divided by the power that aims carry; each has one at least.
+    """
+    turning = indices(scene, lambda body: body.has_interface or _displaces(scene, body))
+    clouds = [_corners(scene.objects[number], center) for number in turning]
+    aims = [aim for light in scene.lights for aim in _aims(scene, light, clouds, center) if aim.weight > 0.0]
+    total = sum(aim.weight for aim in aims)
+    return [replace(aim, photons=max(round(photons * aim.weight / total), 1)) for aim in aims]
+
+
+def _displaces(scene: Scene, body: Object) -> bool:
+    """True if a body without an interface of its own may have one where it displaces another."""
+    if scene.overlap != "priority" or body.medium is None or body.sheet_thickness is not None:
+        return False
+    return any(other.has_interface and other.priority <= body.priority for other in scene.bodies if other is not body)
+
+
+def _corners(body: Object, center: Array) -> Array:
+    """(n, 3): corners of the faces of a body."""
+    used = np.unique(body.mesh.faces)
+    return np.asarray(body.mesh.vertices[used] @ body.matrix[:3, :3].T + (body.matrix[:3, 3] - center))
+
+
+def _aims(scene: Scene, light: Light, clouds: list[Array], center: Array) -> list[PhotonAim]:
+    low, high = np.min([c.min(axis=0) for c in clouds], axis=0), np.max([c.max(axis=0) for c in clouds], axis=0)
+    middle = 0.5 * (low + high)
+    if isinstance(light, DirectionalLight):
+        direction = np.asarray(light.direction)
+        across = _across(direction)
+        from_light, aims = np.array([*direction, 0.0]), []
+        for low, high in _apart([_bounds((corners - middle) @ across.T) for corners in clouds]):
+            at, right, up, area = _rectangle(low, high, middle, across)
+            flux = np.asarray(light.irradiance) * area
+            aims.append(PhotonAim(from_light, at, right, up, flux, float(flux.mean())))
+        return aims
+    assert isinstance(light, PositionalLight)
+    return _point_aims(scene, light, clouds, middle, np.asarray(light.position) - center)
+
+
+def _point_aims(scene: Scene, light: PositionalLight, clouds: list[Array], middle: Array, at: Array) -> list[PhotonAim]:
+    inside = tuple(
+        i
+        for i, item in enumerate(scene.objects)
+        if item.medium is not None and item.sheet_thickness is None and abs(item.winding_number(light.position)) > 0.75
+    )
+    intensity, away = np.asarray(light.intensity), float(np.linalg.norm(middle - at))
+    position = np.array([*at, 1.0])
+    seen = None if inside or away == 0.0 else _seen(clouds, middle, at, away)
+    if seen is None:
+        flux, none = 4.0 * np.pi * intensity, np.zeros(3)
+        weight = float(flux.mean()) * light.mean_share
+        return [PhotonAim(position, middle, none, none, flux, weight, light.cone, inside)]
+    aims, across = [], _across((middle - at) / away)
+    for low, high in _apart(seen):
+        aimed, right, up, area = _rectangle(low, high, middle, across)
+        flux = intensity * area
+        weight = float(flux.mean()) * away / float(np.linalg.norm(aimed - at)) ** 3
+        aims.append(PhotonAim(position, aimed, right, up, flux, weight, light.cone, inside))
+    return aims
+
+
+def _seen(clouds: list[Array], middle: Array, at: Array, away: float) -> list[Array] | None:
+    """Bounds (2, 2) of bodies, as seen from `at` on the plane across the way to their `middle`; None if they are all
+    around.
+    """
+    axis, across, found = (middle - at) / away, _across((middle - at) / away), []
+    for corners in clouds:
+        ahead = (corners - at) @ axis
+        if not (ahead > 0.0).all():
+            return None
+        tangents = (corners - at) @ across.T / ahead[:, None]
+        if float(np.abs(tangents).max()) > _WIDEST:
+            return None
+        found.append(_bounds(tangents * away))
+    return found
+
+
+def _bounds(places: Array) -> Array:
+    """(2, 2): smallest and largest of places (n, 2), with a margin."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    half, mean = 0.5 * _MARGIN * (high - low), 0.5 * (low + high)
+    return np.stack([mean - half, mean + half])
+
+
+def _apart(boxes: list[Array]) -> list[Array]:
+    """The boxes (2, 2), those that overlap joined, until none do: light through one is not that through another."""
+    found: list[Array] = []
+    waiting = list(boxes)
+    while waiting:
+        box = waiting.pop()
+        met = [i for i, other in enumerate(found) if (box[0] < other[1]).all() and (other[0] < box[1]).all()]
+        if not met:
+            found.append(box)
+            continue
+        parts = np.stack([box, *(found[i] for i in met)])
+        found = [other for i, other in enumerate(found) if i not in met]
+        waiting.append(np.stack([parts[:, 0].min(axis=0), parts[:, 1].max(axis=0)]))
+    return found
+
+
+def _across(axis: Array) -> Array:
+    """(2, 3): unit vectors across an axis and each other."""
+    right = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
+    right = right / np.linalg.norm(right)
+    return np.stack([right, np.cross(right, axis)])
+
+
+def _rectangle(low: Array, high: Array, middle: Array, across: Array) -> tuple[Array, Array, Array, float]:
+    """Middle, half sides, and area of a rectangle that reaches from `low` to `high` (2,) along two vectors (2, 3)."""
+    half, mean = 0.5 * (high - low), 0.5 * (low + high)
+    return middle + mean @ across, half[0] * across[0], half[1] * across[1], float(np.prod(high - low))

@@ -1,20 +1,22 @@
-"""Limits of thickness that hold for every method: defects of the meshes of a scene, and rounding in float32."""
+"""Notes of plans: where thickness is not exact, what is not rendered, and which bodies are black."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+
 import numpy as np
 
-from translucent.errors import InputError
-from translucent.media.density import DensityGrid
-from translucent.planning.bodies import open_bodies, scatters, sheets_of
-from translucent.planning.caustics import Caustics
-from translucent.planning.methods import Method, RayMarched
-from translucent.planning.methods.ray_marched import MAX_STEPS
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.render_plan import Capabilities
+from translucent.formulas.color import luminance
+from translucent.formulas.two_stream import two_stream_absorption, two_stream_reflectance, two_stream_scattering
+from translucent.media.medium import Medium
+from translucent.planning.bodies import glowing_bodies, open_bodies, scatters, sheets_of
+from translucent.planning.interfaces import Interfaces
+from translucent.planning.methods import Method
+from translucent.planning.passes import Note, NoteKind
 from translucent.planning.rendered import Treatment, treatment_of
-from translucent.scene.lights import PositionalLight, SpotLight
-from translucent.scene.scene import Scene, object_names
+from translucent.scene.scene import Object, Scene, object_names
+from translucent.units import length_text
 
 #: Largest number of lights that are followed into media.
 MAX_SCATTER_LIGHTS = 8
@@ -22,14 +24,10 @@ MAX_SCATTER_LIGHTS = 8
 #: Optical depth across a scene beyond which float32 places are too coarse for where light is scattered.
 DENSE = 1e5
 
-#: Smallest number of steps through an interval of varying density, unless told otherwise.
-LEAST_STEPS = 64
 
 #: Share of the scene's diagonal by which a visible sheet may lie behind an opaque surface.
 SHEET_ON_OPAQUE = 1e-6
 
-#: Gauss-Legendre points through an interval of fog of one density.
-FOG_POINTS = 16
 
 #: Note of a plan for an OpenGL version that cannot follow lights into media.
 UNLIT = Note(
@@ -59,51 +57,6 @@ def layer_limits(scene: Scene, method: Method) -> list[Note]:
     if possible <= most:
         return []
     return [Note(NoteKind.LAYER_LIMIT, f"pixels with more than {most} surfaces are marked invalid")]
-
-
-def marching_method(scene: Scene, method: Method | None, capabilities: Capabilities) -> Method:
-    """Ray marching for varying densities: as asked for, or with a step for each voxel, and at least 64.
-
-    Raises
-    ------
-    InputError
-        If another method is asked for, or the machine cannot march.
-    """
-    names = object_names(body for body in scene.bodies if body.density is not None)
-    if not capabilities.shader_storage:
-        raise InputError(
-            f"rendering {names} with a density that varies",
-            "this OpenGL has no shader storage buffers, which came with 4.3",
-            "render on the CPU (backend='cpu'), or march there: tl.reference.march(scene, size)",
-        )
-    if method is None:
-        grids = [np.shape(body.density.values) for body in scene.bodies if isinstance(body.density, DensityGrid)]
-        return RayMarched(steps=min(max([LEAST_STEPS, *(max(shape) for shape in grids)]), MAX_STEPS))
-    if not method.marches:
-        raise InputError(
-            type(method).__name__,
-            f"{names}: the density varies, and only steps through the intervals tell how deep they are",
-            "use RayMarched, or leave the choice to the planner",
-        )
-    return method
-
-
-def scattered_again_method(scene: Scene, caustics: Caustics | None = None) -> RayMarched:
-    """Ray marching through fog of one density.
-
-    A few Gauss-Legendre points, which are more accurate than four times as many steps; near a lamp inside, where light
-    falls off as 1 / r^2 from a peak, or for a spot, which shines between two angles, steps of equal angles instead; and
-    even steps through light of photons, which is as narrow as cells.
-    """
-    if caustics is not None:
-        return RayMarched(steps=LEAST_STEPS)
-    if any(isinstance(light, SpotLight) for light in scene.lights):
-        return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
-    lamps = [np.asarray(light.position) for light in scene.lights if isinstance(light, PositionalLight)]
-    fogs = [body.bounds for body in scene.bodies if treatment_of(body) is Treatment.VOLUME]
-    if any((low <= lamp).all() and (lamp <= high).all() for lamp in lamps for low, high in fogs):
-        return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
-    return RayMarched(steps=FOG_POINTS, quadrature="gauss")
 
 
 def mesh_limits(scene: Scene, method: Method) -> list[Note]:
@@ -151,3 +104,239 @@ def sheet_limits(scene: Scene) -> list[Note]:
         "is left out"
     )
     return [Note(NoteKind.SHEETS_WITHOUT_ORDER, text)]
+
+
+def layer_effects(scene: Scene, *, interfaces: bool) -> list[Note]:
+    """Notes on effects of layers that are not rendered; `interfaces` as for `unmodelled_effects`."""
+    effects = []
+    if layers := object_names(item for item in scene.bodies if item.covers):
+        text = (
+            f"{layers}: layers cast no shadows, rays that bend do not meet them, all media on a ray dim those behind "
+            "its first body, and they are painted object by object, far ones first, also where they cross"
+            if interfaces
+            else f"what layers mirror: {layers} show diffuse light alone"
+        )
+        effects.append(Note(NoteKind.LAYERS, text))
+    if glowing := object_names(scene.objects[i] for i in glowing_bodies(scene)):
+        what = "add it where a ray first enters a body, and nowhere behind" if interfaces else "not at all"
+        effects.append(Note(NoteKind.GLOW, f"light of surfaces that glow: {glowing} {what}"))
+    if cut := object_names(item for item in scene.bodies if _wants_holes(item)):
+        text = f"holes by alpha_cutoff: {cut} drawn closed, since a solid with a hole has no inside"
+        effects.append(Note(NoteKind.HOLES, text))
+    return effects
+
+
+def _wants_holes(item: Object) -> bool:
+    if item.sheet_thickness is not None or item.surface is None:
+        return False
+    varies = item.surface.color_texture is not None or item.mesh.colors is not None
+    return item.surface.alpha_cutoff > 0 and varies
+
+
+#: Note of a plan in which interfaces do nothing to light.
+STRAIGHT = Note(
+    NoteKind.REFRACTION, "refraction and reflection: rays go straight, though interfaces bend and mirror them"
+)
+
+#: How a plan with ambient radiance shades pixels, beside what it does without.
+AMBIENT = "of the ambient radiance A, media scatter sigma_s A for each metre, which counts as emitted"
+
+
+def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: Interfaces | None = None) -> tuple[Note, ...]:
+    """Notes on effects that the scene asks for and a plan does not render.
+
+    Parameters
+    ----------
+    scene : Scene
+    scattering : bool
+        The plan has light scattered into the rays.
+    interfaces : Interfaces, optional
+        How the plan finds interfaces; None if it leaves out what they and the surfaces of opaque objects do to light.
+    """
+    surfaces = interfaces is not None
+    effects = _scattering_effects(scene, followed=scattering, interfaces=surfaces)
+    effects += _refraction_effects(scene, interfaces)
+    if clear := [body for body in scene.bodies if _is_invisible(body)]:
+        text = f"{object_names(clear)}: invisible, since nothing in it absorbs, scatters or emits"
+        effects.append(Note(NoteKind.INVISIBLE, text))
+    if not surfaces and (finished := [item for item in scene.opaque if item.surface is not None]):
+        text = f"surfaces of opaque objects: {object_names(finished)} reflect diffusely, in one color each"
+        effects.append(Note(NoteKind.OPAQUE_SURFACES, text))
+    effects += layer_effects(scene, interfaces=surfaces)
+    effects += shadow_effects(scene) if scene.opaque else []
+    if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
+        text = f'priorities: overlap="{scene.overlap}" does not use them'
+        effects.append(Note(NoteKind.UNUSED_PRIORITIES, text))
+    return tuple(effects)
+
+
+def with_ambient(notes: Iterable[Note]) -> tuple[Note, ...]:
+    """Notes of a plan in which media emit the ambient radiance that they would scatter."""
+    way = Note(NoteKind.DIMMED_AMBIENT, "what dims ambient light on its way to a place in the media")
+    return (*(note for note in notes if note.kind is not NoteKind.ONLY_REMOVES), way)
+
+
+def layers_instead(scene: Scene, refusals: Iterable[tuple[int, str]]) -> tuple[Note, ...]:
+    """Notes on objects, by their numbers, that are layers though light should diffuse in them, and why."""
+    reasons: dict[str, list[Object]] = {}
+    for i, why in refusals:
+        reasons.setdefault(why, []).append(scene.objects[i])
+    return tuple(
+        Note(NoteKind.LAYER_INSTEAD, f"diffusion in {object_names(items)}: {why}; shown as layers")
+        for why, items in reasons.items()
+    )
+
+
+def shadow_effects(scene: Scene) -> list[Note]:
+    """Notes on shadows on opaque objects that are not rendered, where there are some, or a picture of them."""
+    notes = []
+    if not scene.environment_shadows and scene.environment.mean.any():
+        text = "shadows of the environment: its light reaches opaque objects through everything"
+        notes.append(Note(NoteKind.SHADOWS, text))
+    layers = [body for body in scene.bodies if body.covers]
+    if layers and (scene.lights or scene.environment_shadows):
+        text = f"shadows of layers: light reaches opaque objects through {object_names(layers)}"
+        notes.append(Note(NoteKind.SHADOWS, text))
+    return notes
+
+
+def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> list[Note]:
+    """Notes on scattered light that is not rendered."""
+    notes = _subsurface_effects(scene) if interfaces else []
+    bodies = [body for body in scene.bodies if body.medium is not None and body.medium.scatters]
+    if any(treatment_of(body) is Treatment.VOLUME for body in bodies):
+        text = (
+            "what is scattered more than once: what opaque objects and other bodies keep from it, and where it goes on "
+            "ahead, as around lights behind media that scatter ahead"
+        )
+        notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
+    shown = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
+    if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in shown]:
+        if followed:
+            densest = max(float(np.max(np.asarray(medium.scattering))) for medium in media)
+            text = (
+                "light scattered more than once, of which there is much in bodies that are thicker than a mean free "
+                f"path, here {1 / densest:.2g} m; light of the environment scattered"
+            )
+            return [*notes, Note(NoteKind.SCATTERED_AGAIN, text)]
+        if not scene.lights:
+            return [*notes, Note(NoteKind.ONLY_REMOVES, "in-scattered light: scattering only removes light")]
+        text = (
+            "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
+        )
+        return [*notes, Note(NoteKind.LIGHTS_LEFT_OUT, text)]
+    lit = scene.opaque or any(body.covers or (interfaces and body.has_interface) for body in scene.bodies)
+    if not notes and scene.lights and not lit:
+        text = "lights: they shine on nothing, since no medium scatters and nothing is opaque"
+        return [Note(NoteKind.UNUSED_LIGHTS, text)]
+    return notes
+
+
+def _subsurface_effects(scene: Scene) -> list[Note]:
+    """Notes on bodies whose surfaces show light that they scatter many times."""
+    notes = []
+    if any(treatment_of(body) is Treatment.LAYER for body in scene.bodies):
+        text = (
+            "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the "
+            "path of the ray, which edges and folds are not"
+        )
+        notes.append(Note(NoteKind.SPREAD_INSIDE, text))
+    if bodies := [body for body in scene.bodies if treatment_of(body) is Treatment.DIFFUSION]:
+        text = (
+            f"{object_names(bodies)}: what other bodies scatter of the environment's light reaches them, and "
+            "what is smaller than a cell has no light of its own"
+        )
+        notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
+    return notes
+
+
+def _refraction_effects(scene: Scene, interfaces: Interfaces | None) -> list[Note]:
+    """Notes on refracted and reflected light that is not rendered."""
+    if not any(body.has_interface for body in scene.bodies):
+        return []
+    if interfaces is None:
+        return [STRAIGHT]
+    return interfaces.unmodelled()
+
+
+def _is_invisible(body: Object) -> bool:
+    medium = body.medium
+    return (
+        medium is not None
+        and not body.covers
+        and not body.has_interface
+        and not (medium.extinction > 0).any()
+        and not medium.emits
+    )
+
+
+#: Luminance of white light that passes a body, or comes back from it, below which it is black: a step of 8 bits.
+BLACK = 1 / 255
+
+#: Luminance at which a body shows its color.
+SHOWN = 0.2
+
+
+def black_bodies(scene: Scene) -> tuple[Note, ...]:
+    """Note on the bodies that are black, with what would show the one that is nearest to it; empty if none is.
+
+    The thickness that counts is the mean chord 4 V / S of a body (Cauchy 1850), so that rays near its edge pass more.
+    """
+    by_medium: dict[int, list[Object]] = {}
+    for body in scene.bodies:
+        if body.density is None and not body.covers and (body.surface is None or body.surface.transmission == 1.0):
+            by_medium.setdefault(id(body.medium), []).append(body)
+    black: list[tuple[float, Object]] = []
+    for bodies in by_medium.values():
+        medium = bodies[0].medium
+        # As thick as the whole scene: if anything passes that, no body is black.
+        if medium is None or medium.emits or _passes(medium, scene.diagonal) + scattered_back(scene, medium) >= BLACK:
+            continue
+        with np.errstate(under="ignore"):
+            shares = luminance(medium.transmittance([_chord(body) for body in bodies])).tolist()
+        black += [(share, body) for share, body in zip(shares, bodies, strict=True) if share < BLACK]
+    if not black:
+        return ()
+    passed, clearest = max(black, key=lambda found: found[0])
+    assert clearest.medium is not None
+    chord, shown = _chord(clearest), _distance(clearest.medium, SHOWN)
+    text = (
+        f"{object_names(body for _, body in black)}: black: {passed:.1e} of white light passes "
+        f"{_text(chord)}, the mean thickness{'' if len(black) == 1 else f' of {clearest.mesh.name!r}'}, and a "
+        f"fifth passes {_text(shown)}; a medium {chord / shown:.2g} times as dilute (a color at a distance so "
+        "much longer) shows its color"
+    )
+    return (Note(NoteKind.BLACK, text),)
+
+
+def scattered_back(scene: Scene, medium: Medium) -> float:
+    """Luminance of white light that a body as large as the scene scatters back."""
+    if not medium.scatters:
+        return 0.0
+    absorbed = two_stream_absorption(medium.absorption) * scene.diagonal
+    turned = two_stream_scattering(medium.scattering, medium.anisotropy) * scene.diagonal
+    return float(luminance(two_stream_reflectance(absorbed, turned)))
+
+
+def _text(metres: float) -> str:
+    return length_text(metres).replace("µ", "u")
+
+
+def _chord(body: Object) -> float:
+    """Mean length of a ray in a solid, and straight through a sheet, in metres."""
+    return body.mean_thickness if body.sheet_thickness is not None else 2.0 * body.mean_thickness
+
+
+def _passes(medium: Medium, distance: float) -> float:
+    with np.errstate(under="ignore"):
+        return float(luminance(medium.transmittance(distance)))
+
+
+def _distance(medium: Medium, share: float) -> float:
+    """Distance in metres that this share of the luminance of white light passes."""
+    # Of the clearest channel alone so much would pass no sooner, and of the densest no later.
+    low, high = (-math.log(share) / sigma for sigma in (medium.extinction.max(), medium.extinction.min()))
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _passes(medium, middle) > share else (low, middle)
+    return float(np.mean((low, high)))

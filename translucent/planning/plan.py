@@ -11,34 +11,61 @@ import numpy as np
 from translucent.arguments import checked_but
 from translucent.errors import InputError
 from translucent.geometry.together import diagnose_together
+from translucent.media.density import DensityGrid
 from translucent.planning.assembly import COSTS, assembled
-from translucent.planning.bodies import scatters, solids_of
-from translucent.planning.caustic_plan import with_caustics
-from translucent.planning.caustics import Caustics
-from translucent.planning.darkness import black_bodies
-from translucent.planning.effects import AMBIENT, layers_instead, shadow_effects, unmodelled_effects, with_ambient
-from translucent.planning.interface_choice import USUAL_DEPTH, chosen_interfaces
-from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
-from translucent.planning.interfaces.places import with_interfaces
-from translucent.planning.limits import marching_method, mesh_limits, open_limits, scattered_again_method
+from translucent.planning.bodies import (
+    MAX_SLOTS,
+    media_differ,
+    medium_slots,
+    overlapping_pair,
+    require_clear_priorities,
+    scatters,
+    solids_of,
+)
+from translucent.planning.caustics import (
+    Caustics,
+    caustics_left_out,
+    check_caustics,
+    lit_by_photons,
+    opaque_to_shadows,
+    passes_with_caustics,
+)
+from translucent.planning.interfaces import (
+    USUAL_DEPTH,
+    Interfaces,
+    ScreenInterfaces,
+    TracedInterfaces,
+    chosen_interfaces,
+    touching_interfaces,
+    with_interfaces,
+)
+from translucent.planning.limits import (
+    AMBIENT,
+    black_bodies,
+    layers_instead,
+    mesh_limits,
+    open_limits,
+    shadow_effects,
+    unmodelled_effects,
+    with_ambient,
+)
 from translucent.planning.methods import (
     DepthPeeling,
     FragmentLists,
     Method,
     PathTraced,
+    RayMarched,
     SignedDepth,
     ThinLayer,
 )
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.order import why_order_matters
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.methods.ray_marched import MAX_STEPS
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.render_plan import Capabilities, MapPlan, RenderPlan
 from translucent.planning.rendered import Treatment, darkened, occluder_scene, occluders, straight_scene, treatment_of
 from translucent.planning.request import RenderRequest
-from translucent.planning.scattering import Scattering, SingleScattering
+from translucent.planning.scattering import Scattering, SingleScattering, Treatments, choose_treatments, rendered_scene
 from translucent.planning.shadow_maps import ShadowMaps, shadow_passes, shadows_left_out
-from translucent.planning.slots import require_clear_priorities
-from translucent.planning.treatments import Treatments, choose_treatments, rendered_scene
+from translucent.scene.lights import PositionalLight, SpotLight
 from translucent.scene.scene import Object, Scene, check_scene, object_names
 
 
@@ -115,7 +142,7 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
         )
     found = replace(found, request=request, remarks=black_bodies(scene))
     if request.caustics is not None:
-        found = with_caustics(found, scene, request.caustics, request.method, machine)
+        found = _with_caustics(found, scene, request.caustics, machine)
     return found if found.traced else _with_shadows(found, scene, machine)
 
 
@@ -191,6 +218,96 @@ def _method(
     return SignedDepth(), "a sum over each ray tells its picture"
 
 
+#: Smallest number of steps through an interval of varying density, unless told otherwise.
+LEAST_STEPS = 64
+
+
+#: Gauss-Legendre points through an interval of fog of one density.
+FOG_POINTS = 16
+
+
+def marching_method(scene: Scene, method: Method | None, capabilities: Capabilities) -> Method:
+    """Ray marching for varying densities: as asked for, or with a step for each voxel, and at least 64.
+
+    Raises
+    ------
+    InputError
+        If another method is asked for, or the machine cannot march.
+    """
+    names = object_names(body for body in scene.bodies if body.density is not None)
+    if not capabilities.shader_storage:
+        raise InputError(
+            f"rendering {names} with a density that varies",
+            "this OpenGL has no shader storage buffers, which came with 4.3",
+            "render on the CPU (backend='cpu'), or march there: tl.reference.march(scene, size)",
+        )
+    if method is None:
+        grids = [np.shape(body.density.values) for body in scene.bodies if isinstance(body.density, DensityGrid)]
+        return RayMarched(steps=min(max([LEAST_STEPS, *(max(shape) for shape in grids)]), MAX_STEPS))
+    if not method.marches:
+        raise InputError(
+            type(method).__name__,
+            f"{names}: the density varies, and only steps through the intervals tell how deep they are",
+            "use RayMarched, or leave the choice to the planner",
+        )
+    return method
+
+
+def scattered_again_method(scene: Scene, caustics: Caustics | None = None) -> RayMarched:
+    """Ray marching through fog of one density.
+
+    A few Gauss-Legendre points, which are more accurate than four times as many steps; near a lamp inside, where light
+    falls off as 1 / r^2 from a peak, or for a spot, which shines between two angles, steps of equal angles instead; and
+    even steps through light of photons, which is as narrow as cells.
+    """
+    if caustics is not None:
+        return RayMarched(steps=LEAST_STEPS)
+    if any(isinstance(light, SpotLight) for light in scene.lights):
+        return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
+    lamps = [np.asarray(light.position) for light in scene.lights if isinstance(light, PositionalLight)]
+    fogs = [body.bounds for body in scene.bodies if treatment_of(body) is Treatment.VOLUME]
+    if any((low <= lamp).all() and (lamp <= high).all() for lamp in lamps for low, high in fogs):
+        return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
+    return RayMarched(steps=FOG_POINTS, quadrature="gauss")
+
+
+def why_order_matters(scene: Scene, method: Method | None, interfaces: Interfaces) -> str | None:
+    """Reason why this scene needs ordered surfaces rather than a sum over each ray; None if a sum suffices."""
+    bodies = scene.bodies
+    if media_differ(scene) and any(body.medium is not None and body.medium.emits for body in bodies):
+        return "emission among several media: what is in front dims what is behind"
+    if method is None and interfaces.finds_exits and (touching := touching_interfaces(scene)) is not None:
+        return touching
+    if method is None and (why := _inside_out(scene)) is not None:
+        return why
+    if scene.overlap == "add":
+        return None
+    # Sheets have no inside to overlap, and pixels that enter more than once may be marked.
+    if method is not None and (method.makes_sheets or method.convex_only):
+        return None
+    solids = [body for body in bodies if body.sheet_thickness is None]
+    if (found := overlapping_pair(solids)) is not None:
+        earlier, later = (solids[index] for index in found)
+        return (
+            f'overlap="{scene.overlap}": {earlier.mesh.name!r} and {later.mesh.name!r} may overlap, and a sum '
+            "would count both"
+        )
+    for body in solids:
+        if not body.mesh.diagnosis.convex:
+            return f'overlap="{scene.overlap}": {body.mesh.name!r} may overlap itself, and a sum would count it twice'
+    return None
+
+
+def _inside_out(scene: Scene) -> str | None:
+    """Reason that a body is inside out in places, so that a sum cannot tell its pixels apart; None where intervals
+    cannot.
+    """
+    broken = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.inside_out]
+    if not broken or len(medium_slots(scene)) > MAX_SLOTS:
+        return None
+    return f"{broken[0].mesh.name!r} is inside out in places, and a sum does not tell which pixels show one"
+
+
 def _ordered_method(scene: Scene, method: Method | None, machine: Capabilities, why: str) -> Method:
     """Method for a scene that needs ordered intervals; refuses any other that is requested."""
     if not solids_of(scene):
@@ -242,6 +359,20 @@ def _followed(scene: Scene, interfaces: Interfaces | None) -> Interfaces | None:
     if not with_interfaces(scene):
         return None
     return interfaces if interfaces is not None and interfaces.traced else TracedInterfaces(depth=USUAL_DEPTH)
+
+
+def _with_caustics(found: RenderPlan, scene: Scene, caustics: Caustics, machine: Capabilities) -> RenderPlan:
+    """The plan with photons; refuses those that could not land, or that the method does not follow."""
+    volumes = found.treated(Treatment.VOLUME)
+    lit = lit_by_photons(scene, found.treated(Treatment.VOLUME, Treatment.DIFFUSION))
+    check_caustics(scene, found.request.method, lit)
+    return replace(
+        found,
+        passes=passes_with_caustics(found.passes, scene, caustics, lit),
+        unmodelled=(*found.unmodelled, *caustics_left_out(scene, lit, volumes, machine.opengl)),
+        caustics=caustics,
+        opaque_to_shadows=opaque_to_shadows(scene),
+    )
 
 
 def _with_shadows(found: RenderPlan, scene: Scene, machine: Capabilities) -> RenderPlan:

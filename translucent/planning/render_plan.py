@@ -7,11 +7,9 @@ from dataclasses import dataclass, field, replace
 
 from translucent.arguments import checked
 from translucent.planning.caustics import Caustics
-from translucent.planning.interfaces import Interfaces, TracedInterfaces
-from translucent.planning.interfaces.traced import INTERIOR_SIZE
+from translucent.planning.interfaces import INTERIOR_SIZE, Interfaces, TracedInterfaces
 from translucent.planning.methods import Method, PathTraced
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.rendered import Treatment, occluder_scene, occluders, treatment_of
 from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Diffusion

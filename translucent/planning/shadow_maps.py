@@ -8,8 +8,7 @@ from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import count_of, indices, media_differ
 from translucent.planning.methods import SignedDepth
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.scene.scene import Scene
 
 #: Textures that shaders of interfaces read at most, with those of shadows. OpenGL promises 16.

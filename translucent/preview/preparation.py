@@ -32,7 +32,7 @@ from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.planning.scattering.diffusion import LEAST_RESOLUTION, Diffusion
+from translucent.planning.scattering import LEAST_RESOLUTION, Diffusion
 from translucent.preview.tasks import CancelledError, Lane, Task, problem
 from translucent.preview.worker import PATIENCE, Pool, Urgency, report
 from translucent.scene.environment import Environment

@@ -17,9 +17,8 @@ from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.request import RenderRequest
-from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
+from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering, choose_treatments
 from translucent.planning.shadow_maps import ShadowMaps
-from translucent.planning.treatments import choose_treatments
 from translucent.preview.preparation import untraceable
 from translucent.preview.tasks import Task
 from translucent.preview.worker import Pool, Urgency

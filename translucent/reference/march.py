@@ -15,8 +15,7 @@ from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
 from translucent.planning.methods import Method, RayMarched
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.reference import compositing as blending
 from translucent.reference.compositing import Layer, _layers

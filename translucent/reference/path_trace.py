@@ -17,8 +17,7 @@ from translucent.arrays import Array, Integers
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
 from translucent.planning.methods import SignedDepth
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.reference.compositing import _layers
 from translucent.reference.interface_paths import InterfacePaths

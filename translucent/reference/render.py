@@ -16,10 +16,10 @@ from translucent.errors import InputError
 from translucent.files.reading import require_memory
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
-from translucent.planning.effects import STRAIGHT
+from translucent.planning.limits import STRAIGHT
 from translucent.planning.methods import Method
 from translucent.planning.methods.base import check_method
-from translucent.planning.notes import NoteKind
+from translucent.planning.passes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.reference.compositing import composite

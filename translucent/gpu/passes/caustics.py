@@ -18,8 +18,8 @@ from translucent.gpu.passes.traced_interfaces import all_closed
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.shaders import build_program, set_uniform
 from translucent.gpu.uniforms import media_center
+from translucent.planning.caustics import PhotonAim, photon_aims
 from translucent.planning.passes import PassSpec
-from translucent.planning.photon_aims import PhotonAim, photon_aims
 
 _TRACED = {name: unit for unit, name in enumerate(("object_table", "hierarchy_nodes", "hierarchy_triangles"))}
 _LANDED = ("landed_point", "landed_power", "landed_normal")

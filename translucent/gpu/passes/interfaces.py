@@ -10,7 +10,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import texture_units
-from translucent.planning.interfaces.places import picture_cuts
+from translucent.planning.interfaces import picture_cuts
 from translucent.planning.passes import PassSpec
 from translucent.scene.surface import SMOOTH, Surface
 

@@ -8,8 +8,7 @@ from typing import ClassVar
 from translucent.errors import InputError
 from translucent.planning.bodies import sheets_of, solids_of
 from translucent.planning.methods.base import Method
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.scene.scene import Scene, object_names
 
 

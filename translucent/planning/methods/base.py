@@ -7,8 +7,7 @@ from typing import ClassVar
 
 from translucent.arguments import brief
 from translucent.errors import InputError
-from translucent.planning.notes import Note
-from translucent.planning.passes import PassSpec
+from translucent.planning.passes import Note, PassSpec
 from translucent.scene.scene import Scene
 
 #: Largest number of points in an interval: more change nothing that float32 could show.

@@ -9,8 +9,7 @@ from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import indices, open_bodies
 from translucent.planning.methods.base import Method, check_count
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Largest number of paths of each pixel.

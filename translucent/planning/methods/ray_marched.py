@@ -10,8 +10,7 @@ from translucent.errors import InputError
 from translucent.planning.bodies import solids_of
 from translucent.planning.methods.base import MAX_LIGHT_POINTS, Method, check_count
 from translucent.planning.methods.fragment_lists import FragmentLists
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.scene.scene import Scene
 
 #: Largest number of steps of a ray through one interval.

@@ -8,8 +8,7 @@ from typing import ClassVar
 from translucent.arguments import checked
 from translucent.planning.bodies import count_of, media_differ, solids_of
 from translucent.planning.methods.base import Method
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.scene.scene import Scene
 
 

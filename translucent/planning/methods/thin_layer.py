@@ -10,8 +10,7 @@ from translucent.errors import InputError
 from translucent.geometry.mesh import MAX_COORDINATE
 from translucent.planning.bodies import count_of, indices
 from translucent.planning.methods.base import Method
-from translucent.planning.notes import Note, NoteKind
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.scene.scene import Scene, object_names
 
 

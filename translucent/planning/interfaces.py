@@ -1,0 +1,367 @@
+"""Ways to find the interfaces at which light refracts and reflects, and the choice among them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from translucent.arguments import checked
+from translucent.errors import InputError
+from translucent.planning.bodies import indices, overlapping_pair
+from translucent.planning.methods.base import check_count
+from translucent.planning.mirrors import mirror_of
+from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
+from translucent.planning.rendered import Treatment, treatment_of
+from translucent.planning.shadow_maps import dims_interfaces
+from translucent.scene.scene import Object, Scene, object_names
+
+#: Time of drawing the interfaces where rays enter and where they leave, in depth-only draws of the same geometry, as
+#: measured on a software rasterizer.
+DRAW_COST = 4.0
+
+#: Time of shading both, likewise, beside 90,000 triangles.
+SHADE_COST = 8.0
+
+#: Time of drawing one interface of each body, as a share of that of two; measured likewise.
+ONE_DRAWN = 0.4
+
+#: Time of shading one interface, as a share of that of two; measured likewise.
+ONE_SHADED = 0.45
+
+#: Note of a plan in which rays meet interfaces as far as the first interval shows them.
+LATER_REFRACTION = Note(
+    NoteKind.LATER_REFRACTION,
+    "refraction and reflection beyond the first interval of a ray: what lies farther on is crossed straight, "
+    "and interfaces mirror the environment only",
+)
+
+
+@dataclass(frozen=True)
+class Interfaces:
+    """A way to find the interfaces at which light refracts and reflects; see its subclasses.
+
+    Attributes
+    ----------
+    name : str
+        On the command line.
+    traced : bool
+        Follows rays through the meshes, from interface to interface.
+    one_interface : bool
+        Bends rays where they enter a body, and not where they leave it.
+    finds_exits : bool
+        Draws the interface where rays leave a body, beside that where they enter.
+    """
+
+    name: ClassVar[str] = ""
+    traced: ClassVar[bool] = False
+    one_interface: ClassVar[bool] = False
+    finds_exits: ClassVar[bool] = False
+
+    @property
+    def tree(self) -> tuple[int, int]:
+        """Number of interfaces that a traced ray may meet, and of forks."""
+        return 0, 0
+
+    def refusal(self, scene: Scene) -> tuple[str, str] | None:
+        """Reason why rays cannot bend so in a scene, and what to do; None if they can."""
+        return None
+
+    def passes(self, scene: Scene, *, straight: bool) -> tuple[PassSpec, PassSpec]:
+        """Passes that find and shade interfaces; `straight` if all of them are of sheets, which bend no ray."""
+        raise NotImplementedError
+
+    def unmodelled(self) -> list[Note]:
+        """Notes on refracted and reflected light that is not rendered."""
+        raise NotImplementedError
+
+
+def with_interfaces(scene: Scene) -> tuple[int, ...]:
+    """Indices of the objects whose interfaces change light."""
+    return indices(scene, lambda item: item.has_interface)
+
+
+def starts_inside(scene: Scene, body: Object) -> bool:
+    """True if rays of the camera may start inside a body."""
+    if scene.camera.fov_y is None:
+        return picture_cuts(scene, body)
+    low, high = body.bounds - scene.camera.eye
+    around = bool((low <= 0).all() and (high >= 0).all())
+    # On a surface the winding number is the mean of both sides.
+    return around and round(abs(body.winding_number(scene.camera.eye)), 6) >= 0.5
+
+
+def picture_cuts(scene: Scene, body: Object) -> bool:
+    """True if an orthographic picture's plane, where its rays start, cuts the bounds of a body."""
+    if scene.camera.fov_y is not None:
+        return False
+    low, high = body.bounds - scene.camera.eye
+    forward = scene.camera.forward
+    return bool(np.where(forward > 0, low, high) @ forward < 0 < np.where(forward > 0, high, low) @ forward)
+
+
+def touching_interfaces(scene: Scene) -> str | None:
+    """Reason why touching bodies with interfaces need ordered surfaces; None if none may touch."""
+    solids = [body for body in scene.bodies if body.sheet_thickness is None]
+    bends = np.array([body.has_interface for body in solids])
+    if not bends.any() or (found := overlapping_pair(solids, lambda one, other: bends[one] | bends[other])) is None:
+        return None
+    earlier, later = (solids[index] for index in found)
+    names = f"{earlier.mesh.name!r} and {later.mesh.name!r}"
+    return f"interfaces of {names} may touch: the order tells where a ray leaves both"
+
+
+def owners(scene: Scene) -> str:
+    """Names of the objects whose interfaces change light."""
+    return object_names(scene.objects[i] for i in with_interfaces(scene))
+
+
+def effects_of(scene: Scene, *, bends: bool = True, mirrored: str = "the environment") -> str:
+    """Effects of the interfaces of a scene: whether they bend rays, and what they mirror."""
+    bodies = [body for body in scene.bodies if body.has_interface]
+    surfaces = [body.surface for body in bodies if body.surface is not None]
+    effects = []
+    if any(body.medium is not None and body.medium.ior > 1 for body in bodies):
+        effects.append(f"interfaces mirror {mirrored}{' and bend rays' if bends else ''} (ior above 1)")
+    if any(surface.roughness > 0 for surface in surfaces):
+        effects.append("rough ones blur both")
+    if bends and any(surface.dispersion > 0 for surface in surfaces):
+        effects.append("dispersion bends each channel on its own")
+    if any(surface.iridescence for surface in surfaces):
+        effects.append("thin films color what is mirrored")
+    if any(surface.clearcoat for surface in surfaces):
+        effects.append("clear coats mirror over them")
+    if any(surface.transmission < 1 for surface in surfaces):
+        effects.append("paint reflects what does not enter")
+    if any((np.asarray(surface.color) != 1).any() or surface.color_texture for surface in surfaces):
+        effects.append("colors tint what enters")
+    if any(treatment_of(body) is Treatment.LAYER for body in bodies):
+        effects.append("light that scatters many times leaves as from a layer (Kubelka and Munk, Saunderson)")
+    if any(treatment_of(body) is Treatment.DIFFUSION for body in bodies):
+        effects.append("light that scatters many times leaves as it has diffused in the body")
+    return "; ".join(effects) or "interfaces"
+
+
+#: Note of a plan in which rays refract at the front interface alone.
+ONE_INTERFACE = Note(
+    NoteKind.ONE_INTERFACE,
+    "FrontInterface: bends once, where a ray enters; leaves without bending: rays leave curved bodies in wrong "
+    "directions",
+)
+
+
+@dataclass(frozen=True)
+class FrontInterface(Interfaces):
+    """The interface where each ray enters a body, and none where it leaves, as viewers of glTF have it.
+
+    In one draw less than `ScreenInterfaces`; right for thin bodies, wrong for curved ones (KHR_materials_volume,
+    Khronos 2021, leaves what happens inside to the viewer). Absorption is that of the straight ray.
+    """
+
+    name: ClassVar[str] = "front"
+    one_interface: ClassVar[bool] = True
+
+    def refusal(self, scene: Scene) -> tuple[str, str] | None:
+        """Reason: rays start inside a body, and have no front interface there."""
+        for body in scene.bodies:
+            if body.has_interface and body.sheet_thickness is None and starts_inside(scene, body):
+                return (
+                    f"rays start inside {body.mesh.name!r}, and meet no interface where they would enter it",
+                    "use ScreenInterfaces(), or move the camera outside",
+                )
+        return None
+
+    def passes(self, scene: Scene, *, straight: bool) -> tuple[PassSpec, PassSpec]:
+        """Passes: one draw of all bodies with interfaces, and one over pixels."""
+        found = f"{owners(scene)}: normal and place of the interface where a ray enters"
+        shaded = f"{effects_of(scene)}; rays bend where they enter and go straight on"
+        return (
+            PassSpec(PassName.INTERFACES, found, with_interfaces(scene), 1, cost=DRAW_COST * ONE_DRAWN),
+            PassSpec(PassName.SURFACES, shaded, cost=SHADE_COST * ONE_SHADED),
+        )
+
+    def unmodelled(self) -> list[Note]:
+        """Notes: what lies beyond the first interval, and the bend where rays leave."""
+        return [LATER_REFRACTION, ONE_INTERFACE]
+
+
+@dataclass(frozen=True)
+class ScreenInterfaces(Interfaces):
+    """The interface where each ray enters a body and the one where it leaves, both drawn in screen space (Wyman 2005).
+
+    What lies farther on is crossed straight, interfaces mirror the environment only, and refracted rays find opaque
+    surfaces as far as the picture shows them.
+    """
+
+    name: ClassVar[str] = "screen"
+    finds_exits: ClassVar[bool] = True
+
+    def passes(self, scene: Scene, *, straight: bool) -> tuple[PassSpec, PassSpec]:
+        """Passes: two draws of all bodies with interfaces, or one of sheets; and one over pixels."""
+        objects, names = with_interfaces(scene), owners(scene)
+        if straight:
+            # What bends on entering a sheet bends back on leaving it: each has one interface, that towards the eye.
+            return (
+                PassSpec(
+                    PassName.INTERFACES,
+                    f"{names}: normal and place of the sheet that a ray meets first",
+                    objects,
+                    1,
+                    cost=DRAW_COST * ONE_DRAWN,
+                ),
+                PassSpec(
+                    PassName.SURFACES,
+                    f"{effects_of(scene, bends=False)}; rays go straight through sheets",
+                    cost=SHADE_COST,
+                ),
+            )
+        found = f"{names}: normal and place of the interface where a ray enters, and of the one where it leaves"
+        shaded = f"{effects_of(scene)}; the path through the first interval bends with it"
+        return (
+            PassSpec(PassName.INTERFACES, found, objects, 2, cost=DRAW_COST),
+            PassSpec(PassName.SURFACES, shaded, cost=SHADE_COST),
+        )
+
+    def unmodelled(self) -> list[Note]:
+        """Notes: what lies beyond the first interval."""
+        return [LATER_REFRACTION]
+
+
+#: Largest number of interfaces that a ray may meet: each takes a walk through the meshes.
+MAX_DEPTH = 64
+
+#: Bodies that a traced ray can be in at once.
+INTERIOR_SIZE = 8
+
+#: Largest number of forks: rays multiply with each.
+MAX_FORKS = 4
+
+#: Time of tracing, in depth-only draws of the same geometry, on a software rasterizer: on polished bodies 45 to 185 in
+#: the published report, beside 8,000 to 41,000 triangles at 256 x 256; beside 90,000 at 512 x 512 that is about this.
+TRACE_COST = 50.0
+
+
+@checked
+@dataclass(frozen=True)
+class TracedInterfaces(Interfaces):
+    """All interfaces that a ray meets, found by rays through the meshes: a tree of reflected and refracted ones.
+
+    The tree of Whitted 1980: at an interface the reflected ray takes Fresnel's share, the refracted one the rest (Born
+    & Wolf 1999, section 1.5). Bodies see themselves, each other and opaque objects, and may touch or hold the eye.
+
+    Parameters
+    ----------
+    depth : int
+        Interfaces that a ray may meet, from 1; behind the last one it sees the environment, as if nothing was ahead.
+    forks : int
+        How often a ray may go on as the weaker of the two, reflected or refracted, from 0; the mirror image at the
+        first interface is free. The stronger one is always followed; a weaker one beyond that sees the environment.
+    """
+
+    name: ClassVar[str] = "traced"
+    traced: ClassVar[bool] = True
+
+    depth: int = 8
+    forks: int = 2
+
+    def __post_init__(self) -> None:
+        check_count("TracedInterfaces depth", self.depth, MAX_DEPTH)
+        check_count("TracedInterfaces forks", self.forks, MAX_FORKS, least=0, example=2)
+
+    @property
+    def tree(self) -> tuple[int, int]:
+        """`depth` and `forks`."""
+        return self.depth, self.forks
+
+    def refusal(self, scene: Scene) -> tuple[str, str] | None:
+        """Reason: rays of one picture start in different media, or media vary along a ray."""
+        solids = [body for body in scene.bodies if body.sheet_thickness is None]
+        if cut := [body for body in solids if picture_cuts(scene, body)]:
+            return (
+                f"the orthographic picture's plane, where rays start, cuts {object_names(cut)}",
+                "use ScreenInterfaces(), or move the camera outside",
+            )
+        if varying := [body for body in solids if body.density is not None]:
+            return (
+                f"{object_names(varying)}: the density varies, and rays cross media in one step",
+                "use ScreenInterfaces()",
+            )
+        return None
+
+    def passes(self, scene: Scene, *, straight: bool) -> tuple[PassSpec, PassSpec]:
+        """Passes: one draw of all bodies with interfaces, and one over pixels that traces."""
+        found = f"{owners(scene)}: normal and place of the first interface on each ray"
+        effects = effects_of(scene, bends=not straight, mirrored="what is around them")
+        traced = f"{effects}; rays are traced from there on, through at most {self._count}"
+        if self.forks:
+            traced += f", {self._times} as the weaker of reflected and refracted light"
+        if (mirror := mirror_of(scene)) is not None:
+            traced += f"; {mirror.ground.mesh.name!r} mirrors what stands on it, once"
+        if dims_interfaces(scene):
+            traced += "; rays straight on to the lights tell what bodies keep of highlights, and of the light on paint"
+        return (
+            PassSpec(PassName.INTERFACES, found, with_interfaces(scene), 1, cost=DRAW_COST * ONE_DRAWN),
+            PassSpec(PassName.TRACED, traced, cost=TRACE_COST),
+        )
+
+    def unmodelled(self) -> list[Note]:
+        """Notes: what the tree leaves out."""
+        often = f" more often than {self._times}" if self.forks else ""
+        text = (
+            f"light that meets more than {self._count}, or is the weaker of reflected and refracted light{often}: "
+            "looked up in the environment, as if nothing was ahead"
+        )
+        return [Note(NoteKind.CUT_OFF_PATHS, text)]
+
+    @property
+    def _times(self) -> str:
+        return {1: "once", 2: "twice"}.get(self.forks, f"{self.forks} times")
+
+    @property
+    def _count(self) -> str:
+        return "1 interface" if self.depth == 1 else f"{self.depth} interfaces"
+
+
+__all__ = ["INTERFACES", "FrontInterface", "Interfaces", "ScreenInterfaces", "TracedInterfaces"]
+
+#: Names on the command line.
+INTERFACES: dict[str, type[Interfaces]] = {
+    one.name: one for one in (TracedInterfaces, ScreenInterfaces, FrontInterface)
+}
+
+
+#: Interfaces that rays may meet if nobody asks for a number: wine in a glass needs them, and few rays go as far.
+USUAL_DEPTH = 12
+
+
+def _default_interfaces(*, solid: bool) -> Interfaces:
+    """The way that the planner takes, if nobody asks for one: sheets, which bend no ray, need no tracing."""
+    return TracedInterfaces(depth=USUAL_DEPTH) if solid else ScreenInterfaces()
+
+
+def chosen_interfaces(scene: Scene, asked: Interfaces | None, *, sheets: bool) -> tuple[Interfaces, str]:
+    """The way in which interfaces are found, and why it is not the one that the planner would rather take.
+
+    Parameters
+    ----------
+    scene : Scene
+    asked : Interfaces, optional
+    sheets : bool
+        All bodies are drawn as sheets.
+
+    Raises
+    ------
+    InputError
+        If what is asked for cannot be done in the scene.
+    """
+    solid = not sheets and any(scene.objects[i].sheet_thickness is None for i in with_interfaces(scene))
+    wanted = _default_interfaces(solid=solid) if asked is None else asked
+    if wanted.one_interface and not solid:
+        return ScreenInterfaces(), ""  # sheets have one interface, whatever is asked for
+    if sheets or not with_interfaces(scene) or (refusal := wanted.refusal(scene)) is None:
+        return wanted, ""
+    found, do = refusal
+    if asked is not None:
+        raise InputError(str(asked), found, do)
+    return ScreenInterfaces(), found
