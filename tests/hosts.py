@@ -10,11 +10,17 @@ import numpy as np
 import translucent as tl
 from tests import references
 from translucent.frames.metrics import interior
-from translucent.gpu.balance import Balance, face_counts
-from translucent.gpu.body_uniforms import BodyRoles, body_records, clip_rows
 from translucent.gpu.layout import BLOCKS
-from translucent.gpu.placement import PlacedScene, SampleView
-from translucent.gpu.uniforms import environment_uniforms, media_center, shade_uniforms, view_uniforms
+from translucent.gpu.placement import Balance, PlacedScene, SampleView, face_counts
+from translucent.gpu.uniforms import (
+    BodyRoles,
+    body_records,
+    clip_rows,
+    environment_uniforms,
+    media_center,
+    shade_uniforms,
+    view_uniforms,
+)
 
 #: Bits of the grid onto which software rasterizers move vertices.
 SUBPIXEL_BITS = 8

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from tests.hosts import Host
-from translucent.gpu.probe import Signature
+from tests.probe import Signature
 
 _WIDTH = {"float": 1, "vec2": 2, "vec3": 3, "vec4": 4}
 _KIND = {1: "f32", 2: "vec2<f32>", 3: "vec3<f32>", 4: "vec4<f32>"}
 
 
 def run_function(device: Any, library: str, signature: Signature, arguments: list[np.ndarray]) -> np.ndarray:
-    """Evaluate a function of a library in WGSL over arrays, as `translucent.gpu.probe.run_function` does in GLSL."""
+    """Evaluate a function of a library in WGSL over arrays, as `tests.probe.run_function` does in GLSL."""
     import wgpu
 
     count = len(arguments[0])

@@ -21,10 +21,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout, w
 
 from translucent.assets import mesh_path
 from translucent.errors import InputError
-from translucent.gpu.balance import COVERAGE_FLOOR, OPEN_WEIGHTS, ROUNDING
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.lifting import lift
-from translucent.gpu.placement import NEAR_SURFACE
+from translucent.gpu.placement import COVERAGE_FLOOR, NEAR_SURFACE, OPEN_WEIGHTS, ROUNDING
 
 ROOT = Path(__file__).resolve().parents[1]
 WEB = ROOT / "web"

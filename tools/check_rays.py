@@ -21,14 +21,13 @@ import trimesh
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import translucent as tl
+from tests.ray_probe import RayProbe
 from tests.rays import agreeing, embree_nearest, inside_points, random_rays
 from translucent.assets import mesh_path
 from translucent.geometry.bvh import build_hierarchy, sah_cost
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.normals import drawn_normals
-from translucent.gpu.hierarchies import SceneHierarchies
-from translucent.gpu.packed_meshes import packed_mesh
-from translucent.gpu.ray_probe import RayProbe
+from translucent.gpu.hierarchies import SceneHierarchies, packed_mesh
 
 #: Meshes of the toolkit: a shape of blobs, thin walls, many turns, and holes.
 OWN = ("bear", "goblet", "knot", "bangle")

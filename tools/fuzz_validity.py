@@ -32,7 +32,7 @@ import translucent as tl
 from translucent.assets import mesh_path
 from translucent.errors import InputError
 from translucent.geometry.solids import Box, Sphere, Torus
-from translucent.gpu.drivers import DriverFaultError
+from translucent.gpu.context import DriverFaultError
 
 SIZE = (48, 36)
 

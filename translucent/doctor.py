@@ -13,7 +13,7 @@ from translucent.cpu.threads import processors
 from translucent.errors import RenderError
 from translucent.geometry.embree import embree_versions
 from translucent.gpu.context import Backend, NoContextError, open_context
-from translucent.gpu.storage import SHADER_STORAGE
+from translucent.gpu.targets import SHADER_STORAGE
 
 #: Optional packages, and the purpose of each.
 OPTIONAL = {

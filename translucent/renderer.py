@@ -16,8 +16,8 @@ from translucent.arguments import brief, checked, checked_but
 from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.formulas.tone import tone_curve
 from translucent.frames.frame import Frame, check_exposure
-from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
+from translucent.gpu.job import TextureBackdrop
 from translucent.gpu.renderer import GpuRenderer
 from translucent.planning.caustics import Caustics
 from translucent.planning.interfaces import Interfaces

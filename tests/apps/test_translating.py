@@ -17,13 +17,13 @@ import pytest
 import translucent as tl
 from tests import webgpu
 from tests.hosts import BODY, RESOLVE, SUM, Host
+from tests.probe import signatures
 from tests.twins import ARGUMENTS, assert_equals_twin
 from translucent.assets import shader_library
 from translucent.commands.shader import NAGA, Language, translate
 from translucent.gpu import lifting
 from translucent.gpu.layout import BLOCKS
 from translucent.gpu.lifting import lift
-from translucent.gpu.probe import signatures
 
 #: The passes that make thickness of faces, and transmittance of thickness: whose texts an engine needs.
 STAGES = {

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from tests.browser.pages import WebPage, decoded, encoded
+from tests.probe import feedback_program, signatures
 from tests.twins import ARGUMENTS, assert_equals_twin
 from translucent.assets import shader_library, shader_names
 from translucent.errors import InputError
 from translucent.gpu.lifting import lift, switches
-from translucent.gpu.probe import feedback_program, signatures
 
 COMPILE = """(texts) => {
   const gl = document.createElement("canvas").getContext("webgl2");

@@ -10,9 +10,8 @@ import pytest
 
 import translucent as tl
 from translucent.gpu import shaders
-from translucent.gpu.layout import BLOCKS, TABLES
+from translucent.gpu.layout import BLOCKS, TABLES, PackedTable, UniformBlock
 from translucent.gpu.shaders import build_program, preprocess, set_uniform
-from translucent.gpu.std140 import PackedTable, UniformBlock
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests.probe import run_function, signatures
 from tests.twins import ARGUMENTS, MODULES, assert_equals_twin
 from translucent.assets import shader_library
-from translucent.gpu.probe import run_function, signatures
 
 #: Functions of these modules that are no formulas of light, and so have no twin.
 HOST_ONLY = {

@@ -7,7 +7,7 @@ from collections.abc import Generator
 import pytest
 
 from translucent.errors import InputError
-from translucent.gpu.drivers import DriverFaultError
+from translucent.gpu.context import DriverFaultError
 
 
 @pytest.hookimpl(wrapper=True)

@@ -10,8 +10,15 @@ import trimesh
 
 import translucent as tl
 from tests.values.plan_scenes import BOX, GLASS, OPEN, body, scene, sheet
-from translucent.gpu.balance import COVERAGE_FLOOR, ROUNDING, UNEXPECTED, Balance, count_weights, face_counts
-from translucent.gpu.placement import PlacedScene
+from translucent.gpu.placement import (
+    COVERAGE_FLOOR,
+    ROUNDING,
+    UNEXPECTED,
+    Balance,
+    PlacedScene,
+    count_weights,
+    face_counts,
+)
 from translucent.planning.methods import Method
 
 INSIDE, ON_FACE, OUTSIDE = (0.1, 0.1, 0.1), (0.1, 0.2, 0.5), (0.1, 0.1, 20.0)

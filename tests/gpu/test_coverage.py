@@ -9,7 +9,7 @@ import trimesh
 import translucent as tl
 from translucent.arrays import Array
 from translucent.gpu import job
-from translucent.gpu.coverage import Part, extents, part_of
+from translucent.gpu.placement import Part, extents, part_of
 from translucent.planning.methods import METHODS
 
 SIZE = (53, 41)

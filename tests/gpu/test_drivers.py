@@ -17,7 +17,7 @@ import translucent as tl
 from translucent.errors import RenderError, TranslucentWarning
 from translucent.geometry.solids import Sphere
 from translucent.gpu import renderer as renderers
-from translucent.gpu.drivers import avoid_full_cache, quick_compiles, require_interfaces
+from translucent.gpu.context import avoid_full_cache, quick_compiles, require_interfaces
 
 LAVAPIPE = {
     "GL_RENDERER": "zink (llvmpipe (LLVM 15.0.6, 256 bits))",
@@ -40,7 +40,8 @@ def test_only_the_driver_at_fault_is_refused(other: dict[str, str]) -> None:
 def test_a_renderer_that_refuses_interfaces_goes_on(
     monkeypatch: pytest.MonkeyPatch, interfaces: tl.ScreenInterfaces | None
 ) -> None:
-    from translucent.gpu.passes import surfaces, traced_interfaces
+    from translucent.gpu.passes import interfaces as surfaces
+    from translucent.gpu.passes import traced_interfaces
 
     def refuse(_: Any) -> None:
         require_interfaces(LAVAPIPE)

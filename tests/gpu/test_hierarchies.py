@@ -15,15 +15,14 @@ import pytest
 import trimesh
 
 import translucent as tl
+from tests.ray_probe import RayProbe
 from tests.rays import Found, agreeing, embree_nearest, inside_points, random_rays, through
 from translucent.assets import mesh_path
 from translucent.geometry.solids import Box, Sphere
+from translucent.gpu import hierarchies
 from translucent.gpu import hierarchies as module
-from translucent.gpu import packed_meshes
-from translucent.gpu.hierarchies import HierarchyCache, SceneHierarchies
+from translucent.gpu.hierarchies import HierarchyCache, SceneHierarchies, packed_mesh
 from translucent.gpu.layout import OBJECT_ROW
-from translucent.gpu.packed_meshes import packed_mesh
-from translucent.gpu.ray_probe import RayProbe
 from translucent.gpu.textures import unlike_powers
 from translucent.reference.hits import camera_hits
 
@@ -253,7 +252,7 @@ def fake(limit: int) -> Any:
 
 
 def test_textures_that_do_not_fit_are_refused_before_they_are_built(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(packed_meshes, "build_hierarchy", None)
+    monkeypatch.setattr(hierarchies, "build_hierarchy", None)
     with pytest.raises(tl.RenderError, match=r"end at 2048 texels a side, .* use interfaces=tl.ScreenInterfaces\(\)$"):
         SceneHierarchies(fake(2048), [ball()], 1)
     # Thirty million triangles, of which only the number is asked for.
@@ -270,7 +269,7 @@ def test_textures_that_turn_out_not_to_fit_are_refused(monkeypatch: pytest.Monke
 
 
 def test_much_memory_is_told_before_it_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(packed_meshes, "build_hierarchy", None)
+    monkeypatch.setattr(hierarchies, "build_hierarchy", None)
     monkeypatch.setattr(module, "MUCH_MEMORY", 1 << 20)
     with pytest.warns(tl.TranslucentWarning, match=r"20,480 triangles takes up to 18.6 MiB of memory; use"):
         module._require_room(fake(16384), [ball(5)])

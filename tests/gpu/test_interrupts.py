@@ -20,10 +20,10 @@ import pytest
 import translucent as tl
 from translucent.geometry.solids import Sphere
 from translucent.gpu import context as contexts
+from translucent.gpu import pass_costs as timers
 from translucent.gpu import renderer as renderers
-from translucent.gpu import signals as deferrals
-from translucent.gpu import timer as timers
-from translucent.gpu.signals import DeferredSignals
+from translucent.gpu import shaders as deferrals
+from translucent.gpu.shaders import DeferredSignals
 
 SIZE = (12, 8)
 MEDIUM = tl.Medium(absorption=(1, 2, 3))

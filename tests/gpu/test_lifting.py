@@ -14,8 +14,7 @@ from translucent.frames.frame import ARRAYS
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import shaders
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.dialects import ES, PLAIN, VULKAN, WITH_STORAGE, Dialect
-from translucent.gpu.lifting import find_shader, lift, switches
+from translucent.gpu.lifting import ES, PLAIN, VULKAN, WITH_STORAGE, Dialect, find_shader, lift, switches
 from translucent.gpu.shaders import ShaderSource, gather
 
 SIZE = (24, 18)

@@ -10,13 +10,11 @@ import trimesh
 
 import translucent as tl
 from tests.work import calls
-from translucent.gpu import shadow_cameras
-from translucent.gpu.balance import face_counts
-from translucent.gpu.body_uniforms import BodyRoles, body_records, clip_rows
+from translucent.gpu import light_cameras
 from translucent.gpu.constants import INTERIOR_SIZE
-from translucent.gpu.light_cameras import support_of
-from translucent.gpu.placement import PlacedScene, SampleView
-from translucent.gpu.shadow_cameras import ShadowThrowers
+from translucent.gpu.light_cameras import ShadowThrowers, support_of
+from translucent.gpu.placement import PlacedScene, SampleView, face_counts
+from translucent.gpu.uniforms import BodyRoles, body_records, clip_rows
 
 _BOX = trimesh.creation.box((1, 1, 1))
 BOX = tl.Mesh(_BOX.vertices, _BOX.faces)
@@ -102,7 +100,7 @@ def test_tiles_that_shadow_none_are_found_in_linear_time() -> None:
 
 
 def test_tiles_beyond_those_that_are_compared_throw_shadows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shadow_cameras, "MOST_GROUNDS", 4)
+    monkeypatch.setattr(light_cameras, "MOST_GROUNDS", 4)
     found = _floor(FEW)[1]
     assert len(found.grounds) == 4
     assert set(found.in_the_way) == set(range(FEW)) - set(found.grounds)

@@ -18,8 +18,8 @@ from translucent.assets import mesh_path
 from translucent.frames.metrics import interior
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.constants import PEEL_BATCH
-from translucent.gpu.storage import Storage
-from translucent.gpu.timer import PassTimer
+from translucent.gpu.pass_costs import PassTimer
+from translucent.gpu.targets import Storage
 
 SIZE = (160, 120)
 #: For pictures in which a pixel of that size would see past an edge without its neighbors telling.

@@ -259,7 +259,7 @@ def test_denser_media_than_float32_can_tell_are_a_limit(renderer: tl.Renderer) -
 
 
 def test_views_shrink_until_they_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    from translucent.gpu.storage import Storage
+    from translucent.gpu.targets import Storage
 
     scene = ball_scene(LIGHTS["near"], 3.0)
     with tl.Renderer() as roomy:
@@ -279,7 +279,7 @@ def test_views_shrink_until_they_fit(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_frame_after_a_failed_one_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    from translucent.gpu.storage import Storage
+    from translucent.gpu.targets import Storage
 
     scene = ball_scene(LIGHTS["near"], 3.0)
     with tl.Renderer() as renderer:

@@ -14,9 +14,8 @@ import trimesh
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.geometry.solids import Box, Sphere
-from translucent.gpu.light_cameras import support_of
+from translucent.gpu.light_cameras import ShadowThrowers, support_of
 from translucent.gpu.shadow_atlas import LEAST_TEXELS, MOST_BYTES, ShadowViews
-from translucent.gpu.shadow_cameras import ShadowThrowers
 from translucent.planning.mirrors import lit_side
 from translucent.scene.stages import staged
 

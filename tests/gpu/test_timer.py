@@ -12,8 +12,8 @@ import pytest
 import trimesh
 
 import translucent as tl
-from translucent.gpu import timer as timers
-from translucent.gpu.timer import PassTimer
+from translucent.gpu import pass_costs as timers
+from translucent.gpu.pass_costs import PassTimer
 from translucent.planning.passes import PassName
 
 

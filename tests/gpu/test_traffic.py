@@ -12,10 +12,9 @@ import pytest
 
 import translucent as tl
 from tests.gpu.test_compact import BALL, CAMERA, MEDIA, OPEN, SCENES, SIZE, balls, with_opaque
-from translucent.gpu.formats import FORMATS
+from translucent.gpu.pass_costs import PassTraffic, frame_traffic
 from translucent.gpu.recording import frames
-from translucent.gpu.targets import Targets
-from translucent.gpu.traffic import PassTraffic, frame_traffic
+from translucent.gpu.targets import FORMATS, Targets
 from translucent.planning.passes import PassName
 
 SHEET = tl.Object(BALL, MEDIA[0], sheet_thickness=0.01)

@@ -12,8 +12,8 @@ import pytest
 import translucent as tl
 from tests.values.plan_scenes import plan_over_backdrop
 from translucent.geometry.solids import Box, Sphere
-from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.job import TextureBackdrop
 from translucent.gpu.placement import AxialRange
 
 Array = npt.NDArray[Any]

@@ -20,8 +20,8 @@ from translucent import assets as data
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals, made_normals
 from translucent.geometry.solids import Box, Sphere
-from translucent.gpu.compile_budget import CompileBudget, PostponedError, ProgramName
-from translucent.gpu.packed_meshes import has_packed
+from translucent.gpu.hierarchies import has_packed
+from translucent.gpu.shaders import CompileBudget, PostponedError, ProgramName
 from translucent.gpu.viewport import Viewport
 from translucent.planning.passes import PassName
 from translucent.preview import preparation, viewport_renderer

@@ -9,7 +9,7 @@ import pytest
 
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels
-from translucent.gpu import convergence
+from translucent.gpu import refinement
 from translucent.preview.actions import SetField, Turn
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
@@ -25,7 +25,7 @@ def view() -> Iterator[ViewportRenderer]:
 def test_a_still_picture_converges_until_something_changes(
     view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(convergence, "MOST_PATHS", 16)
+    monkeypatch.setattr(refinement, "MOST_PATHS", 16)
     work.do(SetField("material.ior", 1.5))
     finish(view, work)
     interactive = pixels(view)

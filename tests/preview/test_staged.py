@@ -13,8 +13,8 @@ import pytest
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.cli import main
-from translucent.gpu.compile_budget import PostponedError
 from translucent.gpu.passes import shadow_maps
+from translucent.gpu.shaders import PostponedError
 from translucent.planning.request import RenderRequest
 from translucent.preview import quality
 from translucent.preview.actions import ChoosePreset, SetField, Turn

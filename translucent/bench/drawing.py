@@ -22,12 +22,11 @@ from translucent.bench.record import Ratio, TimeStatistics
 from translucent.frames.frame import Frame
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
+from translucent.gpu.pass_costs import PassTimer
 from translucent.gpu.passes import PASSES, Pass
-from translucent.gpu.passes.depth_only import DepthOnlyPass
-from translucent.gpu.passes.shortcuts import Shortcut
+from translucent.gpu.passes.shortcuts import DepthOnlyPass, Shortcut
 from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
-from translucent.gpu.timer import PassTimer
 from translucent.planning.methods import SignedDepth
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan

@@ -35,10 +35,8 @@ from translucent.frames.metrics import interior
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.job import FrameJob
-from translucent.gpu.light_cameras import support_of
-from translucent.gpu.passes.depth_only import DepthOnlyPass
-from translucent.gpu.passes.shortcuts import HalfFloatPass
-from translucent.gpu.shadow_cameras import ShadowThrowers
+from translucent.gpu.light_cameras import ShadowThrowers, support_of
+from translucent.gpu.passes.shortcuts import DepthOnlyPass, HalfFloatPass
 from translucent.gpu.targets import Targets
 from translucent.media.medium import Medium
 from translucent.planning.passes import PassName

@@ -1,4 +1,4 @@
-"""``translucent explain``: a mesh or a scene, and how it would be rendered; ``translucent doctor``: this machine."""
+"""``translucent explain``: what is known about a mesh or a scene, and how it would be rendered."""
 
 from __future__ import annotations
 
@@ -14,17 +14,15 @@ from translucent.commands.options import (
     AnyMediumOptions,
     ChoiceOptions,
     FileOptions,
-    common_options,
     group,
     option,
     stage_option,
     takes,
 )
-from translucent.errors import TranslucentError
 
 if TYPE_CHECKING:
     from translucent.geometry.mesh import Mesh
-    from translucent.gpu.traffic import FrameTraffic
+    from translucent.gpu.pass_costs import FrameTraffic
     from translucent.planning.render_plan import RenderPlan
     from translucent.scene.scene import Object, Scene
 
@@ -133,18 +131,6 @@ def _tell_scene(model: str, scene: Scene) -> None:
 
 
 def _traffic(scene: Scene, chosen: RenderPlan) -> FrameTraffic:
-    from translucent.gpu.traffic import frame_traffic
+    from translucent.gpu.pass_costs import frame_traffic
 
     return frame_traffic(chosen)
-
-
-@click.command(epilog="Example: translucent doctor")
-@common_options
-def doctor(as_json: bool) -> None:
-    """Explain this machine: OpenGL, packages, and what is missing for what."""
-    from translucent import doctor as examination
-
-    facts = examination.examine()
-    echo(json.dumps(facts) if as_json else examination.report(facts))
-    if facts["backend"] is None:
-        raise TranslucentError("rendering", "neither OpenGL nor Embree works", "see the lines above")

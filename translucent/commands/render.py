@@ -160,7 +160,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     translucent render bar.glb -o bar.png --object Wine --preset merlot --object Glass --preset crystal
     """
     import translucent as tl
-    from translucent.gpu.drivers import quick_compiles
+    from translucent.gpu.context import quick_compiles
     from translucent.scene.stages import NO_STAGE, STAGED_TONE
     from translucent.scene.turntable import framed_all_around
 

@@ -24,9 +24,8 @@ from translucent.commands.options import common_options
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
-    from translucent.gpu.dialects import Dialect
-    from translucent.gpu.lifting import Lifted
-    from translucent.gpu.std140 import UniformBlock
+    from translucent.gpu.layout import UniformBlock
+    from translucent.gpu.lifting import Dialect, Lifted
 
 
 _NAME, _TYPE_POINTER, _VARIABLE = 5, 32, 59

@@ -5,24 +5,212 @@
 
 from __future__ import annotations
 
+import ctypes
+import errno
 import json
 import os
 import sys
+import tempfile
 import threading
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
+from importlib import metadata
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 import moderngl
 
 from translucent.arguments import brief
-from translucent.errors import InputError, RenderError
+from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.files.reading import require_allowed
-from translucent.gpu.drivers import avoid_full_cache
-from translucent.gpu.osmesa import OSMesaContext
-from translucent.gpu.signals import DeferredSignals
+from translucent.gpu.shaders import DeferredSignals
+
+WHEEL = "lavavu-osmesa"
+
+_GL_RGBA, _GL_UNSIGNED_BYTE = 0x1908, 0x1401
+_FORMAT, _DEPTH_BITS, _PROFILE, _CORE_PROFILE, _MAJOR, _MINOR = 0x22, 0x30, 0x33, 0x34, 0x36, 0x37
+
+
+class OSMesaContext:
+    """A current OSMesa context of at least OpenGL 3.3 core, in the shape that moderngl takes as ``context=``.
+
+    Raises
+    ------
+    OSError
+        If there is no OSMesa library, or it cannot make the context.
+    """
+
+    def __init__(self) -> None:
+        self._library = _load()
+        attributes = (_FORMAT, _GL_RGBA, _DEPTH_BITS, 24, _PROFILE, _CORE_PROFILE, _MAJOR, 3, _MINOR, 3, 0)
+        self._handle = self._library.OSMesaCreateContextAttribs((ctypes.c_int * len(attributes))(*attributes), None)
+        if not self._handle:
+            raise OSError("libOSMesa cannot make an OpenGL 3.3 core context")
+        # The default framebuffer; nobody draws to it, but it must live as long as the context.
+        self._pixels = (ctypes.c_ubyte * 4)()
+        self.__enter__()
+
+    def load_opengl_function(self, name: str) -> int:
+        """Address of an OpenGL function, 0 where there is none."""
+        return int(self._library.OSMesaGetProcAddress(name.encode()) or 0)
+
+    def __enter__(self) -> OSMesaContext:
+        if not self._library.OSMesaMakeCurrent(self._handle, self._pixels, _GL_UNSIGNED_BYTE, 1, 1):
+            raise OSError("OSMesaMakeCurrent failed")
+        return self
+
+    def __exit__(self, *_: object) -> None:  # moderngl calls it without arguments
+        """Leave the context current: there is no other to go back to."""
+
+    def release(self) -> None:
+        """Destroy the context."""
+        if self._handle:
+            self._library.OSMesaMakeCurrent(None, None, 0, 0, 0)
+            self._library.OSMesaDestroyContext(self._handle)
+            self._handle = None
+
+
+def _load() -> ctypes.CDLL:
+    library = _load_from_wheel() or _load_from_system()
+    create, make_current = library.OSMesaCreateContextAttribs, library.OSMesaMakeCurrent
+    create.restype, create.argtypes = ctypes.c_void_p, [ctypes.POINTER(ctypes.c_int), ctypes.c_void_p]
+    make_current.restype = ctypes.c_ubyte
+    make_current.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint, ctypes.c_int, ctypes.c_int]
+    library.OSMesaGetProcAddress.restype, library.OSMesaGetProcAddress.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
+    library.OSMesaDestroyContext.restype, library.OSMesaDestroyContext.argtypes = None, [ctypes.c_void_p]
+    return library
+
+
+def _load_from_system() -> ctypes.CDLL:
+    try:
+        return ctypes.CDLL("libOSMesa.so.8")
+    except OSError:
+        raise OSError(f"neither the package {WHEEL} nor libOSMesa.so.8 is installed") from None
+
+
+def _load_from_wheel() -> ctypes.CDLL | None:
+    """OSMesa of the Python package, or None where it is not installed.
+
+    The wheel carries the libraries that it needs under names that the loader finds only among those already loaded,
+    so they are loaded over and over until none is left that could not be.
+    """
+    try:
+        files = metadata.distribution(WHEEL).files or []
+    except metadata.PackageNotFoundError:
+        return None
+    waiting = sorted(Path(str(f.locate())).resolve() for f in files if ".libs/" in f.as_posix() and ".so" in f.name)
+    found: ctypes.CDLL | None = None
+    progress = True
+    while waiting and progress:
+        failed = []
+        for path in waiting:
+            try:
+                library = ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
+            except OSError:
+                failed.append(path)
+                continue
+            if path.name.startswith("libOSMesa"):
+                found = library
+        progress, waiting = len(failed) < len(waiting), failed
+    return found
+
+
+class DriverFaultError(RenderError):
+    """Error for a request that would crash the process through a fault of the driver."""
+
+
+def require_interfaces(info: Mapping[str, Any]) -> None:
+    """Raise `DriverFaultError` where the driver crashes on the shading of interfaces, and of lit opaque surfaces.
+
+    Lavapipe 22 reads before the first of its constant buffers where it inlines uniforms into that shader.
+    """
+    if str(info["GL_RENDERER"]).startswith("zink (llvmpipe") and "Mesa 22." in str(info["GL_VERSION"]):
+        raise DriverFaultError(
+            "interfaces of bodies, or surfaces of opaque objects in lights, with zink over lavapipe",
+            f"this driver, {info['GL_VERSION']}, ends the process on them",
+            "use another driver, a newer Mesa, or objects without ior and surface",
+        )
+
+
+#: Mesa's variable that leaves out what makes the code of its software rasterizer faster (docs.mesa3d.org/envvars.html).
+_QUICK = "GALLIVM_PERF", "nopt"
+
+
+@contextmanager
+def quick_compiles(wanted: bool) -> Iterator[None]:
+    """Have an OpenGL that is opened meanwhile compile in half the time: the same picture, drawn a fifth slower.
+
+    Mesa's software rasterizer does, where it is the first of its process, and the variable is not set otherwise.
+    """
+    name, value = _QUICK
+    if not wanted or name in os.environ:
+        yield
+        return
+    os.environ[name] = value
+    try:
+        yield
+    finally:
+        del os.environ[name]
+
+
+#: Bytes of the index that Mesa's cache of compiled shaders maps into memory (``disk_cache_os.c``), and of room for it
+#: and for the shaders of a session, where there is none yet.
+_INDEX, _ROOM = 8 + (20 << 16), 1 << 24
+
+
+def avoid_full_cache() -> None:
+    """Leave out Mesa's cache of compiled shaders in this process, with a warning, where the disk has no room for it.
+
+    To be called before OpenGL is opened. Some builds of Mesa map an index that has no blocks on the disk yet, and
+    a write to it ends the process by SIGBUS where the disk, or the user's quota, is full.
+    """
+    off = "MESA_SHADER_CACHE_DISABLE"
+    if not sys.platform.startswith("linux") or os.environ.get(off, "").lower() in ("1", "true", "yes", "y", "t"):
+        return
+    for folder in _cache_folders():
+        try:
+            _allocate_cache(folder)
+        except OSError as error:
+            # Where Mesa may not write at all it leaves the cache out by itself.
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                continue
+            os.environ[off] = "true"
+            found = f"no room in {str(folder)!r} ({error.strerror})"
+            do = "free some, or set MESA_SHADER_CACHE_DIR: shaders are not kept, so that each process compiles its own"
+            warnings.warn(f"Mesa's cache of shaders; {found}; {do}", TranslucentWarning, stacklevel=2)
+            return
+
+
+def _cache_folders() -> list[Path]:
+    """Folders in which Mesa may keep its cache: the one that is set, or that of the user, which versions take from
+    ``HOME`` or from the system's list of users.
+    """
+    for name in ("MESA_SHADER_CACHE_DIR", "MESA_GLSL_CACHE_DIR", "XDG_CACHE_HOME"):
+        if name in os.environ:
+            return [Path(os.environ[name])]
+    found = {os.environ.get("HOME", "")}
+    with suppress(KeyError):  # a user whom the system does not list
+        import pwd
+
+        found.add(pwd.getpwuid(os.getuid()).pw_dir)
+    return [Path(home, ".cache") for home in sorted(found) if home]
+
+
+def _allocate_cache(folder: Path) -> None:
+    """Give the index of a cache all its blocks on the disk; where there is none yet, only try."""
+    if sys.platform == "linux":  # for checkers of types: other systems lack posix_fallocate
+        indices = list(folder.glob("mesa_shader_cache*/index"))
+        for index in indices:
+            with index.open("r+b") as file:
+                os.posix_fallocate(file.fileno(), 0, _INDEX)
+        if not indices:
+            there = next(path for path in (folder, *folder.absolute().parents) if path.is_dir())
+            with tempfile.TemporaryFile(dir=there) as file:
+                os.posix_fallocate(file.fileno(), 0, _ROOM)
+
 
 Backend = Literal["egl", "window", "osmesa"]
 

@@ -3,41 +3,196 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.gpu.backdrop import TextureBackdrop
-from translucent.gpu.balance import Balance, FaceCounts, face_counts
-from translucent.gpu.body_uniforms import BodyRoles
-from translucent.gpu.coverage import extents, part_of
-from translucent.gpu.densities import density_uniforms, scene_grids
-from translucent.gpu.diffusion import DiffusedLight
+from translucent.gpu.diffusion import DiffusedLight, density_uniforms, scene_grids
 from translucent.gpu.features import FrameFeatures
-from translucent.gpu.layout import DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES
+from translucent.gpu.layout import (
+    BODY,
+    BODY_STRIDE,
+    DENSITY,
+    ENVIRONMENT,
+    LIGHTS,
+    MEDIA,
+    SCATTER,
+    SHADE,
+    SURFACES,
+    VIEW,
+    UniformBlock,
+)
 from translucent.gpu.light_cameras import media_sphere
-from translucent.gpu.object_table import Fields, object_rows, packed_objects
-from translucent.gpu.placement import PlacedScene, SampleView, depth_range
+from translucent.gpu.placement import (
+    Balance,
+    FaceCounts,
+    PlacedScene,
+    SampleView,
+    depth_range,
+    extents,
+    face_counts,
+    part_of,
+)
 from translucent.gpu.resources import Resources
-from translucent.gpu.scene_view import CameraView
-from translucent.gpu.std140 import UniformBlock
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import (
+    BodyRoles,
+    Fields,
     LightLookup,
+    body_records,
+    clip_rows,
     environment_uniforms,
     light_uniforms,
     media_center,
     media_uniforms,
+    object_rows,
+    packed_objects,
     scatter_uniforms,
     shade_uniforms,
     surface_uniforms,
+    view_uniforms,
 )
 from translucent.planning.passes import PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.backdrop import Backdrop
+
+
+@dataclass(frozen=True, eq=False)
+class TextureBackdrop:
+    """Backdrop in textures of the same context, so that nothing is read back; it is seen everywhere.
+
+    Parameters
+    ----------
+    color : moderngl.Texture
+        RGB that is linear to the power of 1 / `gamma`. Row 0 is the bottom row, as OpenGL draws.
+    depth : moderngl.Texture
+        What the depth test compared, 0 to 1, at pixel centers; 1 where nothing was drawn.
+    near, far : float
+        Metres along the camera's forward axis where depth is 0 and 1; `far` may be ``inf`` for a perspective camera.
+    orthographic : bool
+        The depth is that of an orthographic camera: linear in metres.
+    gamma : float
+        1 for linear colors.
+    ambient : (float, float, float), optional
+        Linear radiance that lit the picture evenly from all around, as `Backdrop.ambient`.
+    """
+
+    color: moderngl.Texture
+    depth: moderngl.Texture
+    near: float
+    far: float
+    orthographic: bool
+    gamma: float
+    ambient: tuple[float, float, float] | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in pixels."""
+        width, height = self.color.size
+        return width, height
+
+
+class UniformBuffers:
+    """The buffers of all uniform blocks that programs read when they draw a scene as one camera sees it.
+
+    Parameters
+    ----------
+    gl : moderngl.Context
+    placed : PlacedScene
+    roles : BodyRoles
+        Of the objects of the scene.
+    contents : mapping of UniformBlock to bytes
+        Of the blocks that are alike for all samples of a picture.
+    """
+
+    def __init__(
+        self,
+        gl: moderngl.Context,
+        placed: PlacedScene,
+        roles: BodyRoles,
+        contents: Mapping[UniformBlock, bytes],
+    ) -> None:
+        self._gl = gl
+        self._placed = placed
+        self._view = gl.buffer(reserve=VIEW.dtype.itemsize)
+        records = body_records(placed, roles, media_center(placed.scene))
+        self._content = np.zeros((len(records), BODY_STRIDE), np.uint8)
+        self._records = self._content[:, : BODY.dtype.itemsize].view(BODY.dtype)[:, 0]
+        self._records[:] = records
+        self.bodies = gl.buffer(reserve=self._content.nbytes)
+        self._constant = {block: gl.buffer(content) for block, content in contents.items()}
+
+    def place(self, view: SampleView) -> None:
+        """Write and bind the uniforms for some sample points."""
+        self._records["clip_from_offset"] = clip_rows(self._placed, view)
+        self.bodies.write(self._content)
+        self._view.write(view_uniforms(view, self._placed))
+        self.bind()
+
+    def add(self, block: UniformBlock, content: bytes) -> None:
+        """Add a block that is the same for all samples; `bind` binds it."""
+        if block in self._constant:
+            self._constant[block].release()
+        self._constant[block] = self._gl.buffer(content)
+
+    def bind(self) -> None:
+        """Bind these uniforms, where others have been bound since they were placed."""
+        self._view.bind_to_uniform_block(VIEW.binding)
+        for block, buffer in self._constant.items():
+            buffer.bind_to_uniform_block(block.binding)
+
+    def bind_body(self, number: int) -> None:
+        """Bind the uniforms of one object for the next draw."""
+        self.bodies.bind_to_uniform_block(BODY.binding, offset=number * BODY_STRIDE, size=BODY.dtype.itemsize)
+
+    def release(self) -> None:
+        """Free the buffers."""
+        for buffer in (self._view, self.bodies, *self._constant.values()):
+            buffer.release()
+
+
+class CameraView:
+    """Bodies before a camera, with their uniforms, and targets of the size of a picture.
+
+    Parameters
+    ----------
+    placed : PlacedScene
+    roles : BodyRoles
+        Of the objects of the scene.
+    contents : mapping of UniformBlock to bytes
+        Of blocks that are alike for all samples.
+    targets, resources
+    """
+
+    def __init__(
+        self,
+        gl: moderngl.Context,
+        placed: PlacedScene,
+        roles: BodyRoles,
+        contents: Mapping[UniformBlock, bytes],
+        targets: Targets,
+        resources: Resources,
+    ) -> None:
+        self.gl = gl
+        self.scene = placed.scene
+        self.placed = placed
+        self.roles = roles
+        self.targets = targets
+        self.resources = resources
+        self.uniforms = UniformBuffers(gl, placed, roles, contents)
+
+    def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
+        """Draw objects with the current state; front faces are those where a ray enters."""
+        for i in objects:
+            body = self.scene.objects[i]
+            self.uniforms.bind_body(i)
+            self.gl.front_face = "cw" if body.faces_inwards else "ccw"
+            self.resources.meshes[body.mesh].vertex_array(program, body.mesh).render()
+        self.gl.front_face = "ccw"
 
 
 class FrameJob(CameraView):

@@ -11,15 +11,203 @@ import ast
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from translucent.assets import shader_names
 from translucent.errors import InputError, close_names, did_you_mean
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.dialects import Dialect, check_dialect, head_of
-from translucent.gpu.layout import BLOCKS
+from translucent.gpu.layout import BLOCKS, UniformBlock
 from translucent.gpu.shaders import Gathered, gather
-from translucent.gpu.std140 import UniformBlock
-from translucent.gpu.vulkan_glsl import in_vulkan
+
+#: GLSL of desktops, that of WebGL2, which is GLSL ES 3.00, and that of Vulkan.
+Dialect = Literal["glsl", "webgl2", "vulkan"]
+
+#: Identifiers that need a newer GLSL version.
+_STORAGE = re.compile(r"\bstd430\b|\batomic\w+\s*\(")
+_SAMPLER = re.compile(r"\b[iu]?sampler\w+")
+
+#: Versions of GLSL: for all shaders, for those that write to buffers, for WebGL2, and for Vulkan.
+PLAIN, WITH_STORAGE, ES, VULKAN = 330, 430, 300, 450
+
+
+@dataclass(frozen=True)
+class Head:
+    """First lines of a shader.
+
+    Attributes
+    ----------
+    version : int
+        Of GLSL that the code needs.
+    lines : tuple of str
+    """
+
+    version: int
+    lines: tuple[str, ...]
+
+
+def check_dialect(dialect: str) -> None:
+    """Refuse what is no dialect.
+
+    Raises
+    ------
+    InputError
+        Naming those that there are.
+    """
+    if dialect not in get_args(Dialect):
+        raise InputError(f"target {dialect!r}", "unknown", f"use one of {', '.join(get_args(Dialect))}")
+
+
+def head_of(name: str, code: str, dialect: Dialect) -> Head:
+    """First lines for the code of a shader.
+
+    Parameters
+    ----------
+    name : str
+        File under ``shaders/``.
+    code : str
+        Without comments.
+    dialect : {"glsl", "webgl2", "vulkan"}
+
+    Raises
+    ------
+    InputError
+        If the code needs what the dialect lacks.
+    """
+    stores = _STORAGE.search(code) is not None
+    precise = re.search(r"\bprecise\b", code) is not None
+    told = f"// translucent: shaders/{name}"
+    if dialect == "glsl":
+        version = WITH_STORAGE if stores else PLAIN
+        asked = ["#extension GL_ARB_gpu_shader5 : enable // for precise; leave both out elsewhere"] if precise else []
+        return Head(version, (f"#version {version} core", told, *asked))
+    if stores:
+        raise InputError(
+            f"shader {name!r} for {'WebGL2' if dialect == 'webgl2' else 'other languages'}",
+            f"it writes to buffers, which {'WebGL2 has none of' if dialect == 'webgl2' else 'are not translated'}",
+            "use the shaders of a method that does not: signed_depth for sums, peel and peel_fold for ordered segments",
+        )
+    if dialect == "vulkan":
+        asked = ["#extension GL_EXT_samplerless_texture_functions : require"] if "texelFetch" in code else []
+        return Head(VULKAN, (f"#version {VULKAN} core", told, *asked))
+    # Fragment shaders have no precision by default, and most samplers a low one in both stages.
+    samplers = sorted(set(_SAMPLER.findall(code)))
+    highp = [f"precision highp {kind};" for kind in ("float", "int", *samplers)]
+    asked = ["#define precise // not in GLSL ES: a driver may fuse products and sums"] if precise else []
+    return Head(ES, (f"#version {ES} es", told, *highp, *asked))
+
+
+#: Outputs of the vertex shaders of bodies, of the pass over pixels, and of pictures in windows, each by location.
+_OF_BODIES = (
+    "axial",
+    "world_normal",
+    "from_eye",
+    "from_center",
+    "surface_uv",
+    "vertex_color",
+    "irradiance",
+    "counting",
+    "to_axial_depth",
+    "medium_of_body",
+)
+_OF_PICTURES = (
+    "frame_size",
+    "ray_right",
+    "ray_up",
+    "ray_forward",
+    "extinction",
+    "emission",
+    "balance",
+    "beyond",
+    "seen_first",
+    "seen_second",
+    "seen_other",
+    "first_extinction",
+    "second_extinction",
+    "third_extinction",
+    "span",
+    "corner_and_ahead",
+)
+_OF_WINDOWS = ("place",)
+VARYINGS = {name: place for names in (_OF_BODIES, _OF_PICTURES, _OF_WINDOWS) for place, name in enumerate(names)}
+
+#: Bindings of the loose uniforms of a stage, and of the first of its textures. Blocks are below.
+LOOSE = {"frag": 14, "vert": 15}
+FIRST_TEXTURE = {"frag": 16, "vert": 64}
+
+_BLOCK_TEXT = re.compile(r"^layout\(std140, row_major\) uniform (\w+) \{", re.MULTILINE)
+_TEXTURE = re.compile(r"^uniform ([iu]?)sampler(\w+) (\w+);", re.MULTILINE)
+_UNIFORM = re.compile(r"^uniform (\w+ \w+(?:\[\w+\])?;.*)$", re.MULTILINE)
+_VARYING = re.compile(r"^(flat )?(in|out) (\w+) (\w+);", re.MULTILINE)
+_FETCH = r"\b(?:texelFetch|textureSize)\(\s*"
+
+
+def in_vulkan(name: str, texts: Iterable[str], code: str) -> Iterator[str]:
+    """Parts of a shader with their declarations as Vulkan wants them.
+
+    Parameters
+    ----------
+    name : str
+        File under ``shaders/``; its end tells the stage, and what is no stage is taken for fragments.
+    texts : iterable of str
+        Parts, with comments.
+    code : str
+        All of it, without comments.
+    """
+    stage = "vert" if name.endswith(".vert") else "frag"
+    texts = list(texts)
+    loose = [match[1] for text in texts for match in _UNIFORM.finditer(text) if not _TEXTURE.match(match[0])]
+    places = _Places(stage, code)
+    for text in texts:
+        text = _BLOCK_TEXT.sub(places.block, text)
+        text = _VARYING.sub(places.varying, text)
+        text = _TEXTURE.sub(places.texture, text)
+        if _UNIFORM.search(text):
+            # All of them stand where the first one stood.
+            members = "".join(f"    {one}\n" for one in loose)
+            block = f"layout(std140, set = 0, binding = {LOOSE[stage]}) uniform Loose {{\n{members}}};"
+            text = _UNIFORM.sub(lambda _: block, text, count=1) if loose else text  # noqa: B023
+            text = _UNIFORM.sub("", text).strip("\n")
+            loose = []
+        if text:
+            yield text.replace("gl_VertexID", "gl_VertexIndex")
+
+
+class _Places:
+    """Places where the declarations of one shader go."""
+
+    def __init__(self, stage: str, code: str) -> None:
+        self.stage = stage
+        self.code = code
+        self.textures = FIRST_TEXTURE[stage]
+        self.attributes = 0
+
+    def block(self, match: re.Match[str]) -> str:
+        """First line of a uniform block."""
+        return f"layout(std140, set = 0, binding = {BLOCKS[match[1]].binding}) uniform {match[1]} {{"
+
+    def varying(self, match: re.Match[str]) -> str:
+        """An input of a vertex shader in order of appearance, or what stages hand on by its name."""
+        flat, way, kind, name = match.groups()
+        if self.stage == "vert" and way == "in":
+            place = self.attributes
+            self.attributes += 1
+        else:
+            place = VARYINGS[name]
+        return f"layout(location = {place}) {flat or ''}{way} {kind} {name};"
+
+    def texture(self, match: re.Match[str]) -> str:
+        """A texture, and a sampler where more than single texels are read."""
+        prefix, shape, name = match.groups()
+        first = self.textures
+        self.textures += 2
+        if len(re.findall(rf"\b{name}\b", self.code)) == 1 + len(re.findall(rf"{_FETCH}{name}\b", self.code)):
+            return f"layout(set = 0, binding = {first}) uniform {prefix}texture{shape} {name};"
+        return (
+            f"layout(set = 0, binding = {first}) uniform {prefix}texture{shape} {name}_image;\n"
+            f"layout(set = 0, binding = {first + 1}) uniform sampler {name}_sampler;\n"
+            f"#define {name} {prefix}sampler{shape}({name}_image, {name}_sampler)"
+        )
+
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
 _COMMENT = re.compile(r"//.*")
@@ -130,7 +318,7 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
         Values of its switches; those in parts that others leave out may be missing.
     target : {"glsl", "webgl2", "vulkan"}
         GLSL 3.30 core, or 4.30 where it writes to buffers; GLSL ES 3.00, which WebGL2 and OpenGL ES 3.0 take; or
-        GLSL 4.50 for Vulkan (`translucent.gpu.vulkan_glsl`), which translators to other languages read.
+        GLSL 4.50 for Vulkan (`translucent.gpu.lifting`), which translators to other languages read.
 
     Raises
     ------

@@ -2,16 +2,154 @@
 
 from __future__ import annotations
 
-import moderngl
+from collections.abc import Callable
+from weakref import WeakKeyDictionary
 
-from translucent.gpu.buffers import MeshCache
-from translucent.gpu.densities import GridTexture
-from translucent.gpu.diffusion import DiffusionCache
-from translucent.gpu.environment_maps import EnvironmentMaps
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from translucent.geometry.mesh import Mesh, unit_normals
+from translucent.geometry.normals import drawn_normals
+from translucent.gpu.diffusion import DiffusionCache, GridTexture
 from translucent.gpu.hierarchies import HierarchyCache
+from translucent.gpu.shaders import before_making
 from translucent.gpu.shadow_atlas import ShadowAtlas
-from translucent.gpu.storage import Storage
-from translucent.gpu.textures import TextureCache
+from translucent.gpu.targets import Storage
+from translucent.gpu.textures import EnvironmentMaps, TextureCache
+
+#: Faces whose corners are written at a time, so that little memory is taken meanwhile.
+_CHUNK = 1 << 18
+
+
+class MeshBuffers:
+    """Vertex and index buffers of one mesh; vertices are offsets from the center of the mesh, in float32.
+
+    The offsets are taken in float64, so float32 resolves the body's size, not its position in the world. Nothing here
+    refers to the mesh: its end must be able to end these buffers.
+    """
+
+    def __init__(self, gl: moderngl.Context, mesh: Mesh) -> None:
+        self._gl = gl
+        self.offsets = gl.buffer((mesh.vertices - mesh.center).astype(np.float32))
+        self.indices = gl.buffer(mesh.faces)
+        self._flat: moderngl.Buffer | None = None
+        self._smooth: moderngl.Buffer | None = None
+        self._looks: dict[str, moderngl.Buffer] = {}
+        self._arrays: dict[int, moderngl.VertexArray] = {}
+
+    def vertex_array(self, program: moderngl.Program, mesh: Mesh) -> moderngl.VertexArray:
+        """The mesh bound to the inputs of `program`.
+
+        Shared vertices; or where it asks for ``normal``, flat faces; or for ``corner_normal``, faces that look smooth.
+        """
+        if (array := self._arrays.get(program.glo)) is None:
+            if "corner_normal" in program or ("uv" in program and "normal" not in program):
+                # What only glows has no use for normals.
+                lit = "corner_normal" in program
+                layout = ("3f 3f 2f", "offset", "corner_normal", "uv") if lit else ("3f 12x 2f", "offset", "uv")
+                content = [(self._smooth_faces(mesh), *layout), *self._corner_looks(program, mesh)]
+                array = self._gl.vertex_array(program, content)
+            elif "normal" in program:
+                content = [(self._flat_faces(mesh), "3f 3f", "offset", "normal")]
+                if "uv" in program:
+                    content.append((self._of_corners("uv", mesh.uv, mesh), "2f", "uv"))
+                array = self._gl.vertex_array(program, [*content, *self._corner_looks(program, mesh)])
+            else:
+                content = [(self.offsets, "3f", "offset")]
+                array = self._gl.vertex_array(program, content, self.indices, index_element_size=4)
+            self._arrays[program.glo] = array
+        return array
+
+    def _corner_looks(self, program: moderngl.Program, mesh: Mesh) -> list[tuple[moderngl.Buffer, str, str]]:
+        """Colors of the vertices, for a program that asks for them."""
+        if "corner_color" not in program:
+            return []
+        return [(self._of_corners("colors", mesh.colors, mesh), "4f", "corner_color")]
+
+    def _of_corners(self, name: str, values: npt.NDArray[np.float64] | None, mesh: Mesh) -> moderngl.Buffer:
+        """Vertex attribute for each corner of each face; zeros if the mesh lacks it."""
+        if name not in self._looks:
+            content = np.zeros((*mesh.faces.shape, 2)) if values is None else values[mesh.faces]
+            self._looks[name] = self._gl.buffer(content.astype(np.float32))
+        return self._looks[name]
+
+    def _flat_faces(self, mesh: Mesh) -> moderngl.Buffer:
+        """Unshared vertices of all faces, with flat normals."""
+        if self._flat is None:
+            before_making(self._gl)
+            offsets = mesh.vertices - mesh.center
+
+            def rows(part: slice) -> npt.NDArray[np.float32]:
+                corners = offsets[mesh.faces[part]]
+                normals = np.broadcast_to(unit_normals(mesh.vertices, mesh.faces[part])[:, None], corners.shape)
+                return np.concatenate([corners, normals], axis=2).astype(np.float32)
+
+            self._flat = self._written(len(mesh.faces), rows)
+        return self._flat
+
+    def _smooth_faces(self, mesh: Mesh) -> moderngl.Buffer:
+        """Unshared vertices of all faces, with smooth normals and texture coordinates."""
+        if self._smooth is None:
+            before_making(self._gl)
+            normals, offsets = drawn_normals(mesh), (mesh.vertices - mesh.center).astype(np.float32)
+            uv = mesh.uv
+
+            def rows(part: slice) -> npt.NDArray[np.float32]:
+                faces = mesh.faces[part]
+                content = np.zeros((*faces.shape, 8), dtype=np.float32)
+                content[..., :3], content[..., 3:6] = offsets[faces], normals[part]
+                if uv is not None:
+                    content[..., 6:] = uv[faces]
+                return content
+
+            self._smooth = self._written(len(mesh.faces), rows)
+        return self._smooth
+
+    def _written(self, faces: int, rows: Callable[[slice], npt.NDArray[np.float32]]) -> moderngl.Buffer:
+        """Buffer with the `rows` of so many faces, some of which are made at a time."""
+        if faces <= _CHUNK:
+            return self._gl.buffer(rows(slice(None)))
+        buffer, offset = None, 0
+        for begin in range(0, faces, _CHUNK):
+            content = rows(slice(begin, begin + _CHUNK))
+            if buffer is None:
+                buffer = self._gl.buffer(reserve=faces * content.nbytes // len(content))
+            buffer.write(content, offset=offset)
+            offset += content.nbytes
+        assert buffer is not None
+        return buffer
+
+    def release(self) -> None:
+        """Free the OpenGL objects now."""
+        for resource in (*self._arrays.values(), self.offsets, self.indices, self._flat, self._smooth):
+            if resource is not None:
+                resource.release()
+        for buffer in self._looks.values():
+            buffer.release()
+        self._arrays.clear()
+
+
+class MeshCache:
+    """Cache of the buffers of each mesh that has been drawn and is still alive."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._gl = gl
+        self._buffers: WeakKeyDictionary[Mesh, MeshBuffers] = WeakKeyDictionary()
+
+    def __getitem__(self, mesh: Mesh) -> MeshBuffers:
+        if (buffers := self._buffers.get(mesh)) is None:
+            buffers = self._buffers[mesh] = MeshBuffers(self._gl, mesh)
+        return buffers
+
+    def __len__(self) -> int:
+        return len(self._buffers)
+
+    def release(self) -> None:
+        """Free all buffers."""
+        for buffers in list(self._buffers.values()):
+            buffers.release()
+        self._buffers.clear()
 
 
 class Resources:

@@ -1,14 +1,147 @@
-"""Textures to draw into, made when a plan first needs them and kept while the frame size stays."""
+"""Textures and buffers that passes draw into and write to, made when a plan first needs them."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import RenderError
-from translucent.gpu.formats import FORMATS, Format, accumulator_format, compact_format
-from translucent.gpu.storage import Storage
+from translucent.gpu.shaders import before_making
+
+
+@dataclass(frozen=True)
+class Format:
+    """Format of the attachments of a framebuffer.
+
+    Attributes
+    ----------
+    components : tuple of int
+        Of each texture of float32, or of bytes where negative.
+    with_depth : bool
+        There is a depth buffer.
+    windings : int
+        Textures of RGBA32UI behind these.
+    """
+
+    components: tuple[int, ...]
+    with_depth: bool = False
+    windings: int = 0
+
+    @property
+    def attachment_bytes(self) -> tuple[int, ...]:
+        """Bytes of a pixel in each color attachment."""
+        return (*(4 * count if count > 0 else -count for count in self.components), *(16,) * self.windings)
+
+    def bytes_of(self, *attachments: int) -> int:
+        """Bytes of a pixel in some of the color attachments, or in all of them where none is named."""
+        sizes = self.attachment_bytes
+        return sum(sizes[i] for i in attachments) if attachments else sum(sizes)
+
+
+FORMATS = {
+    "accumulated": Format((2,)),
+    "accumulated-spectral": Format((4, 1)),
+    "nearest_and_farthest": Format((4,)),
+    "opaque": Format((1, 4), with_depth=True),
+    "paint": Format((4, 4), with_depth=True),
+    "photons": Format((4,)),
+    "photon_spread": Format((2,)),
+    "entered": Format((4, 4, 4), with_depth=True),
+    "left": Format((4, 4), with_depth=True),
+    "surfaced": Format((4, 4), with_depth=True),
+    "ordered": Format((4, 4, 4)),
+    "peeled": Format((4,), with_depth=True),
+    "peel_state": Format((4, 4, 4, 4, 4), windings=2),
+    "nothing": Format((-1,)),
+    "steepest": Format((1,)),
+    "result": Format((4, 4, 4, 1, -1)),
+    "compact": Format((4, 1)),
+    "compact-spectral": Format((4, 1, 4)),
+    "average": Format((4, 4), with_depth=True),
+    "bent": Format((4, 4), with_depth=True),
+    "unsettled": Format((-1,)),
+    "opaque_mean": Format((4,)),
+    "paths": Format((4, 4)),
+    "layers": Format((4, 4)),
+    "fronts": Format((1,), with_depth=True),
+}
+
+
+def accumulator_format(spectral: bool) -> Format:
+    """Format of `Targets.path_and_count`."""
+    return FORMATS["accumulated-spectral" if spectral else "accumulated"]
+
+
+def compact_format(spectral: bool) -> Format:
+    """Format of `Targets.compact`."""
+    return FORMATS["compact-spectral" if spectral else "compact"]
+
+
+#: First OpenGL version in which shaders write to buffers.
+SHADER_STORAGE = 430
+
+
+class Storage:
+    """Named buffers, made on first use, that only grow.
+
+    Parameters
+    ----------
+    gl : moderngl.Context
+    owner : str
+        What errors call that which the buffers are for.
+    """
+
+    def __init__(self, gl: moderngl.Context, owner: str) -> None:
+        self._gl, self._owner = gl, owner
+        self._buffers: dict[str, moderngl.Buffer] = {}
+
+    def get(self, name: str, size: int) -> moderngl.Buffer:
+        """A buffer of at least `size` bytes; what it held is lost where it has to grow.
+
+        Raises
+        ------
+        RenderError
+            If a shader of this OpenGL cannot reach that many bytes, or there is no room for them.
+        """
+        buffer = self._buffers.get(name)
+        if buffer is not None and buffer.size >= size:
+            return buffer
+        before_making(self._gl)
+        if buffer is not None:
+            buffer.release()
+            del self._buffers[name]
+        try:
+            if size > self.largest:
+                raise moderngl.Error(f"a shader reaches {self.largest / 1e6:.0f} MB")
+            self._buffers[name] = self._gl.buffer(reserve=size)
+        except moderngl.Error as error:
+            raise RenderError(
+                self._owner,
+                f"OpenGL has no room for {size / 1e6:.0f} MB of surfaces ({error})",
+                "use DepthPeeling, render in parts, or smaller",
+            ) from error
+        return self._buffers[name]
+
+    @cached_property
+    def largest(self) -> int:
+        """Bytes of a buffer that a shader can write to."""
+        return int(self._gl.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
+
+    @property
+    def size(self) -> int:
+        """Total size of the buffers in bytes."""
+        return sum(buffer.size for buffer in self._buffers.values())
+
+    def release(self) -> None:
+        """Free all buffers."""
+        for buffer in self._buffers.values():
+            buffer.release()
+        self._buffers.clear()
+
 
 Size = tuple[int, int]
 

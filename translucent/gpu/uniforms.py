@@ -1,36 +1,275 @@
-"""Contents of the uniform blocks: values that shaders read about a frame and its bodies."""
+"""Contents of the uniform blocks and of the table of objects: values that shaders read of a frame."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
+from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.light import ALL_AROUND
-from translucent.gpu.balance import Balance
-from translucent.gpu.body_uniforms import bounded_extinction
-from translucent.gpu.constants import CONSTANTS
+from translucent.formulas.two_stream import two_stream_absorption, two_stream_scattering
+from translucent.gpu.constants import CONSTANTS, OBJECT_TYPES
+from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import (
+    BODY,
     ENVIRONMENT,
     LIGHTS,
     MAX_LIGHT_VIEWS,
     MAX_LIGHTS,
     MEDIA,
+    OBJECT_ROW,
     SCATTER,
     SHADE,
     SURFACES,
     VIEW,
 )
-from translucent.gpu.placement import PlacedScene, SampleView
+from translucent.gpu.placement import NEAR_SURFACE, Balance, FaceCounts, PlacedScene, SampleView
+from translucent.media.medium import VACUUM, Medium
 from translucent.planning.bodies import MAX_SLOTS, Slot
-from translucent.planning.limits import MAX_SCATTER_LIGHTS
+from translucent.planning.limits import MAX_SCATTER_LIGHTS, SHEET_ON_OPAQUE
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
+from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import PositionalLight
-from translucent.scene.scene import Scene
+from translucent.scene.scene import Object, Scene
+from translucent.scene.surface import SMOOTH
+
+#: A medium denser than this over the scene's diagonal is opaque anyway; the limit keeps float32 products finite.
+MAX_SCENE_OPTICAL_DEPTH = 1e30
+
+
+@dataclass(frozen=True, eq=False)
+class BodyRoles:
+    """Roles of the objects of a frame, apart from their placement.
+
+    Attributes
+    ----------
+    anchored : bool
+        Distances count from the center of each body, not from the camera.
+    sheet_thicknesses : (objects,) float64
+        In metres, for passes that draw an object as a sheet.
+    counts : FaceCounts
+        What their faces add to counts.
+    slots : (objects,) int
+        Whose winding number their crossings change.
+    """
+
+    anchored: bool
+    sheet_thicknesses: Array
+    counts: FaceCounts
+    slots: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, features: FrameFeatures, counts: FaceCounts) -> BodyRoles:
+        """Roles of all objects of a frame."""
+        slots = np.zeros(len(features.scene.objects), dtype=np.intp)
+        for number, slot in enumerate(features.slots):
+            slots[list(slot.objects)] = number
+        return cls(not features.plan.method.counts_from_camera, features.sheet_thicknesses, counts, slots)
+
+
+def body_records(placed: PlacedScene, roles: BodyRoles, center: Array) -> npt.NDArray[Any]:
+    """(objects,): contents of the Body blocks, but for what the view changes: `clip_rows`.
+
+    Parameters
+    ----------
+    placed, roles
+    center : (3,) float64
+        Of the media.
+    """
+    scene, media, counts = placed.scene, placed.media, roles.counts
+    camera, diagonal, objects = scene.camera, scene.diagonal, scene.objects
+    records = np.zeros(len(objects), BODY.dtype)
+    seen = placed.camera_from_offset(camera)
+    axes = seen[:, 2].copy()
+    if roles.anchored:
+        axes[~placed.cut, 3] = 0.0
+    records["world_from_normal"] = _normal_matrices(placed)
+    records["eye_from_offset"] = np.eye(4)
+    records["eye_from_offset"][:, :3, :3], records["eye_from_offset"][:, :3, 3] = (
+        placed.matrices[:, :3, :3],
+        placed.anchors,
+    )
+    records["axis"] = axes
+    nothing = np.zeros(3)
+    extinctions = np.array([nothing if item.medium is None else item.medium.extinction for item in objects])
+    records["extinction"][:, :3] = np.minimum(extinctions, _densest(diagonal))
+    records["color"][:, :3] = [item.base_color for item in objects]
+    records["sheet_thickness"] = roles.sheet_thicknesses
+    records["sheet_ior"] = [1.0 if item.medium is None else item.medium.ior for item in objects]
+    records["sheet_tolerance"] = SHEET_ON_OPAQUE * diagonal
+    starts_cut = placed.cut & (camera.fov_y is None)
+    records["axial_start"] = np.where(starts_cut, 0.0, -float(CONSTANTS["NOTHING"]))
+    records["count_weight"], records["count_offset"] = counts.weights, counts.offsets
+    records["subpixel"], records["snapping_share"] = counts.subpixel, counts.snapping_share
+    records["axial_depth_scale"] = 1.0 / media.length
+    records["axial_depth_start"] = (seen[:, 2, 3] - axes[:, 3] - media.near) / media.length
+    records["slot"] = roles.slots
+    records["starts_unknown"] = placed.on_surface
+    records["object"] = np.arange(len(objects))
+    records["anchor_from_center"][:, :3] = placed.anchors + camera.eye - center
+    return records
+
+
+def clip_rows(placed: PlacedScene, view: SampleView) -> Array:
+    """(objects, 4, 4): from offsets to clip space."""
+    camera = view.camera
+    half_width, half_height = camera.half_extent(view.size)
+    seen = placed.camera_from_offset(camera)
+    clip = np.zeros((len(seen), 4, 4))
+    clip[:, 0], clip[:, 1] = seen[:, 0] / half_width, seen[:, 1] / half_height
+    if camera.fov_y is None:
+        clip[:, 3, 3] = 1.0
+    else:
+        clip[:, 3] = seen[:, 2]
+    aside, above = camera.center(view.size)
+    clip[:, 0] -= (2.0 * view.shift[0] / view.size[0] + aside) * clip[:, 3]
+    clip[:, 1] += (2.0 * view.shift[1] / view.size[1] - above) * clip[:, 3]
+    if view.depth_range is not None:
+        near, far = view.depth_range
+        if camera.fov_y is None:
+            clip[:, 2] = (2.0 * seen[:, 2] - (near + far) * clip[:, 3]) / (far - near)
+        else:
+            clip[:, 2] = clip[:, 3] * (far + near) / (far - near) - np.eye(4)[3] * 2.0 * far * near / (far - near)
+    else:
+        # Triangles through the eye itself have no image: they project to 0/0. Clip them just ahead of it.
+        for i in np.flatnonzero(placed.on_surface).tolist():
+            clip[i, 2, 3] = -NEAR_SURFACE * placed.scene.objects[i].mesh.diagonal
+    return clip
+
+
+def _normal_matrices(placed: PlacedScene) -> Array:
+    """(objects, 4, 4): from normals of meshes to those of the world."""
+    inverted = np.array([item.mesh.diagnosis.inverted for item in placed.scene.objects])
+    matrices = np.tile(np.eye(4), (len(inverted), 1, 1))
+    # The inverse transpose keeps outwards outwards under a mirror; only an inverted mesh has its normals inside.
+    turned = np.linalg.inv(placed.matrices[:, :3, :3]).transpose(0, 2, 1) * np.where(inverted, -1.0, 1.0)[:, None, None]
+    # The scale of a normal is lost when it is normalized; unit scale keeps it within float32.
+    matrices[:, :3, :3] = turned / np.abs(turned).max(axis=(1, 2), keepdims=True)
+    return matrices
+
+
+def bounded_extinction(medium: Medium | None, diagonal: float) -> Array:
+    """(3,): extinction in 1/m that float32 can multiply with lengths of the scene; 0 without a medium."""
+    return np.zeros(3) if medium is None else np.minimum(medium.extinction, _densest(diagonal))
+
+
+def _densest(diagonal: float) -> float:
+    """Largest extinction in 1/m in a scene of this size."""
+    return MAX_SCENE_OPTICAL_DEPTH / max(diagonal, float(np.finfo(np.float64).tiny))
+
+
+#: Fields of an object, by their names in `OBJECT_ROW`.
+Fields = Mapping[str, npt.ArrayLike]
+
+#: Placement of an object where no rays are traced.
+_UNPLACED: Fields = dict.fromkeys(("local_x", "local_y", "local_z", "first_node", "node_count", "fading"), 0.0)
+
+#: Fields of a body in which no light diffuses.
+_NO_DIFFUSION: Fields = {
+    "diffuses": 0.0,
+    "grid_low": 0.0,
+    "cells_per_metre": 0.0,
+    "grid_size": 1.0,
+    "first_layer": 0.0,
+    "albedo": 0.0,
+    "conductance": 0.0,
+    "emergent_fluxes": 0.0,
+    "exit_share": 0.0,
+    "mean_cosine": 1.0,
+    "ahead": 0.0,
+    "haze_far": 0.0,
+    "haze_near": 0.0,
+}
+
+
+def object_rows(
+    scene: Scene, sheets: Mapping[int, float], diffused: Mapping[int, Fields] | None = None
+) -> tuple[Fields, ...]:
+    """Media and surfaces of all objects.
+
+    Parameters
+    ----------
+    scene : Scene
+    sheets : dict of int to float
+        Thickness in metres of the objects that are drawn without an inside, by their numbers.
+    diffused : dict of int to dict, optional
+        Fields of those in which light diffuses.
+    """
+    ranks = np.unique([body.priority for body in scene.objects], return_inverse=True)[1] + 1.0
+    numbers: dict[Medium | None, int] = {}
+    rows = []
+    for i, body in enumerate(scene.objects):
+        decides = i not in sheets and body.medium is not None and (body.has_interface or scene.overlap == "priority")
+        own = {"rank": ranks[i] if decides else 0.0, "slot": numbers.setdefault(body.medium, len(numbers))}
+        diffusion = (diffused or {}).get(i, _NO_DIFFUSION)
+        rows.append({**_medium(scene, body, sheets.get(i)), **_surface(body, sheets.get(i)), **own, **diffusion})
+    return tuple(rows)
+
+
+def packed_objects(rows: Sequence[Fields], placements: Sequence[Fields] | None = None) -> npt.NDArray[np.float32]:
+    """(objects, texels, 4): contents of the table; `placements` are those of `SceneHierarchies.place`."""
+    placed = placements or [_UNPLACED] * len(rows)
+    return OBJECT_ROW.pack([{**row, **place} for row, place in zip(rows, placed, strict=True)])
+
+
+def _medium(scene: Scene, body: Object, sheet: float | None) -> Fields:
+    medium, metres = body.medium or VACUUM, 1.0 if sheet is None else sheet
+    extinction = metres * bounded_extinction(medium, scene.diagonal)
+    with np.errstate(under="ignore"):
+        albedo = medium.scattering / np.where(medium.extinction > 0, medium.extinction, 1.0)
+    stream = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
+    limit = MAX_SCENE_OPTICAL_DEPTH / max(scene.diagonal, float(np.finfo(np.float64).tiny))
+    return {
+        "extinction": extinction,
+        "scattering": extinction * albedo,
+        "emission": metres * np.asarray(medium.emission),
+        "phase": medium.phase_function.parameters,
+        "stream_absorption": np.minimum(stream[0], limit),
+        "stream_scattering": np.minimum(stream[1], limit),
+        "inner_mirror": diffuse_interface(medium.ior).reflected,
+        "scatters_much": treatment_of(body) is Treatment.LAYER,
+        "longest": np.linalg.norm(body.bounds[1] - body.bounds[0]),
+    }
+
+
+def _surface(body: Object, sheet: float | None) -> Fields:
+    surface, opaque = body.surface or SMOOTH, body.medium is None
+    return {
+        "type": OBJECT_TYPES.index(_type(body, sheet)),
+        "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
+        "not_closed": not opaque and not body.mesh.diagnosis.solid,
+        "plain": body.surface is None if opaque else body.plain,
+        "one_sided": not surface.double_sided,
+        "color": body.base_color if opaque else np.asarray(surface.color),
+        "transmission": surface.transmission,
+        "ior": surface.ior if body.medium is None else body.medium.ior,
+        "dispersion": surface.dispersion,
+        "roughness": surface.roughness,
+        "metallic": surface.metallic,
+        "emissive": np.asarray(surface.emissive),
+        "passed": surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color),
+        "passed_share": surface.diffuse_transmission,
+        "film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
+        "clearcoat": surface.clearcoat,
+        "clearcoat_roughness": surface.clearcoat_roughness,
+    }
+
+
+def _type(body: Object, sheet: float | None) -> str:
+    if body.medium is None:
+        return "OPAQUE"
+    if body.covers:
+        return "UNSEEN"
+    return "SOLID" if sheet is None else "THIN_WALL" if body.has_interface else "ABSORBER"
+
 
 #: Optical depth, across the scene, of what stops the straight light of lamps.
 STOPPING = 1e5

@@ -9,22 +9,87 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import RenderError
+from translucent.formulas.sampling import sample_shifts
 from translucent.formulas.tone import TONES
 from translucent.frames.aovs import EMPTY, SEEN, WRONG, false_colors
 from translucent.frames.frame import Frame
-from translucent.gpu.compile_budget import before_drawing, before_making
 from translucent.gpu.job import FrameJob
 from translucent.gpu.renderer import GpuRenderer
-from translucent.gpu.shaders import build_program, set_uniform
-from translucent.gpu.strides import STRIDES, phases, shifts
-from translucent.gpu.viewport_side import Side, Size
+from translucent.gpu.shaders import before_drawing, before_making, build_program, set_uniform
 from translucent.planning.render_plan import RenderPlan
+
+#: Strides of steps; the sides of pictures are multiples of the largest.
+STRIDES = (1, 2, 4, 8, 16)
+
+
+@lru_cache(maxsize=4)
+def shifts(samples: int) -> npt.NDArray[np.float64]:
+    """(samples, 2): sub-pixel shifts of a pixel's later samples."""
+    return sample_shifts(samples)
+
+
+@lru_cache(maxsize=len(STRIDES))
+def phases(stride: int) -> list[tuple[tuple[int, int], int]]:
+    """Phases: pixels within stride x stride pixels, in drawing order, and the side of the square that each fills."""
+    order: list[tuple[tuple[int, int], int]] = [((0, 0), stride)]
+    block = stride // 2
+    while block:
+        # Diagonals first: half of the new pixels already make the picture look sharper in both directions.
+        known = {phase for phase, _ in order}
+        fresh = [(x, y) for y in range(0, stride, block) for x in range(0, stride, block) if (x, y) not in known]
+        fresh.sort(key=lambda phase: (phase[0] % (2 * block) == 0) + (phase[1] % (2 * block) == 0))
+        order += [(phase, block) for phase in fresh]
+        block //= 2
+    return order
+
+
+Size = tuple[int, int]
+
+
+class Side:
+    """Accumulated samples of one side of the comparison: radiance, optical depth and thickness, flags."""
+
+    def __init__(self, gl: moderngl.Context, size: Size) -> None:
+        self.size = size
+        try:
+            self.textures = [gl.texture(size, count, dtype="f4") for count in (4, 4, 1)]
+            for texture in self.textures:
+                texture.filter = moderngl.NEAREST, moderngl.NEAREST
+            self.all = gl.framebuffer(self.textures)
+            self.light = gl.framebuffer(self.textures[:1])
+        except moderngl.Error as error:
+            found = f"OpenGL has no room for it ({error})"
+            raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
+        self.step, self.stride = 0, 1
+
+    def known(self) -> list[tuple[int, ...]]:
+        """Drawn phase, of the stride x stride ones, that stands in for each phase; 0 for the rest. In fours."""
+        order = phases(self.stride)
+        found = [0] * STRIDES[-1] ** 2
+        for (x, y), block in order[: max(self.step, 1)]:
+            for i in range(x, x + block):
+                for j in range(y, y + block):
+                    found[i + self.stride * j] = x + self.stride * y
+        # Whole registers: of small ones, OpenGL 3.3 need not have room for those of two frames.
+        return [tuple(found[i : i + 4]) for i in range(0, len(found), 4)]
+
+    def kept(self, x: int, y: int) -> Size:
+        """Position at which pixel (x, y) is kept, once all of them are drawn."""
+        part = self.size[0] // self.stride, self.size[1] // self.stride
+        return x % self.stride * part[0] + x // self.stride, y % self.stride * part[1] + y // self.stride
+
+    def release(self) -> None:
+        """Free the textures."""
+        for resource in (self.all, self.light, *self.textures):
+            resource.release()
+
 
 #: Samples of a pixel after which its edges are smooth.
 SAMPLES = 16

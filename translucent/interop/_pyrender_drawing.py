@@ -17,8 +17,8 @@ from OpenGL import GL
 from OpenGL.error import Error as OpenGLError
 
 from translucent.errors import RenderError
-from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import GpuContext
+from translucent.gpu.job import TextureBackdrop
 from translucent.interop._pyrender_scenes import GAMMA, Clipping, PyrenderPicture, ambient_of
 
 Flags = pyrender.RenderFlags

@@ -18,16 +18,13 @@ from translucent.formulas.tone import TONES
 from translucent.frames.aovs import false_colors
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import drawn_normals
-from translucent.gpu.balance import face_counts
-from translucent.gpu.body_uniforms import BodyRoles, bounded_extinction
 from translucent.gpu.features import FrameFeatures
-from translucent.gpu.layout import BLOCKS, BODY, TABLES
+from translucent.gpu.layout import BLOCKS, BODY, TABLES, PackedTable, UniformBlock
 from translucent.gpu.lifting import lift
-from translucent.gpu.placement import PlacedScene
+from translucent.gpu.placement import PlacedScene, face_counts
 from translucent.gpu.recording.context import INFO, RecordingContext
 from translucent.gpu.recording.frames import FrameRecorder, RecordedFrame
-from translucent.gpu.std140 import PackedTable, UniformBlock
-from translucent.gpu.uniforms import media_center
+from translucent.gpu.uniforms import BodyRoles, bounded_extinction, media_center
 from translucent.media.medium import Medium
 from translucent.media.presets import presets
 from translucent.page.plans import PagePlan, current, editable, variant

@@ -25,10 +25,10 @@ from translucent.formulas.tone import TONES
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import drawn_normals, has_drawn_normals, keep_drawn_normals, made_normals
 from translucent.geometry.solids import Box
-from translucent.gpu.compile_budget import CompileBudget, ProgramName
-from translucent.gpu.packed_meshes import has_packed, keep_packed, pack_mesh
-from translucent.gpu.photon_light import PhotonLight
+from translucent.gpu.hierarchies import has_packed, keep_packed, pack_mesh
+from translucent.gpu.refinement import PhotonLight
 from translucent.gpu.renderer import GpuRenderer
+from translucent.gpu.shaders import CompileBudget, ProgramName
 from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan

@@ -11,8 +11,8 @@ from typing import Any
 from translucent.assets import newest_shader
 from translucent.errors import TranslucentError
 from translucent.geometry.normals import drawn_normals
-from translucent.gpu.compile_budget import PostponedError, ProgramName
 from translucent.gpu.context import open_context
+from translucent.gpu.shaders import PostponedError, ProgramName
 from translucent.gpu.viewport import PixelProbe, Shown, Viewport
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
@@ -25,13 +25,12 @@ from translucent.preview.quality import (
     SCREEN,
     FrameBudget,
     InteractiveQuality,
-    PathRefinement,
-    PhotonRefinement,
     StepTimes,
     StepTiming,
     Strides,
     samples_of,
 )
+from translucent.preview.refining import PathRefinement, PhotonRefinement
 from translucent.preview.scenes import method_of, request_of, tone_of
 from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace

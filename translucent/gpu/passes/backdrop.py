@@ -7,9 +7,8 @@ import math
 import moderngl
 import numpy as np
 
-from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.job import FrameJob
+from translucent.gpu.job import FrameJob, TextureBackdrop
 from translucent.gpu.passes.opaque import shadow_switches
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform

@@ -9,14 +9,13 @@ import moderngl
 import numpy as np
 
 from translucent.errors import RenderError
-from translucent.gpu.compile_budget import before_making
 from translucent.gpu.constants import CONSTANTS, PHOTON_WIDTH
-from translucent.gpu.drivers import require_interfaces
+from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps, OpaquePass, shadow_switches
 from translucent.gpu.passes.traced_interfaces import all_closed
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
-from translucent.gpu.shaders import build_program, set_uniform
+from translucent.gpu.shaders import before_making, build_program, set_uniform
 from translucent.gpu.uniforms import media_center
 from translucent.planning.caustics import PhotonAim, photon_aims
 from translucent.planning.passes import PassSpec

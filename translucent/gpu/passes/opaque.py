@@ -6,11 +6,10 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.drivers import require_interfaces
-from translucent.gpu.job import FrameJob
+from translucent.gpu.context import require_interfaces
+from translucent.gpu.job import CameraView, FrameJob
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.resources import Resources
-from translucent.gpu.scene_view import CameraView
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table, texture_units
 from translucent.planning.passes import PassSpec

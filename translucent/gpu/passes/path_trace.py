@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from translucent.errors import RenderError
-from translucent.gpu.drivers import require_interfaces
+from translucent.gpu.context import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import interface_shadow_switches

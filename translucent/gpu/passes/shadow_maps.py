@@ -12,25 +12,22 @@ import moderngl
 import numpy as np
 
 from translucent.arrays import Array
-from translucent.gpu.balance import FaceCounts
-from translucent.gpu.body_uniforms import BodyRoles, bounded_extinction
-from translucent.gpu.compile_budget import before_making
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
-from translucent.gpu.light_cameras import light_key, objects_key, support_of
+from translucent.gpu.light_cameras import ShadowThrowers, holds_eye, light_key, objects_key, support_of
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
 from translucent.gpu.passes.transmittance import TransmittancePass
-from translucent.gpu.placement import AxialRange, PlacedScene, depth_range
+from translucent.gpu.placement import AxialRange, FaceCounts, PlacedScene, depth_range
 from translucent.gpu.resources import Resources
+from translucent.gpu.shaders import before_making
 from translucent.gpu.shadow_atlas import Seen, ShadowView, ShadowViews
-from translucent.gpu.shadow_cameras import ShadowThrowers, holds_eye
 from translucent.gpu.targets import Targets
-from translucent.gpu.uniforms import media_center
+from translucent.gpu.uniforms import BodyRoles, bounded_extinction, media_center
 from translucent.media.medium import Medium
 from translucent.planning.mirrors import lit_side
 from translucent.planning.passes import PassName, PassSpec

@@ -9,13 +9,13 @@ import moderngl
 import numpy as np
 
 from translucent.formulas.footprint import FOOTPRINT_STEP
-from translucent.gpu.coverage import extents, part_of
-from translucent.gpu.drivers import require_interfaces
+from translucent.gpu.context import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.no_interface import NoInterface
+from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
 from translucent.gpu.passes.variants import Variants, coat_switches
+from translucent.gpu.placement import extents, part_of
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import media_center

@@ -8,12 +8,11 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
-from translucent.gpu.uniforms import view_span
+from translucent.gpu.uniforms import bounded_extinction, view_span
 from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Scene
 

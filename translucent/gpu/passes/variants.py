@@ -8,11 +8,10 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.gpu.compile_budget import before_making
-from translucent.gpu.coverage import Part
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
-from translucent.gpu.shaders import build_program
+from translucent.gpu.placement import Part
+from translucent.gpu.shaders import before_making, build_program
 from translucent.scene.scene import Object
 
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from translucent.geometry.mesh import Mesh
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.layout import BLOCKS, BODY
+from translucent.gpu.layout import BLOCKS, BODY, BODY_STRIDE
 from translucent.gpu.lifting import lift
 from translucent.gpu.recording.objects import (
     RecordedArray,
@@ -37,9 +37,6 @@ INFO: dict[str, int | str] = {
 _NAMED = re.compile(r"^// shaders/(\S+)$", re.MULTILINE)
 _DEFINE = re.compile(r"^#define (\w+) (-?\d+)$", re.MULTILINE)
 _BINDINGS = {name: block.binding for name, block in BLOCKS.items()}
-
-#: Bytes from the uniforms of one object to those of the next, as `UniformBuffers` lays them out.
-BODY_STRIDE = -(-BODY.dtype.itemsize // 256) * 256
 
 
 class RecordingContext:

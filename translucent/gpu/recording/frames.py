@@ -8,13 +8,13 @@ from typing import Any, cast
 import moderngl
 
 from translucent.formulas.sampling import sample_shifts
-from translucent.gpu.coverage import Part
-from translucent.gpu.job import FrameJob
+from translucent.gpu.job import CameraView, FrameJob
+from translucent.gpu.layout import BODY_STRIDE
 from translucent.gpu.passes import PASSES, Pass
-from translucent.gpu.recording.context import BODY_STRIDE, RecordingContext
+from translucent.gpu.placement import Part
+from translucent.gpu.recording.context import RecordingContext
 from translucent.gpu.recording.objects import RecordedBuffer, RecordedMeshes
 from translucent.gpu.resources import Resources
-from translucent.gpu.scene_view import CameraView
 from translucent.gpu.targets import Targets
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan

@@ -275,7 +275,7 @@ class RecordedMeshes:
         return self
 
     def vertex_array(self, program: RecordedProgram, mesh: Mesh) -> RecordedArray:
-        """The mesh as the program needs it; see `translucent.gpu.buffers.MeshBuffers.vertex_array`."""
+        """The mesh as the program needs it; see `translucent.gpu.resources.MeshBuffers.vertex_array`."""
         inputs = program.inputs
         if "corner_normal" in inputs or ("uv" in inputs and "normal" not in inputs):
             looks = "smooth"

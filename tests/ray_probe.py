@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 from translucent.gpu.hierarchies import SceneHierarchies
-from translucent.gpu.object_table import object_rows, packed_objects
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
+from translucent.gpu.uniforms import object_rows, packed_objects
 from translucent.scene.scene import Scene
 
 _UNITS = {

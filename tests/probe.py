@@ -10,8 +10,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.gpu.shaders import preprocess
-from translucent.gpu.signals import DeferredSignals
+from translucent.gpu.shaders import DeferredSignals, preprocess
 
 _SIGNATURE = re.compile(r"^((?:float|vec[234])(?:\[\d+\])?)\s+(\w+)\s*\(([^)]*)\)\s*\{", re.MULTILINE)
 _PARAMETER = re.compile(r"(\w+)\s+(\w+)(?:\[(\d+)\])?")
