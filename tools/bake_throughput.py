@@ -36,9 +36,9 @@ from translucent.bake.batch import BatchReport, bake_many
 from translucent.bake.gltf_builder import mesh_file
 from translucent.bake.jobs import Job
 from translucent.bake.measure import Measure
+from translucent.bake.rays import Points, Surface
 from translucent.bake.record import parts_of, read_record
 from translucent.bake.settings import BakeSettings
-from translucent.bake.surface import Points, Surface
 from translucent.cpu.threads import in_threads, processors
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.file import write_gltf

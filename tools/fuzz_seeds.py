@@ -15,8 +15,7 @@ from PIL import Image
 
 import translucent as tl
 from translucent.bench.codec import Packed
-from translucent.bench.output import read_report, write_csv
-from translucent.bench.page import heat_map
+from translucent.bench.output import heat_map, read_report, write_csv
 from translucent.bench.record import (
     CaseRecord,
     ErrorStatistics,

@@ -28,8 +28,8 @@ import translucent as tl
 from translucent.assets import mesh_path
 from translucent.bake.atlas import unwrap
 from translucent.bake.measure import Measure
+from translucent.bake.rays import Surface
 from translucent.bake.settings import BakeSettings
-from translucent.bake.surface import Surface
 from translucent.cpu.threads import in_threads, processors
 
 Array = npt.NDArray[np.float64]

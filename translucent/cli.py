@@ -11,19 +11,16 @@ import warnings
 
 import click
 
-from translucent.commands.bake import bake
+from translucent.commands.bake import bake, lithophane
 from translucent.commands.console import echo
-from translucent.commands.doctor import doctor
-from translucent.commands.explain import explain
+from translucent.commands.explain import doctor, explain
 from translucent.commands.extinction import extinction
-from translucent.commands.lithophane import lithophane
 from translucent.commands.material import material
-from translucent.commands.page import page
 from translucent.commands.presets import presets
-from translucent.commands.preview import preview
 from translucent.commands.render import render
 from translucent.commands.report import report
 from translucent.commands.shader import shader
+from translucent.commands.viewers import page, preview
 from translucent.errors import InputError, TranslucentError, message_of
 
 #: Options after which a shell drops a color that is not quoted.

@@ -10,8 +10,8 @@ import pytest
 
 import translucent as tl
 from translucent.bake.measure import Measure
+from translucent.bake.rays import Surface
 from translucent.bake.settings import BakeSettings
-from translucent.bake.surface import Surface
 from translucent.geometry.solids import Box, Ellipsoid, Sphere
 
 

@@ -15,8 +15,8 @@ from translucent.assets import mesh_path
 from translucent.bake import inscribed
 from translucent.bake.inscribed import InscribedSpheres
 from translucent.bake.measure import Measure
+from translucent.bake.rays import Points, Surface
 from translucent.bake.settings import BakeSettings
-from translucent.bake.surface import Points, Surface
 from translucent.geometry.solids import Torus
 
 #: Points along each side of a face.

@@ -10,7 +10,7 @@ import pytest
 
 import translucent as tl
 from translucent.bake.atlas import Atlas, pad, unwrap
-from translucent.bake.surface import Surface
+from translucent.bake.rays import Surface
 from translucent.geometry.solids import Box, Sphere
 
 SQUARE = [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]]]

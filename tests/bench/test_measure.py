@@ -21,11 +21,10 @@ from translucent.bench.cases import CASES, Case
 from translucent.bench.contenders import CONTENDERS, Contender, Effect, check_names, contenders
 from translucent.bench.drawing import BenchContext, FloorDrawing
 from translucent.bench.experiment import Experiment, Whole
-from translucent.bench.methods import MethodComparison
+from translucent.bench.methods import CostScaling, MethodComparison, ScalingStep
 from translucent.bench.output import read_report, table, write_report
 from translucent.bench.record import HardCase, Part, Report, ShadowCase
 from translucent.bench.run import measure_all
-from translucent.bench.scaling import CostScaling, ScalingStep
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
 from translucent.bench.truth import CaseTruth
 from translucent.geometry.solids import Box, Sphere

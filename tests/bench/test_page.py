@@ -25,8 +25,7 @@ from tests.bench.provenance import PROVENANCE
 from translucent.bench import figures as numbers
 from translucent.bench.codec import Packed
 from translucent.bench.judgement import mark_frontier
-from translucent.bench.output import checked_folder
-from translucent.bench.page import build_page
+from translucent.bench.output import build_page, checked_folder
 from translucent.bench.plots import overview_svg
 from translucent.bench.record import (
     CaseRecord,
@@ -415,7 +414,7 @@ def test_names_are_no_formulas_and_long_ones_are_cut() -> None:
 def test_no_opengl_is_needed() -> None:
     code = (
         "import sys; from pathlib import Path; from translucent.bench.record import Report; "
-        "from translucent.bench.page import build_page; "
+        "from translucent.bench.output import build_page; "
         "build_page(Report.from_json(sys.stdin.read())); "
         "assert not {'moderngl', 'OpenGL', 'glcontext', 'embreex'} & sys.modules.keys()"
     )

@@ -17,7 +17,7 @@ from translucent.bench import figures as numbers
 from translucent.bench.codec import Packed
 from translucent.bench.figures import COLORS, FAMILIES, place_labels, short_count, spread, style_of
 from translucent.bench.judgement import advise, summarize
-from translucent.bench.page import STEPS, heat_map, scale_colors
+from translucent.bench.output import STEPS, heat_map, scale_colors
 from translucent.bench.record import CaseRecord, ErrorStatistics, MethodRow, Ratio, ReportPicture, RowKind
 
 

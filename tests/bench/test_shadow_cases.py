@@ -15,8 +15,7 @@ from translucent.bench.caustics import CAUSTIC_SCENES, MEDIUM_SCENES, GroundCaus
 from translucent.bench.claims import SHADOW_CLAIMS
 from translucent.bench.drawing import BenchContext
 from translucent.bench.judgement import compare_reports
-from translucent.bench.output import table
-from translucent.bench.page import build_page
+from translucent.bench.output import build_page, table
 from translucent.bench.record import (
     CONSTANT,
     HALF,

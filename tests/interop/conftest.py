@@ -11,7 +11,7 @@ import pytest
 
 import translucent as tl
 from translucent.geometry.solids import Box, Sphere
-from translucent.interop._pyrender_shim import load_pyrender
+from translucent.interop.pyrender import load_pyrender
 
 
 @pytest.fixture(scope="session")

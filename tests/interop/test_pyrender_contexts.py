@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.interop._pyrender_shim import load_pyrender
-from translucent.interop.pyrender import backdrop_from_pyrender, render, render_scene
+from translucent.interop.pyrender import backdrop_from_pyrender, load_pyrender, render, render_scene
 
 SIZE = (48, 36)
 GREEN = tl.Medium(absorption=(3.0, 0.5, 2.0))

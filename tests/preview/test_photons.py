@@ -18,7 +18,7 @@ from translucent.gpu.viewport import Viewport
 from translucent.planning import caustics
 from translucent.planning.rendered import Treatment
 from translucent.planning.request import RenderRequest
-from translucent.preview import refining
+from translucent.preview import quality
 from translucent.preview.actions import SetField, Turn
 from translucent.preview.document import Document, Model
 from translucent.preview.exports import write_picture
@@ -82,7 +82,7 @@ def test_photons_light_the_still_picture_until_something_changes(
     view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in {"ROUND": ROUND, "MOST_PHOTONS": 8 * ROUND, "SHARE": 0.0}.items():
-        monkeypatch.setattr(refining, name, value)
+        monkeypatch.setattr(quality, name, value)
     assert work.loaded is not None
     monkeypatch.setattr(work, "scene", lambda: LIT)
     finish(view, work)
@@ -149,10 +149,10 @@ def test_photons_in_media_are_followed_aside(
     if not view.renderer.gpu.capabilities.shader_storage:
         pytest.skip("this OpenGL has no shader storage buffers, without which nothing marches")
     monkeypatch.setattr(caustics, "LEAST_IN_MEDIA", 1 << 10)
-    monkeypatch.setattr(refining, "ROUND", 1 << 10)
+    monkeypatch.setattr(quality, "ROUND", 1 << 10)
     fog = tl.Object(Box((-1.5, -3.0, -1.5), (1.5, -1.2, 1.5)).tessellate(), tl.Medium(scattering=0.5))
     scene = replace(LIT, objects=[tl.Object(Sphere().tessellate(16), tl.Medium(ior=1.5)), fog])
-    found, lane = refining.PhotonRefinement(), work.lanes["diffuse"]
+    found, lane = quality.PhotonRefinement(), work.lanes["diffuse"]
 
     def ready() -> bool:
         request = RenderRequest(scattering=tl.Diffusion(8))

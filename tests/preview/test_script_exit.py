@@ -11,7 +11,7 @@ import pytest
 
 from tests.command_line import Run
 from tests.preview.waiting import wait
-from translucent.commands import preview as preview_command
+from translucent.commands import viewers as preview_command
 from translucent.errors import RenderError
 from translucent.preview import app
 from translucent.preview.actions import ChoosePreset, SetField

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 import translucent as tl
 from tests.values.gltf_writer import WINE, Json, Writer, glass, load
-from translucent.gltf.animations import sample
+from translucent.gltf.nodes import sampled_channel
 
 HALF = math.sqrt(0.5)
 #: About y, by 0 and by 90 degrees.
@@ -73,7 +73,7 @@ def test_arcs_are_those_of_another_library() -> None:
     for turns in rng.normal(size=(20, 2, 4)):
         turns /= np.linalg.norm(turns, axis=1)[:, None]
         expected = Slerp([0, 1], Rotation.from_quat(turns))([0.3]).as_quat()[0]
-        found = sample(np.array([0.0, 1.0]), turns[:, None], 0.3, "LINEAR", arc=True)
+        found = sampled_channel(np.array([0.0, 1.0]), turns[:, None], 0.3, "LINEAR", arc=True)
         assert abs(float(found @ expected)) == pytest.approx(1, abs=1e-12)
 
 
@@ -82,7 +82,7 @@ def test_cubic_splines_follow_their_tangents() -> None:
     times = np.array([0.0, 0.5, 2.0])
     keys = np.stack([3 * times**2 - 1, times**3 - times, 3 * times**2 - 1], axis=1)[..., None]
     for t in (0.1, 0.5, 1.7):
-        np.testing.assert_allclose(sample(times, keys, t, "CUBICSPLINE", arc=False), t**3 - t, atol=1e-14)
+        np.testing.assert_allclose(sampled_channel(times, keys, t, "CUBICSPLINE", arc=False), t**3 - t, atol=1e-14)
 
 
 def test_animations_play_at_once_and_the_first_moves_what_two_do(tmp_path: Path) -> None:

@@ -16,9 +16,9 @@ from translucent.arguments import checked
 from translucent.arrays import Array, Floats
 from translucent.bake.atlas import Atlas, Unwrapped, in_tile, pad, unwrap
 from translucent.bake.measure import Measure, Measured
+from translucent.bake.rays import Surface
 from translucent.bake.settings import BakeSettings, settings_from
 from translucent.bake.strips import Canvas, Checkpoint, Progress, Projection, Strips, bake_key, bake_strips, in_order
-from translucent.bake.surface import Surface
 from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
 from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentWarning

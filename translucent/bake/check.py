@@ -27,8 +27,8 @@ from translucent.arrays import Array, Integers, Mask, Pixels
 from translucent.bake.gltf_builder import wrapping
 from translucent.bake.gltf_targets import Bodies, first_transforms, transformed
 from translucent.bake.jobs import has_parts, stays_gltf
+from translucent.bake.rays import barycentric, blend
 from translucent.bake.record import Record, parts_of
-from translucent.bake.surface import barycentric, blend
 from translucent.bake.thickness_map import load_thickness_map
 from translucent.cpu.renderer import CpuRenderer
 from translucent.errors import InputError, RenderError, TranslucentWarning

@@ -23,8 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Floats, Integers
-from translucent.bake.rays import SPHERE_CONE
-from translucent.bake.surface import Points, Surface
+from translucent.bake.rays import SPHERE_CONE, Points, Surface
 from translucent.geometry.bvh import curve_order
 
 #: Children of a box, and the largest number of boxes at the top of the tree.

@@ -30,9 +30,8 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 from translucent.bake.inscribed import InscribedSpheres
-from translucent.bake.rays import Directions, Rays
+from translucent.bake.rays import Directions, Points, Rays, Surface
 from translucent.bake.settings import LOCAL_REACH, BakeSettings
-from translucent.bake.surface import Points, Surface
 from translucent.formulas.color import LUMINANCE_WEIGHTS
 
 #: Number of groups of rays whose means give the standard error.

@@ -30,9 +30,9 @@ from translucent.arrays import Array, Floats, Mask
 from translucent.bake.atlas import Atlas, pad, unwrap
 from translucent.bake.gltf_builder import GlbBuilder, mesh_file
 from translucent.bake.gltf_targets import PrimitiveKey
+from translucent.bake.rays import blend
 from translucent.bake.record import Record, add_record, fingerprint, mesh_record, plain, write_record
 from translucent.bake.settings import BakeSettings
-from translucent.bake.surface import blend
 from translucent.bake.thickness_map import add_uv_file, check_map_output
 from translucent.diffusion.harmonics import LitAlone, Transfer
 from translucent.errors import InputError, TranslucentWarning

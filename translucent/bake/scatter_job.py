@@ -23,6 +23,7 @@ from translucent.arrays import Array, Floats, Integers, Mask
 from translucent.bake.check import MOST_ROWS, NO_BODY, first_hits, labeled, look, look_up, stacked
 from translucent.bake.gltf_builder import GlbBuilder
 from translucent.bake.gltf_targets import PrimitiveKey, Target, find_targets, first_transforms, left_out, transformed
+from translucent.bake.rays import blend
 from translucent.bake.record import Record, write_record
 from translucent.bake.scatter import (
     MAP_SUFFIX,
@@ -37,7 +38,6 @@ from translucent.bake.scatter import (
     save_scatter_map,
     write_scatter_glb,
 )
-from translucent.bake.surface import blend
 from translucent.bake.thickness_map import check_map_output
 from translucent.diffusion.harmonics import LitAlone, exit_radiance
 from translucent.errors import InputError

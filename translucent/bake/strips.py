@@ -25,8 +25,8 @@ import numpy.typing as npt
 from translucent.arrays import Array, Floats, Mask
 from translucent.bake.atlas import Atlas, Unwrapped
 from translucent.bake.measure import Measure
+from translucent.bake.rays import Points, Surface, barycentric, blend
 from translucent.bake.settings import BakeSettings
-from translucent.bake.surface import Points, Surface, barycentric, blend
 from translucent.errors import InputError
 from translucent.files.paths import write_atomically
 from translucent.files.unpacking import read_arrays

@@ -24,9 +24,8 @@ from translucent.bench.contenders import check_names
 from translucent.bench.drawing import FULL, QUICK, BenchContext, Effort, Size
 from translucent.bench.experiment import Experiment
 from translucent.bench.hard_light import HardCases
-from translucent.bench.methods import MethodComparison
+from translucent.bench.methods import CostScaling, MethodComparison
 from translucent.bench.record import Part, Provenance, Renewal, Report
-from translucent.bench.scaling import CostScaling
 from translucent.bench.shadows import SHADOW_SCENES, ShadowMapComparison
 from translucent.bench.slabs import SlabComparison
 from translucent.errors import RenderError

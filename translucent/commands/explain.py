@@ -1,4 +1,4 @@
-"""``translucent explain``: what is known about a mesh or a scene, and how it would be rendered."""
+"""``translucent explain``: a mesh or a scene, and how it would be rendered; ``translucent doctor``: this machine."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from translucent.commands.options import (
     AnyMediumOptions,
     ChoiceOptions,
     FileOptions,
+    common_options,
     group,
     option,
     stage_option,
     takes,
 )
+from translucent.errors import TranslucentError
 
 if TYPE_CHECKING:
     from translucent.geometry.mesh import Mesh
@@ -134,3 +136,15 @@ def _traffic(scene: Scene, chosen: RenderPlan) -> FrameTraffic:
     from translucent.gpu.pass_costs import frame_traffic
 
     return frame_traffic(chosen)
+
+
+@click.command(epilog="Example: translucent doctor")
+@common_options
+def doctor(as_json: bool) -> None:
+    """Explain this machine: OpenGL, packages, and what is missing for what."""
+    from translucent import doctor as examination
+
+    facts = examination.examine()
+    echo(json.dumps(facts) if as_json else examination.report(facts))
+    if facts["backend"] is None:
+        raise TranslucentError("rendering", "neither OpenGL nor Embree works", "see the lines above")

@@ -1,15 +1,17 @@
-"""Checks of paths that a user names, before any work is done; and atomic writing of files."""
+"""Files and folders to write to: checks before any work is done, atomic writing, and CSV text."""
 
 from __future__ import annotations
 
+import csv
 import errno
+import io
 import os
 import secrets
 import stat
 import sys
 import zlib
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO, Self
@@ -245,3 +247,96 @@ def _lock(file: BinaryIO) -> bool:
 def _partial(path: Path) -> str:
     """Prefix of the names of temporary files for `path`."""
     return f".partial-{zlib.crc32(os.fsencode(path.name)):08x}-"
+
+
+@contextmanager
+def made_folder(folder: Path) -> Iterator[None]:
+    """Context manager that makes a folder and its parents; after an error, empty ones that it made are removed.
+
+    Raises
+    ------
+    InputError
+        If its name, or that of a folder above, is one of a file.
+    RenderError
+        If it cannot be made.
+    """
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    try:
+        make_folder(folder)
+        yield
+    except BaseException:
+        with suppress(OSError):  # something is in it
+            for made in missing:
+                made.rmdir()
+        raise
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those above it, unless it is there.
+
+    Raises
+    ------
+    InputError
+        If its name, or that of a folder above, is one of a file.
+    RenderError
+        If it cannot be made.
+    """
+    require_folder(folder, f"folder {str(folder)!r}")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RenderError(
+            f"folder {str(folder)!r}", f"it cannot be made ({error.strerror})", "check the path"
+        ) from error
+
+
+#: Name of the toolkit's folder in each.
+NAME = "translucent"
+
+
+def config_folder() -> Path:
+    """Folder of settings; it need not be there."""
+    if sys.platform == "win32":
+        return Path(os.environ.get("APPDATA", Path.home())) / NAME
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Application Support" / NAME
+    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / NAME
+
+
+def cache_folder() -> Path:
+    """Folder of what can be made again at any time; it need not be there."""
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / NAME / "Cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / NAME
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / NAME
+
+
+#: Beginnings of cells that spreadsheets run as formulas.
+_FORMULAS = ("=", "+", "-", "@", "\t", "\n")
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, object]]) -> str:
+    """Write rows as CSV, below the names of their columns; other keys of a row are left out.
+
+    A text that a spreadsheet would run as a formula gets an apostrophe before it, and all its line ends are ``\\n``, as
+    the module csv leaves others without quotes. Numbers stay as they are.
+    """
+    stream = io.StringIO(newline="")
+    writer = csv.DictWriter(stream, columns, restval="", extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({name: _harmless(cell) for name, cell in row.items()} for row in rows)
+    return stream.getvalue()
+
+
+def _harmless(cell: object) -> object:
+    if not isinstance(cell, str):
+        return cell
+    text = cell.replace("\r\n", "\n").replace("\r", "\n")
+    if not text.startswith(_FORMULAS):
+        return text
+    try:
+        list(map(float, text.split()))
+    except ValueError:
+        return f"'{text}"
+    return text

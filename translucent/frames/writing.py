@@ -16,9 +16,8 @@ import numpy.typing as npt
 from translucent.arrays import Mask, Pixels
 from translucent.errors import InputError
 from translucent.extras import require_package
-from translucent.files.folders import make_folder
 from translucent.files.images import write_exr, write_npz, write_png
-from translucent.files.paths import require_output, write_atomically
+from translucent.files.paths import make_folder, require_output, write_atomically
 from translucent.units import length_text
 
 #: Data by MIME type, and metadata likewise: what `_repr_mimebundle_` returns.

@@ -19,8 +19,7 @@ from translucent.arrays import Array, Integers
 from translucent.files.reading import require_memory, require_room
 from translucent.geometry.grouping import use_mask
 from translucent.geometry.mesh import MAX_INDEX, PER_TRIANGLE, Mesh, adopted, mended
-from translucent.gltf.fields import JsonFields
-from translucent.gltf.file import GltfFile, Json
+from translucent.gltf.file import GltfFile, Json, JsonFields
 
 Indices = npt.NDArray[np.int64]
 

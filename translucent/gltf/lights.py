@@ -15,8 +15,7 @@ import numpy as np
 from translucent.arguments import brief
 from translucent.arrays import Array
 from translucent.errors import InputError
-from translucent.gltf.fields import JsonFields, LeftOut, label
-from translucent.gltf.file import GltfFile
+from translucent.gltf.file import GltfFile, JsonFields, LeftOut, label
 from translucent.scene.camera import Camera
 from translucent.scene.lights import NARROWEST_CONE, DirectionalLight, PointLight, SpotLight
 from translucent.scene.scene import Light

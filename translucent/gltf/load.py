@@ -15,9 +15,7 @@ from translucent.errors import InputError, TranslucentWarning
 from translucent.files.reading import require_room
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh, Triangles, joined
 from translucent.gltf.accessors import Accessors, raw_mesh
-from translucent.gltf.animations import posed
-from translucent.gltf.fields import LeftOut, label
-from translucent.gltf.file import COMPRESSIONS, GltfFile, read_gltf
+from translucent.gltf.file import COMPRESSIONS, GltfFile, LeftOut, label, read_gltf
 from translucent.gltf.lights import LIGHTS, scene_camera, scene_lights
 from translucent.gltf.materials import (
     CLEARCOAT,
@@ -30,7 +28,7 @@ from translucent.gltf.materials import (
     TRANSMISSION,
     VOLUME,
 )
-from translucent.gltf.nodes import VARIANTS, node_transforms, primitives, variant_names
+from translucent.gltf.nodes import VARIANTS, node_transforms, posed, primitives, variant_names
 from translucent.gltf.objects import UNLIT, scene_objects
 from translucent.gltf.textures import TEXTURE_TRANSFORM
 from translucent.scene.environment import Environment
@@ -110,7 +108,7 @@ def load_scene(
     variant : str, optional
         Name of a variant of materials (KHR_materials_variants). Default: the materials that primitives have themselves.
     time : float, optional
-        Seconds on the clock of the animations at which nodes stand; see `translucent.gltf.animations`. Default: as the
+        Seconds on the clock of the animations at which nodes stand; see `translucent.gltf.nodes`. Default: as the
         nodes are written. Skins and morph targets are left out, whatever the time.
     draft_extensions : bool
         Whether to read KHR_materials_scatter and KHR_materials_volume_scatter, which are drafts.

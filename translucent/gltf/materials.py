@@ -71,8 +71,7 @@ import numpy as np
 from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
-from translucent.gltf.fields import JsonFields, Triple
-from translucent.gltf.file import GltfFile, Json, read_gltf
+from translucent.gltf.file import GltfFile, Json, JsonFields, Triple, read_gltf
 from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform, texture_transform
 from translucent.media.albedo import hulst_albedo, hulst_color
 from translucent.media.conversion import html_strip

@@ -51,8 +51,7 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.geometry.mesh import MIN_DIAGONAL, Mesh
 from translucent.gltf.accessors import Accessors, primitive_mesh
-from translucent.gltf.fields import JsonFields, LeftOut, label
-from translucent.gltf.file import GltfFile, Json
+from translucent.gltf.file import GltfFile, Json, JsonFields, LeftOut, label
 from translucent.gltf.materials import (
     CLEARCOAT,
     DEFAULT_IOR,

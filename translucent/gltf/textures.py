@@ -24,8 +24,7 @@ from translucent.arrays import Array
 from translucent.errors import InputError, UnreadableError
 from translucent.files.unpacking import open_picture
 from translucent.formulas.color import srgb_to_linear
-from translucent.gltf.fields import JsonFields, LeftOut, label
-from translucent.gltf.file import GltfFile, Json
+from translucent.gltf.file import GltfFile, Json, JsonFields, LeftOut, label
 from translucent.scene.texture import Texture, Wrap
 
 TEXTURE_TRANSFORM = "KHR_texture_transform"

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from translucent.errors import InputError
-from translucent.files.paths import require_output, write_atomically
-from translucent.files.tables import csv_text
+from translucent.files.paths import csv_text, require_output, write_atomically
 from translucent.media.conversion import CLAMP, clamp_colors, html_strip, summary
 from translucent.media.medium import Medium
 from translucent.media.preset import Row, check_cells, read_table

@@ -11,8 +11,7 @@ from pathlib import Path
 
 from translucent.arguments import checked
 from translucent.errors import LEAST_PART, InputError, close_names, did_you_mean
-from translucent.files.folders import config_folder, make_folder
-from translucent.files.paths import write_text_atomically
+from translucent.files.paths import config_folder, make_folder, write_text_atomically
 from translucent.files.reading import read_text
 from translucent.media.preset import Preset, preset_text, read_good_presets, read_presets
 

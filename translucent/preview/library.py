@@ -16,9 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError, TranslucentError
-from translucent.files.folders import cache_folder, make_folder
 from translucent.files.images import write_png
-from translucent.files.paths import write_atomically
+from translucent.files.paths import cache_folder, make_folder, write_atomically
 from translucent.formulas.color import linear_to_srgb
 from translucent.formulas.tone import tone_curve
 from translucent.geometry.mesh import Mesh

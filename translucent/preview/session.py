@@ -11,8 +11,7 @@ from typing import Any
 
 from translucent.errors import InputError
 from translucent.extras import require_package
-from translucent.files.folders import config_folder
-from translucent.files.paths import write_atomically
+from translucent.files.paths import config_folder, write_atomically
 from translucent.files.reading import read_text, toml_value
 from translucent.preview.document import AUTO, STAGE_WORDS, Assigned, Document, Material, Orbit, checked
 

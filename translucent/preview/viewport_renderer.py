@@ -25,12 +25,13 @@ from translucent.preview.quality import (
     SCREEN,
     FrameBudget,
     InteractiveQuality,
+    PathRefinement,
+    PhotonRefinement,
     StepTimes,
     StepTiming,
     Strides,
     samples_of,
 )
-from translucent.preview.refining import PathRefinement, PhotonRefinement
 from translucent.preview.scenes import method_of, request_of, tone_of
 from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace

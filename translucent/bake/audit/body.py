@@ -17,9 +17,8 @@ import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.bake.gltf_targets import Bodies, PrimitiveKey, primitive_name, read_primitive
-from translucent.bake.rays import OFFSET, Directions, Rays
+from translucent.bake.rays import OFFSET, Directions, Points, Rays, Surface
 from translucent.bake.settings import BakeSettings
-from translucent.bake.surface import Points, Surface
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.file import GltfFile, Json

@@ -37,8 +37,7 @@ from translucent.bake.jobs import ON_SURFACE
 from translucent.bake.settings import BakeSettings
 from translucent.bake.thickness_map import ThicknessMap, check_map_output, write_maps
 from translucent.errors import InputError, TranslucentWarning
-from translucent.gltf.fields import label
-from translucent.gltf.file import GltfFile, read_gltf, write_gltf
+from translucent.gltf.file import GltfFile, label, read_gltf, write_gltf
 from translucent.gltf.materials import materials_of
 from translucent.gltf.nodes import node_transforms
 

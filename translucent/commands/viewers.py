@@ -1,9 +1,11 @@
-"""``translucent page``: a scene as one file for any browser."""
+"""``translucent preview`` and ``translucent page``: a scene in a window, and in a page for browsers."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,8 +27,102 @@ from translucent.commands.options import (
     stage_option,
     takes,
 )
-from translucent.errors import RenderError
+from translucent.errors import InputError, RenderError, TranslucentError, message_of
+from translucent.extras import require_package
 from translucent.units import parse_length
+
+
+def _stage_words() -> str:
+    from translucent.scene.stages import STAGES
+
+    return (
+        f"What the model stands on: {', '.join(STAGES)}, none, or auto, as render. Default: that of the last window; "
+        "at first auto; with a script none."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PreviewOptions:
+    """Options of ``translucent preview``."""
+
+    file: FileOptions = group(FileOptions, without=("draft_extensions",))
+    session: Path | None = option(metavar="FILE", help="Begin with a session, a .toml file.")
+    stage: str | None = option(metavar="S", help=_stage_words)
+    size: str = option("1600x1000", metavar="WxH", help="Size of the window.")
+    scale: float = option(1.0, help="Makes letters and fields larger.")
+    script: Path | None = option(metavar="FILE", help="Do what a .toml file says; close.")
+    screenshot: Path | None = option(metavar="PNG", help="Of the window, at the end.")
+
+
+@click.command(epilog="Example: translucent preview goblet")
+@click.argument("model", required=False)
+@takes(PreviewOptions)
+def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
+    """Open MODEL, a file or one of the toolkit's own meshes, in a window. Without it: a goblet.
+
+    With --script, the window does what the script says, and closes; --screenshot keeps a picture of it. An action that
+    fails does not stop the others; the exit code is then 1, or 2 where it asked for what cannot be.
+    """
+    from translucent.preview.document import AUTO, Document, Look, Model
+    from translucent.preview.script import Script, read_script
+    from translucent.preview.session import Preferences, load_session
+    from translucent.preview.tasks import problem
+    from translucent.scene.stages import stage_named
+
+    session, stage, script, screenshot = given.session, given.stage, given.script, given.screenshot
+    if stage is not None and stage != AUTO:
+        stage_named(stage)
+    if session is not None and model is not None:
+        raise InputError(f"--session {str(session)!r}", f"{model} is given, too", "give one of them")
+    if not 0.5 <= given.scale <= 4.0:
+        raise InputError(f"--scale {given.scale}", "not in 0.5 to 4", "give for example 2")
+    if screenshot is not None and (screenshot.suffix.lower() != ".png" or not screenshot.parent.is_dir()):
+        raise InputError(f"--screenshot {str(screenshot)!r}", "no .png in a folder that is there", "give such a path")
+    pixels = read_size(given.size)
+    if session is not None:
+        document = load_session(session)
+    else:
+        document = Document() if script or screenshot else Document(look=Look(stage=Preferences.read().stage))
+    if stage is not None:
+        document = dataclasses.replace(document, look=dataclasses.replace(document.look, stage=stage))
+    if model is not None:
+        document = dataclasses.replace(document, model=Model(model, given.file.unit))
+    todo = read_script(script) if script is not None else Script.of([]) if screenshot is not None else None
+    require_display()
+    from translucent.preview.app import leave, run
+
+    shot = str(screenshot) if screenshot is not None else None
+    work = run(document, pixels, given.scale, todo, shot, given.file.allow_outside)
+    failure = None if todo is None else work.failure
+    if as_json:
+        told = [{"kind": message.kind, "text": message.text} for message in work.messages]
+        echo(json.dumps({"model": work.document.model.path, "messages": told}))
+    elif todo is not None:
+        for message in work.messages:
+            # The error by which the script fails is the last line, as that of any verb.
+            if failure is None or message.text != problem(failure):
+                echo(f"{message.kind}: {message.text}", err=True)
+    error = failure if failure is None or isinstance(failure, TranslucentError) else RenderError(problem(failure))
+    if error is not None and not work.ended:
+        echo(f"error: {message_of(str(error))}", err=True)
+    leave(work, 0 if error is None else 2 if isinstance(error, InputError) else 1)
+    if error is not None:
+        raise error
+
+
+def require_display() -> None:
+    """Raise if there is no display for a window, or no package that could open one.
+
+    Raises
+    ------
+    RenderError
+        It names the way without a window.
+    """
+    without = "without a window: translucent render MODEL -o picture.png"
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise RenderError("preview", "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)", without)
+    require_package("imgui_bundle", "preview", without)
+
 
 #: Values of --poster that are no files.
 RENDERED, NO_POSTER = "rendered", "none"
