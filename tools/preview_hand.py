@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import shutil
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -91,17 +90,15 @@ class Places:
 
 
 class Hand:
-    """Mouse and keyboard: those of the system by xdotool, or what imgui is told."""
+    """Mouse and keyboard of the display, by xdotool: the backend of Dear ImGui overrides events that are made there."""
 
     def __init__(self) -> None:
-        self.real = shutil.which("xdotool") is not None
         self.window = ""
 
     def begin(self) -> Waiting:
         """Give the window the keyboard."""
-        if self.real:
-            self.window = subprocess.check_output(["xdotool", "search", "--name", app.TITLE], text=True).split()[-1]
-            yield from self._x("windowfocus", self.window)
+        self.window = subprocess.check_output(["xdotool", "search", "--name", app.TITLE], text=True).split()[-1]
+        yield from self._x("windowfocus", self.window)
 
     def _x(self, *words: object) -> Waiting:
         process = subprocess.Popen(["xdotool", *map(str, words)], stderr=subprocess.DEVNULL)
@@ -111,10 +108,7 @@ class Hand:
 
     def move(self, place: tuple[float, float]) -> Waiting:
         """Move the mouse, and wait until it is there in the window."""
-        if self.real:
-            yield from self._x("mousemove", "--window", self.window, round(place[0]), round(place[1]))
-        else:
-            imgui.get_io().add_mouse_pos_event(*place)
+        yield from self._x("mousemove", "--window", self.window, round(place[0]), round(place[1]))
         for _ in range(RESTING):
             yield
             at = imgui.get_io().mouse_pos
@@ -123,33 +117,21 @@ class Hand:
         yield from frames(1)
 
     def press(self, *, down: bool) -> Waiting:
-        if self.real:
-            yield from self._x("mousedown" if down else "mouseup", 1)
-        else:
-            imgui.get_io().add_mouse_button_event(0, down)
-            yield from frames()
+        yield from self._x("mousedown" if down else "mouseup", 1)
         for _ in range(RESTING):
             if imgui.is_mouse_down(0) == down:
                 break
             yield
 
     def wheel(self, steps: int) -> Waiting:
-        if self.real:
-            yield from self._x("click", "--repeat", abs(steps), "--delay", 30, 4 if steps > 0 else 5)
-        else:
-            imgui.get_io().add_mouse_wheel_event(0.0, steps)
-            yield from frames()
+        yield from self._x("click", "--repeat", abs(steps), "--delay", 30, 4 if steps > 0 else 5)
 
     def key(self, name: str) -> Waiting:
         """Press and release a key, while those before plus signs are held."""
         *modifiers, last = name.split("+")
         for modifier in modifiers:
             yield from self.hold(modifier, down=True)
-        if self.real:
-            yield from self._x("key", X_KEYS.get(last, last))
-        else:
-            for pressed in (True, False):
-                imgui.get_io().add_key_event(getattr(imgui.Key, last), pressed)
+        yield from self._x("key", X_KEYS.get(last, last))
         yield from frames()
         for modifier in modifiers:
             yield from self.hold(modifier, down=False)
@@ -159,22 +141,14 @@ class Hand:
         state alone.
         """
         key = {"ctrl": imgui.Key.mod_ctrl, "shift": imgui.Key.mod_shift}.get(name) or getattr(imgui.Key, name)
-        if self.real:
-            yield from self._x("keydown" if down else "keyup", name)
-        else:
-            imgui.get_io().add_key_event(key, down)
-            yield from frames()
+        yield from self._x("keydown" if down else "keyup", name)
         for _ in range(RESTING):
             if imgui.is_key_down(key) == down:
                 break
             yield
 
     def type(self, text: str) -> Waiting:
-        if self.real:
-            yield from self._x("type", "--delay", 5, text)
-        else:
-            imgui.get_io().add_input_characters_utf8(text)
-            yield from frames()
+        yield from self._x("type", "--delay", 5, text)
 
 
 def frames(count: int = FRAMES) -> Waiting:

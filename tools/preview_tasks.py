@@ -1,11 +1,10 @@
 """Twenty tasks of an artist in the previewer, by mouse and keyboard: ``python tools/preview_tasks.py [NAME...]``.
 
-On a display of its own (Xvfb), in two windows one after the other. Where xdotool is installed, the pointer and the
-keys are those of the system; else imgui is told of them. Each task (`preview_artist`) checks its result, and waits for
-the window's own state (`preview_hand`). For each are told the seconds that it took, the longest frame, and the one that
-took most time of all cores, which tells more where others use them: that of the window's thread, what of it was
-drawing, and what the thread was at. ``--size 2560x1600 --scale 2`` for a large display, ``--keep FOLDER`` for a picture
-of the window after each task.
+Needs Xvfb and xdotool: the tool opens two windows, one after the other, on a display of its own. Each task
+(`preview_artist`) checks its result, and waits for the window's own state (`preview_hand`). The tool prints for each
+the seconds that it took, the longest frame, and the frame that took most time of all cores, which says more where other
+programs use them: its time in the window's thread and in drawing, and what the thread was at. ``--size 2560x1600
+--scale 2`` is for a large display, ``--keep FOLDER`` for a picture of the window after each task.
 """
 
 from __future__ import annotations
@@ -174,6 +173,8 @@ def main() -> int:
     parser.add_argument("--folder", help="folder to work in, on the display that is there, in one window")
     parser.add_argument("--again", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if shutil.which("xdotool") is None:
+        parser.error("mouse and keyboard need xdotool, which is not installed: apt-get install xdotool")
     if options.folder:
         return play(options)
     with tempfile.TemporaryDirectory() as name:
