@@ -36,7 +36,7 @@ from translucent.bake.batch import BatchReport, bake_many
 from translucent.bake.gltf_builder import mesh_file
 from translucent.bake.jobs import Job
 from translucent.bake.measure import Measure
-from translucent.bake.rays import Points, Surface
+from translucent.bake.rays import Points, PreparedMesh
 from translucent.bake.record import parts_of, read_record
 from translucent.bake.settings import BakeSettings
 from translucent.cpu.threads import in_threads, processors
@@ -90,7 +90,7 @@ def throughput(
 
 def _embree_alone(unwrapped: Unwrapped, size: int, rays: int, threads: int) -> Callable[[], tuple[float, float]]:
     """A round of Embree alone: millions of rays a second, by the clock and of processor time."""
-    surface = Surface.of(unwrapped.mesh)
+    surface = PreparedMesh.of(unwrapped.mesh)
     measure = Measure(surface, BakeSettings(size=size, rays=rays))
     prepared = _prepared(measure, _some_points(surface, unwrapped, size, SAMPLE // rays))
     count = sum(len(origins) for origins, _ in prepared) / 1e6
@@ -195,7 +195,7 @@ def _on_dask(jobs: list[Job], workers: int, *, steady: bool) -> tuple[BatchRepor
         return report, presence.seconds + left * time.perf_counter()
 
 
-def _some_points(surface: Surface, unwrapped: Unwrapped, size: int, most: int) -> Points:
+def _some_points(surface: PreparedMesh, unwrapped: Unwrapped, size: int, most: int) -> Points:
     """Points of texels from all over the map, in the order in which the bake takes them."""
     texels = Atlas(unwrapped.uv[surface.faces], size, size).strip(0, size)
     step = max(1, len(texels.face) // most)

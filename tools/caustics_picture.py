@@ -23,9 +23,9 @@ def main(path: Path = Path("docs/caustics-in-media.png")) -> None:
     )
     floor = tl.Object(Box((-30.0, -2.8, -30.0), (30.0, -2.6, 30.0)).tessellate(), color=(0.12, 0.13, 0.16))
     dusk = tl.Environment.gradient((0.02, 0.02, 0.03), (0.08, 0.09, 0.12))
-    lamp = tl.SpotLight((-2.4, 6.0, 0.6), (2.4, -6.0, -0.6), [260, 250, 230], inner_cone=12.0, outer_cone=14.0)
+    light = tl.SpotLight((-2.4, 6.0, 0.6), (2.4, -6.0, -0.6), [260, 250, 230], inner_cone=12.0, outer_cone=14.0)
     scenes = (
-        tl.Scene([smoke, GLASS], tl.Camera.look_at((2, 0, 13), (0, -0.8, 0), fov_y=27.0), [lamp], dusk, "priority"),
+        tl.Scene([smoke, GLASS], tl.Camera.look_at((2, 0, 13), (0, -0.8, 0), fov_y=27.0), [light], dusk, "priority"),
         tl.Scene(
             [block, GLASS, floor],
             tl.Camera.look_at((2, 5.5, 7), (0.1, -1.2, 0), fov_y=38.0),

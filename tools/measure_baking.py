@@ -28,7 +28,7 @@ import translucent as tl
 from translucent.assets import mesh_path
 from translucent.bake.atlas import unwrap
 from translucent.bake.measure import Measure
-from translucent.bake.rays import Surface
+from translucent.bake.rays import PreparedMesh
 from translucent.bake.settings import BakeSettings
 from translucent.cpu.threads import in_threads, processors
 
@@ -41,7 +41,7 @@ SECONDS, FEWEST, MOST = 0.3, 50, 200_000
 THEIRS = {"normal": "ray", "inscribed": "max_sphere"}
 
 
-def sampled(surface: Surface, count: int) -> tuple[npt.NDArray[np.int64], Array]:
+def sampled(surface: PreparedMesh, count: int) -> tuple[npt.NDArray[np.int64], Array]:
     """Faces (count,) and barycentric weights (count, 3) of points that are spread by area."""
     rng = np.random.default_rng(2)
     a, b, c = surface.corners.transpose(1, 0, 2)
@@ -59,7 +59,7 @@ def seconds(call: Callable[[], object], clock: Callable[[], float] = time.perf_c
 
 def compare(mesh: tl.Mesh, mode: str, rounds: int, processor_time: bool) -> str:
     """One line of the table."""
-    smooth = Surface.of(mesh)
+    smooth = PreparedMesh.of(mesh)
     # trimesh has the normals of the faces.
     surface = dataclasses.replace(smooth, normals=np.repeat(smooth.planes[:, None, :3], 3, axis=1))
     measure = Measure(surface, BakeSettings(mode=mode))  # type: ignore[arg-type]

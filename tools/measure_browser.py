@@ -139,7 +139,7 @@ def load(name: str) -> tl.Mesh:
 
 
 def sky(height: int = 256) -> Array:
-    """(h, 2 h, 3): soft sky, ground and three lamps, smooth enough for the maps that three.js filters."""
+    """(h, 2 h, 3): soft sky, ground and three soft boxes, smooth enough for the maps that three.js filters."""
     v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(2 * height) + 0.5) / (2 * height), indexing="ij")
     polar, longitude = v * np.pi, (u - 0.5) * 2 * np.pi
     across = np.sin(polar)

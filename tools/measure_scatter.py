@@ -2,7 +2,7 @@
 
 ``python tools/measure_scatter.py [MODEL...] [--preset NAME]...`` prints three things; default: bear and sphere of the
 toolkit, in wax, jade and milk. The check of each bake, as `translucent bake --check` makes it. The error at the
-vertices in the light of one round lamp, by its angular radius: what is lost beyond the second band. And, with
+vertices in the light of one round light, by its angular radius: what is lost beyond the second band. And, with
 ``--picture FILE``, that of the whole picture in the studio: mirror image of the environment plus what is baked, beside
 `translucent render`.
 """
@@ -28,7 +28,7 @@ from translucent.scene.showcase import showcase, with_roughness
 
 Array = npt.NDArray[np.float64]
 
-#: Angular radii of the lamp in degrees, and where it is.
+#: Angular radii of the light in degrees, and where it is.
 RADII, TOWARDS = (60, 30, 10), np.ones(3) / np.sqrt(3.0)
 
 SIZE = (320, 320)
@@ -37,8 +37,8 @@ SIZE = (320, 320)
 BLACK = 1e7
 
 
-def lamp(radius: float) -> tl.Environment:
-    """Darkness but for a round lamp."""
+def round_light(radius: float) -> tl.Environment:
+    """Darkness but for a round light."""
     inside = texel_directions(128, 256) @ TOWARDS > np.cos(np.radians(radius))
     return tl.Environment.image(inside[..., None] * np.ones(3))
 
@@ -47,13 +47,13 @@ def nrmse(found: Array, true: Array) -> float:
     return float(np.sqrt(((found - true) ** 2).mean()) / true.mean())
 
 
-def of_lamps(baked: tl.VertexScatter) -> str:
+def of_round_lights(baked: tl.VertexScatter) -> str:
     alone = LitAlone(tl.Object(baked.mesh, medium=baked.medium, surface=tl.Surface(roughness=baked.roughness)), 32)
     errors = []
     for radius in RADII:
-        true = exit_radiance(alone.field(lamp(radius)), baked.mesh.vertices)
-        errors.append(f"{radius} degrees {nrmse(baked.radiance(lamp(radius).harmonics()), true):.1%}")
-    return f"lamp         {', '.join(errors)}"
+        true = exit_radiance(alone.field(round_light(radius)), baked.mesh.vertices)
+        errors.append(f"{radius} degrees {nrmse(baked.radiance(round_light(radius).harmonics()), true):.1%}")
+    return f"round light  {', '.join(errors)}"
 
 
 def whole(baked: tl.VertexScatter, given_back: Array) -> tuple[Array, Array, float]:
@@ -82,7 +82,7 @@ def main(models: tuple[str, ...], presets: tuple[str, ...], picture: Path | None
             preset = tl.preset(name)
             baked = tl.bake_vertex_scatter(mesh, preset.medium, roughness=preset.roughness or 0.0)
             check = check_scatter(Baked(baked, mesh, np.eye(3)), baked.values, SIZE)
-            print(f"{model}, {name}", *str(check).split("\n"), of_lamps(baked), sep="\n  ")
+            print(f"{model}, {name}", *str(check).split("\n"), of_round_lights(baked), sep="\n  ")
             if picture is not None:
                 found, true, error = whole(baked, check["studio"].baked)
                 print(f"  picture      nRMSE {error:.1%}")

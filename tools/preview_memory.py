@@ -125,7 +125,7 @@ def held(pid: int) -> dict[int, int]:
 def show(path: Path, stage: str, inset: bool, patience: float) -> None:
     """Open the window, tell what is reached, and close it."""
     from translucent.preview import app
-    from translucent.preview.actions import Turn
+    from translucent.preview.actions import OrbitBy
     from translucent.preview.document import Display, Document, Look, Model
     from translucent.preview.script import PAUSE, Script
     from translucent.preview.window_state import WindowState
@@ -141,7 +141,7 @@ def show(path: Path, stage: str, inset: bool, patience: float) -> None:
             now = time.time()
             if state.more:
                 self.busy = now
-            if state.waits:
+            if state.idle:
                 time.sleep(PAUSE)  # as a window without a script, which leaves other processes the time
             self.longest, self.last = max(self.longest, now - self.last), now
             if self.reached < 0:
@@ -151,7 +151,7 @@ def show(path: Path, stage: str, inset: bool, patience: float) -> None:
             if now - self.busy < REST and now - self.since < patience:
                 return False
             self.reach(("at rest", "turned, at rest")[self.reached], now)
-            state.work.do(Turn(30.0, 5.0))
+            state.work.do(OrbitBy(30.0, 5.0))
             return self.reached == 2
 
         def reach(self, state: str, now: float) -> None:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from translucent.media.presets import presets
-from translucent.preview.actions import ChoosePreset, Pan, SetField, SetOrbit, Turn, Zoom
+from translucent.preview.actions import ChoosePreset, OrbitBy, Pan, SetField, SetOrbit, Zoom
 from translucent.preview.document import RANGES, Document, Model, Orbit
 from translucent.preview.scenes import method_of
 from translucent.preview.session import save_session
@@ -139,7 +139,7 @@ class Monkey:
         self.work.do(
             r.choice(
                 (
-                    Turn(r.uniform(-300, 300), r.uniform(-100, 100)),
+                    OrbitBy(r.uniform(-300, 300), r.uniform(-100, 100)),
                     Pan(r.uniform(-2, 2), r.uniform(-2, 2)),
                     Zoom(10 ** r.uniform(-2, 2), r.uniform(-1, 1), r.uniform(-0.5, 0.5)),
                     SetOrbit(Orbit((0.0, 0.05, 0.0), r.uniform(-180, 180), r.uniform(-89, 89), 10 ** r.uniform(-2, 1))),

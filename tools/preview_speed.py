@@ -17,7 +17,7 @@ import numpy as np
 import trimesh
 
 from translucent.preview import app, viewport_renderer
-from translucent.preview.actions import SetField, Turn
+from translucent.preview.actions import OrbitBy, SetField
 from translucent.preview.document import Document, Look, Model
 from translucent.preview.script import Script
 from translucent.preview.window_state import WindowState
@@ -45,7 +45,7 @@ class Orbit(Script):
         self.frames.append(time.perf_counter())
         self.inside.append(state.view.drawing)
         self.sizes.add(state.view.viewport.size)
-        state.work.do(Turn(2.0, 0.0))
+        state.work.do(OrbitBy(2.0, 0.0))
         return time.perf_counter() - self.started > self.seconds
 
 

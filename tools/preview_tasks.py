@@ -77,7 +77,7 @@ class Tasks(Script):
             if cores > self._busiest.cores:
                 self._busiest = Frame(cores, seconds, thread, state.view.drawing, self._sampler.told())
         ended = self._continue(state)
-        if state.waits:
+        if state.idle:
             time.sleep(PAUSE)  # other processes need the time more
         # What the tool does is no part of a frame.
         self._last = clocks()

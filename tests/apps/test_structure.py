@@ -53,17 +53,12 @@ SHARED = {
     "Layer",
     "PhotonLight",
     "Picture",
-    "Progress",
-    "Rays",
     "Steps",
-    "Surface",
     "SurfaceLight",
     "Tracer",
-    "Turn",
     "_Channel",
     "_Spans",
     "_Tree",
-    "_Walk",
 }
 
 

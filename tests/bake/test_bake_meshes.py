@@ -10,7 +10,7 @@ import pytest
 
 import translucent as tl
 from translucent.bake.measure import Measure
-from translucent.bake.rays import Surface
+from translucent.bake.rays import PreparedMesh
 from translucent.bake.settings import BakeSettings
 from translucent.geometry.solids import Box, Ellipsoid, Sphere
 
@@ -100,10 +100,10 @@ def test_no_ray_escapes_from_a_closed_mesh(assets: Path, name: str) -> None:
     assert measured.escaped <= 2
 
 
-def sampled(name: str, assets: Path, count: int) -> tuple[tl.Mesh, Surface, np.ndarray, np.ndarray, np.ndarray]:
+def sampled(name: str, assets: Path, count: int) -> tuple[tl.Mesh, PreparedMesh, np.ndarray, np.ndarray, np.ndarray]:
     """A mesh, and points of its faces whose normals are the faces' own."""
     mesh = tl.load_mesh(assets / "meshes_clean" / name)
-    smooth = Surface.of(mesh)
+    smooth = PreparedMesh.of(mesh)
     surface = dataclasses.replace(smooth, normals=np.repeat(smooth.planes[:, None, :3], 3, axis=1))
     rng = np.random.default_rng(2)
     area = np.linalg.norm(np.cross(*(surface.corners[:, i] - surface.corners[:, 0] for i in (1, 2))), axis=1)

@@ -15,7 +15,7 @@ from translucent.assets import mesh_path
 from translucent.bake import inscribed
 from translucent.bake.inscribed import InscribedSpheres
 from translucent.bake.measure import Measure
-from translucent.bake.rays import Points, Surface
+from translucent.bake.rays import Points, PreparedMesh
 from translucent.bake.settings import BakeSettings
 from translucent.geometry.solids import Torus
 
@@ -32,16 +32,16 @@ def prism() -> tl.Mesh:
     return tl.Mesh(made.vertices @ turn.T, made.faces)
 
 
-def points_of(mesh: tl.Mesh, count: int, *, flat: bool) -> tuple[Surface, Points]:
+def points_of(mesh: tl.Mesh, count: int, *, flat: bool) -> tuple[PreparedMesh, Points]:
     """A surface and points all over it, with the normals of the faces where they are `flat`."""
-    surface = Surface.of(mesh)
+    surface = PreparedMesh.of(mesh)
     if flat:
         surface = dataclasses.replace(surface, normals=np.repeat(surface.planes[:, None, :3], 3, axis=1))
     rng = np.random.default_rng(5)
     return surface, surface.points(rng.integers(0, len(surface.faces), count), rng.dirichlet([1, 1, 1], count))
 
 
-def by_points(surface: Surface, points: Points) -> np.ndarray:
+def by_points(surface: PreparedMesh, points: Points) -> np.ndarray:
     """Diameters by the definition, over a grid of points in each face: never too small, and too large by its step."""
     i, j = np.array([(i, j) for i in range(GRID + 1) for j in range(GRID + 1 - i)]).T / GRID
     grid = np.einsum("gc,mci->mgi", np.stack([i, j, 1 - i - j], axis=1), surface.corners)

@@ -10,7 +10,7 @@ import pytest
 
 import translucent as tl
 from translucent.bake.atlas import Atlas, pad, unwrap
-from translucent.bake.rays import Surface
+from translucent.bake.rays import PreparedMesh
 from translucent.geometry.solids import Box, Sphere
 
 SQUARE = [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]]]
@@ -239,7 +239,7 @@ def test_seams_of_a_sphere(size: int) -> None:
 def test_both_sides_of_a_smooth_edge_have_the_same_points_and_normals() -> None:
     """Each corner of a ball, from all its faces; the normal of none of these."""
     solid = Sphere().tessellate(16)
-    surface = Surface.of(solid)
+    surface = PreparedMesh.of(solid)
     count = len(surface.faces)
     points = surface.points(np.repeat(np.arange(count), 3), np.tile(np.eye(3), (count, 1)))
     index = solid.faces.ravel()
@@ -250,7 +250,7 @@ def test_both_sides_of_a_smooth_edge_have_the_same_points_and_normals() -> None:
     # Faces tilt by a 16th of pi from one to the next; their mean is off by a fraction of that, most beside the poles.
     assert np.allclose(points.normal, outwards, atol=np.pi / 16 / 4)
     # A box keeps its edges.
-    box = Surface.of(Box().tessellate())
+    box = PreparedMesh.of(Box().tessellate())
     assert np.allclose(box.normals, box.planes[:, None, :3])
 
 

@@ -23,8 +23,8 @@ SCATTERING = {
     "milk ball": "ball of milk, g = 0.5",
     "milk bear": "bear of skimmed milk",
     "marble knot": "knot of marble",
-    "wax block": "block of wax without an interface, a lamp behind it",
-    "lantern": "hollow ball without an interface, a lamp inside",
+    "wax block": "block of wax without an interface, a point light behind it",
+    "lantern": "hollow ball without an interface, a point light inside",
 }
 INTERFACES = {
     "glass": "ball of glass",

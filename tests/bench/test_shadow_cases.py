@@ -71,7 +71,7 @@ def test_maps_are_nearer_than_what_others_throw(bench: BenchContext) -> None:
 
 
 def test_what_is_opaque_is_in_the_way_of_maps_and_keeps_some_rows_out(bench: BenchContext) -> None:
-    made = HASTE.measure(bench, told(BALL, BLOCK, light="lamp"))
+    made = HASTE.measure(bench, told(BALL, BLOCK, light="point light"))
     assert (made.failure, made.opaque, made.texels) == (None, True, None)
     rows = {row.method: row for row in made.rows}
     assert rows[HALF].refusal == "drawn without opaque objects"
@@ -114,7 +114,7 @@ def test_the_largest_ground_is_left_out_of_maps_wherever_it_stands() -> None:
 def test_scenes_are_those_of_the_design() -> None:
     names = {scene.name for scene in SHADOW_SCENES}
     assert len(names) == len(SHADOW_SCENES)
-    lights = {"sun", "lamp"}
+    lights = {"sun", "point light"}
     assert {
         f"{mesh}, {light}" for mesh in ("bear", "knot", "shell", "goblet", "bangle", "soap") for light in lights
     } <= names

@@ -14,7 +14,7 @@ from tests.preview.waiting import wait
 from translucent.assets import shader_path
 from translucent.preview import library
 from translucent.preview.dialogs import Browser, with_recent
-from translucent.preview.document import FINISH, TIPS, Display, Look, Material, Orbit, camera_of
+from translucent.preview.document import SURFACE_FIELDS, TIPS, Display, Look, Material, Orbit, camera_of
 from translucent.preview.library import EnvironmentFolder, draw_panorama, model_key, model_picture, panorama_key, title
 from translucent.preview.session import Preferences
 from translucent.preview.workspace import Workspace
@@ -181,7 +181,7 @@ def test_every_knob_is_explained() -> None:
     sections = {"material": Material, "look": Look, "display": Display, "orbit": Orbit}
     fields = {f"{section}.{one.name}" for section, kind in sections.items() for one in dataclasses.fields(kind)}
     assert set(TIPS) == (fields - silent) | {"model.unit"}
-    for name in ("ior", "color", "distance", "thickness", *FINISH):
+    for name in ("ior", "color", "distance", "thickness", *SURFACE_FIELDS):
         assert "glTF" in TIPS[f"material.{name}"]
         if name != "color":
             assert "Typical" in TIPS[f"material.{name}"]

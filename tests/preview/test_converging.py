@@ -10,7 +10,7 @@ import pytest
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels
 from translucent.gpu import refinement
-from translucent.preview.actions import SetField, Turn
+from translucent.preview.actions import OrbitBy, SetField
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 
@@ -48,10 +48,10 @@ def test_a_still_picture_converges_until_something_changes(
     probe = view.probe(80, 48)
     assert probe is not None
     assert probe.thickness == pytest.approx(truth.thickness[48, 80], rel=1e-5)
-    work.do(Turn(20.0, 10.0))
+    work.do(OrbitBy(20.0, 10.0))
     assert view.draw(work, SIZE)
     assert view.paths.note == ""
-    work.do(Turn(-20.0, -10.0))
+    work.do(OrbitBy(-20.0, -10.0))
     work.do(SetField("display.converge", False))
     finish(view, work)
     assert (np.abs(pixels(view) - interactive).max(axis=2) > 1).mean() < 2e-3

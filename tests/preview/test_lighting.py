@@ -14,7 +14,7 @@ from PIL import Image
 from tests.preview.waiting import wait
 from translucent.preview import scenes
 from translucent.preview import scenes as staging
-from translucent.preview.actions import SetField, Turn
+from translucent.preview.actions import OrbitBy, SetField
 from translucent.preview.document import Document, Model
 from translucent.preview.workspace import Workspace
 
@@ -59,7 +59,7 @@ def test_the_one_before_is_on_show_until_a_file_is_read(
     read.clear()
     workspace.do(SetField("look.environment", str(sky)))
     assert kind(workspace) == before != "image"
-    workspace.do(Turn(5.0, 0.0))
+    workspace.do(OrbitBy(5.0, 0.0))
     first = workspace.scene()
     assert first is not None
     np.testing.assert_allclose(first.camera.eye, scenes.camera_of(workspace.document.orbit).eye)  # type: ignore[arg-type]

@@ -12,7 +12,7 @@ import pytest
 import translucent as tl
 from tests.preview.waiting import SIZE, wait
 from translucent.preview import measuring, workspace
-from translucent.preview.actions import SetField, Turn
+from translucent.preview.actions import OrbitBy, SetField
 from translucent.preview.measuring import crossing, measure
 from translucent.preview.window_state import WindowState
 from translucent.preview.workspace import Workspace
@@ -89,12 +89,12 @@ def test_measuring_waits_for_what_the_picture_needs_and_is_cancelled_when_things
     state.draw(SIZE)
     assert begun == [work.scene()]
     task = work.lanes["draw"].start("measuring", lambda _: None, lambda _: None)
-    work.do(Turn(10.0, 0.0))
+    work.do(OrbitBy(10.0, 0.0))
     state.draw(SIZE)
     assert task.cancelled
     assert begun[1:] == [work.scene()]
     monkeypatch.setattr(measuring, "MOST_TRIANGLES", 10)
-    work.do(Turn(10.0, 0.0))
+    work.do(OrbitBy(10.0, 0.0))
     state.draw(SIZE)
     assert len(begun) == 2
     work.do(SetField("display.inset", True))

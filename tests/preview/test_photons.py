@@ -19,7 +19,7 @@ from translucent.planning import caustics
 from translucent.planning.rendered import Treatment
 from translucent.planning.request import RenderRequest
 from translucent.preview import quality
-from translucent.preview.actions import SetField, Turn
+from translucent.preview.actions import OrbitBy, SetField
 from translucent.preview.document import Document, Model
 from translucent.preview.exports import write_picture
 from translucent.preview.viewport_renderer import ViewportRenderer
@@ -115,7 +115,7 @@ def test_what_has_no_caustics_says_why_and_keeps_its_picture(view: ViewportRende
     finish(view, work)
     assert view.photons.note.startswith("no caustics; the scene has no lights")
     assert view.viewport.steps(0) > view._strides.of[0] ** 2  # edges become smooth all the same
-    work.do(Turn(10.0, 0.0))
+    work.do(OrbitBy(10.0, 0.0))
     assert view.draw(work, SIZE)
     work.do(SetField("display.mode", "thickness"))
     finish(view, work)

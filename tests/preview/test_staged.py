@@ -17,7 +17,7 @@ from translucent.gpu.passes import shadow_maps
 from translucent.gpu.shaders import PostponedError
 from translucent.planning.request import RenderRequest
 from translucent.preview import quality
-from translucent.preview.actions import ChoosePreset, SetField, Turn
+from translucent.preview.actions import ChoosePreset, OrbitBy, SetField
 from translucent.preview.document import AUTO, Document, Look, Model, framed, orbit_of
 from translucent.preview.exports import Recipe, command_line, python_code
 from translucent.preview.scenes import stage_name, tone_of
@@ -77,7 +77,7 @@ def test_a_stage_comes_after_the_first_picture_and_stays(staged: Workspace, tmp_
     first = staged.scene()
     assert first is not None
     assert (staged.document.material.ior, tone_of(staged.document.look, first)) == (1.5, "neutral")
-    for action in (Turn(30.0, 5.0), ChoosePreset("merlot"), SetField("material.ior", 1.4)):
+    for action in (OrbitBy(30.0, 5.0), ChoosePreset("merlot"), SetField("material.ior", 1.4)):
         staged.do(action)
         scene = staged.scene()
         assert scene is not None
@@ -124,7 +124,7 @@ def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch
     with view.current():
         frame = view.renderer.render(scene, SIZE)
     assert np.abs(pixels(view) - frame.to_srgb8(0.0, "neutral").astype(int)).max() <= 1
-    staged.do(Turn(20.0, 0.0))
+    staged.do(OrbitBy(20.0, 0.0))
     view.draw(staged, SIZE)
     assert view.simpler
     assert view._moving is not None
@@ -228,7 +228,7 @@ def assert_alike(scene: tl.Scene, expected: tl.Scene) -> None:
 
 @pytest.mark.usefixtures("told_only")
 def test_recipes_make_the_same_picture(staged: Workspace, capsys: pytest.CaptureFixture[str]) -> None:
-    for action in (Turn(40.0, 5.0), SetField("look.rotation", 30.0), SetField("look.exposure", 0.5)):
+    for action in (OrbitBy(40.0, 5.0), SetField("look.rotation", 30.0), SetField("look.exposure", 0.5)):
         staged.do(action)
     told = shot(staged)
     command, left_out = command_line(told)

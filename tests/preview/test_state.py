@@ -20,10 +20,10 @@ from translucent.preview.actions import (
     ChoosePreset,
     History,
     Open,
+    OrbitBy,
     Pan,
     SetField,
     SetOrbit,
-    Turn,
     Zoom,
     apply,
 )
@@ -93,7 +93,7 @@ def test_a_drag_after_undo_is_a_step_of_its_own() -> None:
 
 def test_undo_leaves_the_camera_where_it_is() -> None:
     history = History(dataclasses.replace(Document(), orbit=ORBIT)).done(SetField("look.exposure", 1.0))
-    turned = history.done(Turn(30.0, 0.0))
+    turned = history.done(OrbitBy(30.0, 0.0))
     assert len(turned.past) == 1
     assert turned.undone().present.orbit == turned.present.orbit != ORBIT
 
@@ -252,7 +252,7 @@ def test_a_camera_comes_back_from_its_orbit() -> None:
 
 
 def test_nothing_moves_before_there_is_a_model() -> None:
-    assert apply(Document(), Turn(5.0, 5.0)) == Document()
+    assert apply(Document(), OrbitBy(5.0, 5.0)) == Document()
     assert apply(Document(), SetOrbit(ORBIT)).orbit == ORBIT
 
 
@@ -266,7 +266,7 @@ def test_a_film_and_a_coat_reach_the_scene_and_come_back_from_it() -> None:
     surface = scene.objects[0].surface
     assert surface is not None
     assert {name: getattr(surface, name) for name in values} == values
-    assert material_of(scene).finish == document.material.finish
+    assert material_of(scene).surface_values == document.material.surface_values
     assert document.material.unsaid == ["iridescence", "clearcoat"]
     assert Material().unsaid == []
 

@@ -19,7 +19,7 @@ from translucent import assets as data
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import Treatment
 from translucent.preview import quality, viewport_renderer
-from translucent.preview.actions import ChoosePreset, SetField, Turn
+from translucent.preview.actions import ChoosePreset, OrbitBy, SetField
 from translucent.preview.document import Model
 from translucent.preview.measuring import crossing
 from translucent.preview.quality import SMALL, StepTimes
@@ -42,7 +42,7 @@ def test_the_picture_is_the_one_that_render_makes(
     """At once, and from the smallest steps: these differ by float32 rounding at silhouettes only."""
     monkeypatch.setattr(viewport_renderer, "BUDGET", budget)
     finish(view, work)
-    work.do(Turn(20.0, 10.0))  # by now the stage knows what a step takes
+    work.do(OrbitBy(20.0, 10.0))  # by now the stage knows what a step takes
     finish(view, work)
     scene = work.scene()
     assert scene is not None
@@ -81,7 +81,7 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
 
     monkeypatch.setattr(view.renderer, "draw_requested", spied)
     for _ in range(2):
-        work.do(Turn(20.0, 10.0))
+        work.do(OrbitBy(20.0, 10.0))
         assert view.draw(work, SIZE)
         assert ("interfaces in screen space while the picture moves" in view.simpler) is slow
     assert [plan.interfaces for plan in drawn] == 2 * [tl.ScreenInterfaces() if slow else usual]
@@ -133,7 +133,7 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(
     assert np.abs(pixels(view) - frame.to_srgb8().astype(int)).mean() < 1.0
     work.do(SetField("look.light", True))
     finish(view, work)
-    for action, told in ((Turn(20.0, 10.0), ""), (SetField("look.light_yaw", 3.0), "on a small grid")):
+    for action, told in ((OrbitBy(20.0, 10.0), ""), (SetField("look.light_yaw", 3.0), "on a small grid")):
         work.do(action)
         view.draw(work, SIZE)
         assert (told in view.quality.notes[1]) if told else not view.quality.notes[1]
@@ -189,14 +189,14 @@ def test_a_picture_that_takes_long_to_be_shown_has_frames_for_that(
         monkeypatch.setattr(
             view.viewport, name, lambda *a, done=done, name=name, **k: (frame.append(name), done(*a, **k))
         )
-    work.do(Turn(20.0, 10.0))
+    work.do(OrbitBy(20.0, 10.0))
     frames = []
     while view.draw(work, SIZE):
         frames.append(tuple(frame))
         frame.clear()
     assert frames[1] == ("step", "present")  # the first that is sharper than what moved
     assert set(frames[2:]) == {("step",), ("present",)}
-    work.do(Turn(-20.0, -10.0))
+    work.do(OrbitBy(-20.0, -10.0))
     finish(view, work)
     assert (pixels(view) != whole).mean() < 1e-3  # the last step is shown, too
 
@@ -266,8 +266,8 @@ def test_a_shader_that_does_not_compile_leaves_the_last_good_one(
     broken.write_text(good + "\nvoid broken( {\n")
     view.reload(work)
     assert "shaders/thickness/signed_depth.frag:" in view.shader_problem
-    work.do(Turn(1.0, 0.0))
-    work.do(Turn(-1.0, 0.0))
+    work.do(OrbitBy(1.0, 0.0))
+    work.do(OrbitBy(-1.0, 0.0))
     finish(view, work)
     assert view.problem == ""
     assert (np.abs(pixels(view) - before).max(axis=2) > 1).mean() < 2e-3

@@ -158,7 +158,7 @@ class Texels:
     row, column : (k,) int64
         Each texel once, row by row.
     face : (k,) int64
-        The face that has the center of the texel, or is nearest to it among those that touch the texel.
+        The face that has the center of the texel, or is nearest to it among the faces that touch the texel.
     barycentric : (k, 3) float64
         The point of the face that is nearest to the texel's center in UV.
     inside : (k,) bool
@@ -288,7 +288,7 @@ class Atlas:
 
 
 def _cells(low: Array, high: Array) -> tuple[Integers, Integers]:
-    """First cell, and last + 1, of closed ranges; those that end on a boundary do not touch the cell behind it."""
+    """First cell, and last + 1, of closed ranges; a range that ends on a boundary does not touch the cell behind it."""
     first = np.floor(low).astype(np.int64)
     return first, np.maximum(np.ceil(high).astype(np.int64), first + 1)
 

@@ -16,7 +16,7 @@ from translucent.arguments import checked
 from translucent.arrays import Array, Floats
 from translucent.bake.atlas import Atlas, Unwrapped, in_tile, pad, unwrap
 from translucent.bake.measure import Measure, Measured
-from translucent.bake.rays import Surface
+from translucent.bake.rays import PreparedMesh
 from translucent.bake.settings import BakeSettings, settings_from
 from translucent.bake.strips import Canvas, Checkpoint, Progress, Projection, Strips, bake_key, bake_strips, in_order
 from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
@@ -31,7 +31,7 @@ from translucent.geometry.normals import corner_angles
 #: has that could show all.
 MOST_HIDDEN, ENOUGH_TEXELS = 0.1, 4
 
-#: Distance from its vertex of the point that stands for a face's corner, as a share of the way to the other two.
+#: Distance from a vertex to the point where the corner of a face is measured, as a fraction of the way to the others.
 CORNER = 1e-3
 
 #: Settings without meaning for vertices.
@@ -129,14 +129,14 @@ def _check_high(high: Mesh | None, cage: Mesh | None, high_distance: float | Non
 
 
 def _strips(mesh: Mesh, unwrapped: Unwrapped, settings: BakeSettings, high: Mesh | None, cage: Mesh | None) -> Strips:
-    low = Surface.of(unwrapped.mesh)
+    low = PreparedMesh.of(unwrapped.mesh)
     uv = unwrapped.uv[low.faces]
     shown = np.arange(len(uv)) if settings.tile is None else np.flatnonzero(in_tile(uv, settings.tile))
     side = settings.size * settings.supersample
     atlas = Atlas(uv[shown], side, side)
     if high is None:
         return Strips(low, shown, atlas, Measure(low, settings), None)
-    detailed = Surface.of(high)
+    detailed = PreparedMesh.of(high)
     projection = Projection.of(low, unwrapped, detailed, mesh, cage, settings.high_distance)
     return Strips(low, shown, atlas, Measure(detailed, settings), projection)
 
@@ -188,7 +188,7 @@ def bake_vertex_thickness(
         raise InputError("thickness per vertex", f"{wrong[0]} is of maps", "leave it out")
     settings = dataclasses.replace(settings_from(settings, "mode", given), **_OF_MAPS)
     threads = check_threads(threads)
-    surface = Surface.of(mesh)
+    surface = PreparedMesh.of(mesh)
     parts = _measure_corners(surface, settings, threads, progress)
     corner = np.concatenate([part.values for part in parts]), np.concatenate([part.errors for part in parts])
     values, errors = _at_vertices(mesh, surface, *corner)
@@ -204,7 +204,7 @@ def bake_vertex_thickness(
 
 
 def _measure_corners(
-    surface: Surface, settings: BakeSettings, threads: int, progress: Progress | None
+    surface: PreparedMesh, settings: BakeSettings, threads: int, progress: Progress | None
 ) -> list[Measured]:
     measure, count = Measure(surface, settings), 3 * len(surface.faces)
     parts: list[Measured] = []
@@ -224,7 +224,7 @@ def _measure_corners(
 
 
 def _at_vertices(
-    mesh: Mesh, surface: Surface, values: Array, errors: Array
+    mesh: Mesh, surface: PreparedMesh, values: Array, errors: Array
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
     """(n,), (n,): means over the corners (3 m,) at each position, and their standard errors."""
     position = position_ids(mesh.vertices)

@@ -107,7 +107,7 @@ class GlbBuilder:
         target : int, optional
             `VERTICES`, whose elements are aligned, `INDICES`, or None.
         normalized : bool
-            Whether whole numbers stand for -1..1 or 0..1.
+            Whether whole numbers are normalized to -1..1 or 0..1.
         bounds : bool
             Whether to state smallest and largest values, as positions must.
         """
@@ -143,7 +143,7 @@ class GlbBuilder:
         return primitives(file, file.item("meshes", mesh))[index]
 
     def own_material(self, mesh: int, index: int) -> int:
-        """Index of the material of a primitive, of which it is now the only user: shared ones are duplicated.
+        """Index of a material that this primitive alone uses: shared ones are duplicated.
 
         Nodes that share the mesh share its material, too. Materials that variants name stay theirs.
         """

@@ -4,7 +4,7 @@ Targets are the primitives whose material lets light in, but for open meshes tha
 inside. Where no material lets light in, all triangles, whose materials then will. Each is baked in the mesh's own
 space, as glTF states thickness, so nodes that share a mesh share the map, whatever their scale.
 
-The UVs are those that the material reads its thickness texture at (KHR_texture_transform included, as long as it keeps
+The UVs are the ones where the material reads its thickness texture (KHR_texture_transform included, as long as it keeps
 them in 0..1), else TEXCOORD_0, else new ones as the next set.
 
 Modelling tools split a mesh by its materials: of a vase in four primitives none is closed, and all of them are. Such a
@@ -249,7 +249,7 @@ def find_targets(
     size : int
         Texels along each side of the map to come, which the gaps between new charts depend on.
     only : collection of (int, int), optional
-        Mesh and primitive of those that count. Default: all.
+        Mesh and primitive of each that counts. Default: all.
 
     Raises
     ------

@@ -5,7 +5,7 @@ The sphere at p has its center p - r n on the inward normal, and is empty: with 
     2 r(p) = min over q of |q - p|^2 / s(q),
 
 over the points q of the surface in the cone of `SPHERE_CONE` around m. Where a sphere touches beyond it, seen from the
-center less than the crease angle away from p, is the smooth surface around p, each edge of whose tessellation would
+center less than the crease angle away from p, is the smooth surface around p, where each edge of its tessellation would
 otherwise end the sphere.
 
 The quotient is quasi-convex: spheres that touch at p lie within one another. So its minimum in a face is where a sphere
@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Floats, Integers
-from translucent.bake.rays import SPHERE_CONE, Points, Surface
+from translucent.bake.rays import SPHERE_CONE, Points, PreparedMesh
 from translucent.geometry.bvh import curve_order
 
 #: Children of a box, and the largest number of boxes at the top of the tree.
@@ -58,15 +58,15 @@ class InscribedSpheres:
 
     Parameters
     ----------
-    surface : Surface
+    surface : PreparedMesh
     """
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, surface: PreparedMesh) -> None:
         self._planes = surface.planes
         self._corners = surface.corners
         self._sides = _sides(surface.corners, surface.planes[:, :3])
         self._middles = surface.corners.mean(axis=1)
-        self._tree = _Tree.of(surface)
+        self._tree = _BoxTree.of(surface)
         self._slack = LARGE_SLACK if len(surface.corners) > LARGE else 0.0
 
     def diameters(self, points: Points, radius: Array) -> Array:
@@ -202,7 +202,7 @@ def _in_parents(values: Array, width: int) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Tree:
+class _BoxTree:
     """Tree of boxes: each has `CHILDREN` of the next level.
 
     Attributes
@@ -217,7 +217,7 @@ class _Tree:
     levels: tuple[_Boxes, ...]
 
     @classmethod
-    def of(cls, surface: Surface) -> _Tree:
+    def of(cls, surface: PreparedMesh) -> _BoxTree:
         """Tree of the faces of a surface."""
         corners = surface.corners
         order = curve_order(*(end.astype(np.float32) for end in (corners.min(axis=1), corners.max(axis=1))))

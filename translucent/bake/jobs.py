@@ -90,7 +90,7 @@ _HOW = {"output", "model", "high", "cage", "resume", "threads", "max_escaped", "
 _LENGTHS = ("max_distance", "tolerance", "high_distance")
 #: Largest length of the name of a map, and the characters besides letters and digits that are safe in file names.
 _LONGEST, _SAFE = 60, "._-"
-#: Keys without meaning for vertices: those that are a mistake, and those that merely have a default.
+#: Keys without meaning for vertices: mistakes, and keys that merely have a default.
 _OF_MAPS, _TEXELS = ("tile", "high", "cage", "high_distance"), ("size", "supersample", "padding")
 
 
@@ -220,7 +220,7 @@ def bake_one(
     part : str
         Tells the parts of a job apart that keep what is finished.
     around : Mesh, optional
-        The body of whose surface the mesh is a part.
+        The body whose surface the mesh is a part of.
     """
     given = _settings(job, mesh.diagonal)
     if given.get("mode") == "transmittance":

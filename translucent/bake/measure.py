@@ -30,7 +30,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 from translucent.bake.inscribed import InscribedSpheres
-from translucent.bake.rays import Directions, Points, Rays, Surface
+from translucent.bake.rays import Directions, InwardRays, Points, PreparedMesh
 from translucent.bake.settings import LOCAL_REACH, BakeSettings
 from translucent.formulas.color import LUMINANCE_WEIGHTS
 
@@ -192,11 +192,11 @@ class Measure:
 
     Parameters
     ----------
-    surface : Surface
+    surface : PreparedMesh
     settings : BakeSettings
     """
 
-    def __init__(self, surface: Surface, settings: BakeSettings) -> None:
+    def __init__(self, surface: PreparedMesh, settings: BakeSettings) -> None:
         self.surface, self.settings = surface, settings
         self.stop = threading.Event()
         # The diagonal of the mesh is two radii.
@@ -206,7 +206,7 @@ class Measure:
         extinction = None
         if settings.mode == "transmittance" and settings.medium is not None:
             extinction = settings.medium.extinction * surface.radius
-        self.rays, self.directions = Rays(surface, settings, reach), Directions.of(settings)
+        self.rays, self.directions = InwardRays(surface, settings, reach), Directions.of(settings)
         self.mean = RayMean(settings.mode, reach, extinction)
         self.spheres = InscribedSpheres(surface) if settings.mode == "inscribed" else None
 

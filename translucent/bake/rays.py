@@ -63,7 +63,7 @@ class Points:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class PreparedMesh:
     """Mesh data that rays and points need. Lengths are in the unit ball around it.
 
     Attributes
@@ -85,7 +85,7 @@ class Surface:
     normals: Array
 
     @classmethod
-    def of(cls, mesh: Mesh) -> Surface:
+    def of(cls, mesh: Mesh) -> PreparedMesh:
         """Prepare a mesh.
 
         Parameters
@@ -129,7 +129,7 @@ class Surface:
 
     @cached_property
     def plane_columns(self) -> Array:
-        """(4, m): `planes`, of which one number of each is taken at a time."""
+        """(4, m): `planes`, transposed: one number of each is taken at a time."""
         return np.ascontiguousarray(self.planes.T)
 
     def points(self, face: Integers, barycentric: Array) -> Points:
@@ -221,19 +221,19 @@ SAME_POINT = 2.0**-24
 
 
 @dataclass(frozen=True, eq=False)
-class Rays:
+class InwardRays:
     """Rays into a surface, followed to their exits. Any number of threads may ask at once.
 
     Parameters
     ----------
-    surface : Surface
+    surface : PreparedMesh
     settings : BakeSettings
         Whether rays end at their first exit, and pass faces through which they enter once more.
     reach : float
         How far rays are followed, in radii; may be infinite.
     """
 
-    surface: Surface
+    surface: PreparedMesh
     settings: BakeSettings
     reach: float
 
@@ -250,7 +250,7 @@ class Rays:
         traced = len(face)
         for begin in range(0, len(left), FOLLOWED_RAYS):
             ray = left[begin : begin + FOLLOWED_RAYS]
-            walk = _Walk.of(points.start[ray // rays], directions.reshape(3, -1)[:, ray].T.astype(np.float64))
+            walk = _RayWalk.of(points.start[ray // rays], directions.reshape(3, -1)[:, ray].T.astype(np.float64))
             walk.pass_exit(leaves[ray], distance[ray], face[ray])
             traced += self._follow(walk)
             distance[ray] = walk.length
@@ -307,7 +307,7 @@ class Rays:
         """(k, 3): where rays from points (k) begin, a little below the surface."""
         return (points.start - OFFSET * self.surface.planes[points.face, :3]).astype(np.float32)
 
-    def _follow(self, walk: _Walk) -> int:
+    def _follow(self, walk: _RayWalk) -> int:
         """Follow rays to their ends, and tell how many rays Embree traced for that."""
         traced = 0
         while walk.live.size:
@@ -320,7 +320,7 @@ class Rays:
             self._step(walk, hits)
         return traced
 
-    def _step(self, walk: _Walk, hits: dict[str, Any]) -> None:
+    def _step(self, walk: _RayWalk, hits: dict[str, Any]) -> None:
         """Advance the live rays of a walk behind the face that each has found, or end them."""
         missed = hits["primID"] < 0
         walk.end(missed, np.where(walk.depth[walk.live] > 0, np.inf, walk.length[walk.live]))
@@ -336,7 +336,7 @@ class Rays:
         enters = (cosine < -GRAZING) & (distance > NEAR) & ~again
         self._cross_surface(walk, np.maximum(distance, 0.0), leaves, enters)
 
-    def _cross(self, walk: _Walk, face: Integers, seen: Array) -> tuple[Array, Array]:
+    def _cross(self, walk: _RayWalk, face: Integers, seen: Array) -> tuple[Array, Array]:
         """Distance to the planes of faces, and cosine at them; along a plane, the distance that Embree has `seen`."""
         plane, origin, direction = self.surface.planes[face], walk.origin[walk.live], walk.direction[walk.live]
         cosine = plane[:, 0] * direction[:, 0] + plane[:, 1] * direction[:, 1] + plane[:, 2] * direction[:, 2]
@@ -345,9 +345,9 @@ class Rays:
         return np.where(across, height / np.where(across, cosine, 1.0), seen), cosine
 
     def _cross_surface(
-        self, walk: _Walk, distance: Array, leaves: npt.NDArray[np.bool_], enters: npt.NDArray[np.bool_]
+        self, walk: _RayWalk, distance: Array, leaves: npt.NDArray[np.bool_], enters: npt.NDArray[np.bool_]
     ) -> None:
-        """Count the crossings of the live rays, and end those that leave."""
+        """Count the crossings of the live rays, and end the ones that leave."""
         live = walk.live
         if self.settings.gaps == "first-exit":
             walk.end(leaves | (enters & (not self.settings.ignore_back_faces)), distance)
@@ -361,8 +361,8 @@ class Rays:
 
 
 @dataclass(eq=False)
-class _Walk:
-    """Walk of rays, one per row; `live` has the indices of those that are not at their end."""
+class _RayWalk:
+    """Walk of rays, one per row; `live` has the indices of unfinished rays."""
 
     origin: Array
     direction: Array
@@ -375,7 +375,7 @@ class _Walk:
     length: Array
 
     @classmethod
-    def of(cls, origin: Array, direction: Array) -> _Walk:
+    def of(cls, origin: Array, direction: Array) -> _RayWalk:
         """Rays (n, 3) that begin inside a body, a step before their start."""
         count = len(origin)
         return cls(

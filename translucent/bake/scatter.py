@@ -60,7 +60,7 @@ _CHANNELS = {f"SH{i}.{color}": (i, k) for i in range(COUNT) for k, color in enum
 
 #: What the numbers are.
 DEFINITION = (
-    "T: mean radiance (flux / pi) that the surface gives back of light scattered inside, for a unit of each spherical "
+    "T: mean radiance (flux / pi) of light scattered inside that leaves the surface, for a unit of each spherical "
     "harmonic of the radiance around it; radiance = sum_i T_i L_i, times (1 - F(cos)) / entering in a direction"
 )
 

@@ -248,7 +248,7 @@ def environments() -> dict[str, Environment]:
 
 
 def check_scatter_output(path: Path, results: dict[PrimitiveKey, Baked]) -> dict[str, ScatterCheck]:
-    """Checks of all bodies of a file, read back; by the names of their meshes, without those that nothing shows.
+    """Checks of all bodies of a file, read back; by the names of their meshes, without hidden ones.
 
     Raises
     ------

@@ -28,7 +28,7 @@ DEFINITIONS: dict[Mode, str] = {
 #: Largest size of a map, in texels along a side.
 MAX_SIZE = 16384
 
-#: Largest number of rays from one point, before those that a tolerance adds.
+#: Largest number of rays from one point, before a tolerance adds more.
 MAX_RAYS = 65536
 
 #: Default reach of mode "local", as a share of the diagonal; the customary one of baking tools.

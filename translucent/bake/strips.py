@@ -25,7 +25,7 @@ import numpy.typing as npt
 from translucent.arrays import Array, Floats, Mask
 from translucent.bake.atlas import Atlas, Unwrapped
 from translucent.bake.measure import Measure
-from translucent.bake.rays import Points, Surface, barycentric, blend
+from translucent.bake.rays import Points, PreparedMesh, barycentric, blend
 from translucent.bake.settings import BakeSettings
 from translucent.errors import InputError
 from translucent.files.paths import write_atomically
@@ -63,21 +63,27 @@ class Projection:
 
     Attributes
     ----------
-    low, high : Surface
+    low, high : PreparedMesh
     cage : (m, 3, 3) float64 or None
         Corners of the cage's faces in metres, one for each face of `low`.
     distance : float
         In metres, to either side, where there is no cage.
     """
 
-    low: Surface
-    high: Surface
+    low: PreparedMesh
+    high: PreparedMesh
     cage: Array | None
     distance: float
 
     @classmethod
     def of(
-        cls, low: Surface, unwrapped: Unwrapped, high: Surface, given: Mesh, cage: Mesh | None, distance: float | None
+        cls,
+        low: PreparedMesh,
+        unwrapped: Unwrapped,
+        high: PreparedMesh,
+        given: Mesh,
+        cage: Mesh | None,
+        distance: float | None,
     ) -> Projection:
         """For a `given` mesh that was `unwrapped`.
 
@@ -143,7 +149,7 @@ class Strip:
     ----------
     values, errors : (rows, w) float32
     coverage, valued : (rows, w) bool
-        Texels that a triangle touches, and those that have a value: without a high mesh, the same.
+        Texels that a triangle touches, and texels that have a value: without a high mesh, the same.
     owners : (m,) bool
         Faces that some texel shows.
     counts : (len(COUNTS),) int64
@@ -163,7 +169,7 @@ class Strips:
 
     Attributes
     ----------
-    low : Surface
+    low : PreparedMesh
         With the texture coordinates.
     shown : (k,) int64
         The faces of `low` that the atlas has.
@@ -175,7 +181,7 @@ class Strips:
         From `low` to that mesh, where it is another.
     """
 
-    low: Surface
+    low: PreparedMesh
     shown: npt.NDArray[np.int64]
     atlas: Atlas
     measure: Measure
@@ -336,7 +342,7 @@ def in_order(
 ) -> Generator[Result, None, None]:
     """Results of a task for each item, in their order, as they come.
 
-    Whatever ends the iteration early sets `stop`, which the task is to heed, and waits for the threads.
+    Whatever ends the iteration early sets `stop`, which the task is to heed, and joins the threads.
     """
     # How NumPy treats floating-point errors belongs to the context; the caller's choice holds in all threads.
     context = copy_context()

@@ -143,13 +143,13 @@ def _two_emitters(size: Size) -> Scene:
 
 
 def _scattering(make: Callable[[], Mesh], optical_depth: float, size: Size) -> Scene:
-    """Lit by a lamp from behind and by the sky."""
+    """Body that scatters, lit by a point light from behind and by the sky."""
     mesh = make()
     extinction, reach = optical_depth / mesh.diagonal, mesh.diagonal
     milky = Medium(absorption=(0.1 * extinction,) * 3, scattering=(0.9 * extinction,) * 3, anisotropy=0.3)
-    lamp = PointLight(mesh.center + np.array([0.7, 0.5, -0.8]) * reach, (3.0 * reach**2,) * 3)
+    behind = PointLight(mesh.center + np.array([0.7, 0.5, -0.8]) * reach, (3.0 * reach**2,) * 3)
     sky = DirectionalLight((0.4, -0.8, -0.5), (2.0, 2.2, 2.6))
-    return showcase(mesh, milky, size, environment=DUSK, lights=[lamp, sky])
+    return showcase(mesh, milky, size, environment=DUSK, lights=[behind, sky])
 
 
 def _cloud(size: Size) -> Scene:
@@ -233,14 +233,14 @@ def _marble(_: Size) -> Scene:
 
 def _wax(_: Size) -> Scene:
     block = Box((-0.6, -0.5, -0.3), (0.6, 0.5, 0.3)).tessellate()
-    lamp = PointLight((-0.95, 0.35, -0.75), (1.6, 1.3, 1.0))
-    return _seen(Object(block, _milky(12.0, 1.2, (0.995, 0.98, 0.94), 1.0)), [lamp], EVENING)
+    light = PointLight((-0.95, 0.35, -0.75), (1.6, 1.3, 1.0))
+    return _seen(Object(block, _milky(12.0, 1.2, (0.995, 0.98, 0.94), 1.0)), [light], EVENING)
 
 
 def _lantern(_: Size) -> Scene:
     shell = SphericalShell(1.0, 0.8).tessellate(64)
-    lamp = PointLight((0.0, 0.0, 0.0), (1.5, 1.1, 0.6))
-    return _seen(Object(shell, _milky(2.5, 0.2, (0.99, 0.99, 0.99), 1.0)), [lamp], EVENING)
+    light = PointLight((0.0, 0.0, 0.0), (1.5, 1.1, 0.6))
+    return _seen(Object(shell, _milky(2.5, 0.2, (0.99, 0.99, 0.99), 1.0)), [light], EVENING)
 
 
 #: Cases by effect: those of interfaces take long, and all but one are left out by ``--quick``. Those of light that is
@@ -268,7 +268,7 @@ CASES: tuple[Case, ...] = (
     _scattered(
         "scattering",
         "Milky torus",
-        "light of a lamp and of the sky, scattered once; shadows that the body throws into itself",
+        "light of a point light and of the sky, scattered once; shadows that the body throws into itself",
         partial(_scattering, lambda: lying_torus(96), 8.0),
         compared=96,
     ),
@@ -364,11 +364,11 @@ CASES: tuple[Case, ...] = (
     _stored("milk bear", "Bear of skimmed milk", "limbs that shadow each other", _bear, paths=100),
     _stored("marble knot", "Knot of marble", "a body beside itself, in its own light", _marble, paths=90),
     _stored(
-        "wax block", "Block of wax with a lamp behind it", "light of one corner that spreads sideways", _wax, paths=400
+        "wax block", "Block of wax with a light behind it", "light of one corner that spreads sideways", _wax, paths=400
     ),
     _stored(
         "lantern",
-        "Hollow ball with a lamp inside",
+        "Hollow ball with a light inside",
         "a wall of 2.5 mean free paths around a hollow, in which light goes to and fro",
         _lantern,
         compared=32,

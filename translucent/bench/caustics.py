@@ -1,6 +1,6 @@
 """Shadows of environments by some directions, and caustics by photons on grounds and in media.
 
-Errors are freed of the noise of their truths, of which there are two each: photons or random paths of the reference.
+Each truth is two independent estimates, by photons or random paths of the reference; errors are free of their noise.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from translucent.scene.environment_map import row_solid_angles, texel_directions
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Object, Scene
 
-#: Environments: from all sides alike, from above, and from a few lamps.
+#: Environments: from all sides alike, from above, and from a few soft boxes.
 ENVIRONMENTS = {
     "white": Environment.constant((1.0, 1.0, 1.0)),
     "sky": Environment.gradient((0.2, 0.2, 0.2), (1.0, 1.0, 1.2)),
@@ -57,9 +57,10 @@ _COLOR = 0.7
 GROUND = Object(Mesh(0.5 * QUAD, QUAD_FACES, name="ground"), color=[_COLOR] * 3)
 DUSK = Environment.gradient((0.02, 0.02, 0.025), (0.05, 0.05, 0.06))
 
-#: Sun of caustics in media: rows of its map, half of its width, lamps that stand for it and how many at once, and its
-#: irradiance. No path finds a lamp behind glass: the truth has a disc of the environment, the picture lamps over it.
-MAP_HEIGHT, RADIUS, LAMPS, AT_ONCE, IRRADIANCE = 128, np.radians(12.0), 32, 8, 3.0
+#: Sun of caustics in media: rows of its map, half of its width, lights in place of it and how many at once, and its
+#: irradiance. No path finds a directional light behind glass: the truth has a disc of the environment, the picture
+#: lights over it.
+MAP_HEIGHT, RADIUS, LIGHTS, AT_ONCE, IRRADIANCE = 128, np.radians(12.0), 32, 8, 3.0
 
 #: Width and height of the pictures in media, and of the squares that show their pixels.
 SIZE, ENLARGED = (24, 24), 8
@@ -181,7 +182,7 @@ def glass_ball() -> Scene:
 
 
 def goblet() -> Scene:
-    """A crystal goblet with wine beside a lamp."""
+    """A crystal goblet with wine beside a point light."""
     glass, red = toolkit("goblet"), Medium.from_color((0.62, 0.05, 0.09), 0.02, ior=1.34)
     above = (0.0, 1e-4 - float(glass.bounds[0][1]), 0.0)
     bodies = [placed(glass, preset("crystal").medium, above, priority=1), placed(toolkit("wine"), red, above)]
@@ -198,7 +199,10 @@ CAUSTIC_SCENES = (
         quick=True,
     ),
     LightScene(
-        "goblet", "Wine in a crystal goblet, lamp", "three media, curved both ways, and a foot on the ground", goblet
+        "goblet",
+        "Wine in a crystal goblet, point light",
+        "three media, curved both ways, and a foot on the ground",
+        goblet,
     ),
 )
 
@@ -445,13 +449,13 @@ class MediumCaustics(Experiment[MediumScene]):
     def row(self, bench: BenchContext, truth: CausticTruth, photons: int) -> CausticRow:
         """Errors with a number of photons; lights over the disc of the sun are drawn a few at a time."""
         caustics = Caustics(photons) if photons else None
-        number = np.arange(LAMPS)
-        fall = (number + 0.5) / LAMPS * (1.0 - np.cos(RADIUS))
+        number = np.arange(LIGHTS)
+        fall = (number + 0.5) / LIGHTS * (1.0 - np.cos(RADIUS))
         turn, across = np.pi * (1.0 + np.sqrt(5.0)) * number, np.sqrt(fall * (2.0 - fall))
         directions = -np.stack([across * np.cos(turn), 1.0 - fall, across * np.sin(turn)], axis=1)
         began, total = time.perf_counter(), np.zeros((*SIZE[::-1], 3))
-        for first in range(0, LAMPS, AT_ONCE):
-            lights = [DirectionalLight(one, IRRADIANCE / LAMPS) for one in directions[first : first + AT_ONCE]]
+        for first in range(0, LIGHTS, AT_ONCE):
+            lights = [DirectionalLight(one, IRRADIANCE / LIGHTS) for one in directions[first : first + AT_ONCE]]
             lit = dataclasses.replace(truth.scene, lights=lights)
             total += bench.renderer.render(lit, SIZE, samples=4, caustics=caustics).radiance
         seconds = time.perf_counter() - began

@@ -45,7 +45,7 @@ LOST = ("slab", "far slab", "far knot")
 #: Visibly wrong: this much more than signed depth, and more than float32 has to say at all.
 VISIBLE_FACTOR, VISIBLE = 10.0, 1e-6
 
-#: Resolutions of which the finer one has to be nearer, and the one that the planner takes.
+#: A coarse and a fine resolution; the fine one, which the planner takes, has to be nearer.
 COARSE, FINE = "Diffusion, resolution 16", "Diffusion, resolution 32"
 
 #: Fraction of the mean by which a coarse solution may be the better one by chance, where both are equally near.
@@ -103,7 +103,7 @@ class ClaimRule:
     ----------
     text : str
     cases : callable
-        Takes those that it is about from a report.
+        Takes the cases of the claim from a report.
     check : callable
         Verdict on one of them; None where it has not the numbers.
     worst : bool
@@ -443,7 +443,7 @@ SHADOW_CLAIMS = (*SHADOW_MAP_CLAIMS, *SKY_CLAIMS, *CAUSTIC_CLAIMS, *MEDIUM_CLAIM
 
 
 def hard_claim(known: Sequence[str]) -> Judge:
-    """Claim that all hard cases hold, of which these are the identifiers."""
+    """Claim that all hard cases with these identifiers hold."""
 
     def judge(report: Report) -> Claim:
         text, found = f"All hard cases {known[0]} to {known[-1]} hold", report.hard_cases

@@ -78,7 +78,11 @@ _TREES = {(2, 0): True, (4, 0): False, (4, 1): True, (8, 1): False, (8, 2): Fals
 #: Treatments of light that is scattered many times, whether brief cases have them, and what they promise: no bound.
 _DIFFUSES = "no bound: light diffuses, which it does a few mean free paths below the surface"
 _SCATTERINGS: dict[str, tuple[Scattering, bool, str]] = {
-    "SingleScattering": (SingleScattering(), False, "light of lamps that is scattered once; the rest is lost"),
+    "SingleScattering": (
+        SingleScattering(),
+        False,
+        "light of punctual lights scattered once; the rest is lost",
+    ),
     "ScatteringLayer": (
         ScatteringLayer(),
         True,
@@ -120,7 +124,7 @@ class Contender:
     quick : bool
         Measured with ``--quick``, too, if it is in brief cases.
     pictured : tuple of str
-        Cases of which the report shows its picture.
+        Cases whose page shows its picture.
     ior : {"matched", "refracted"}, optional
         Drawn with media of the index of refraction 1 and without surfaces, or else of `REFRACTED_IOR` where they have
         none of their own.
@@ -410,7 +414,7 @@ def _with_interfaces() -> Iterable[Contender]:
         family="straight rays",
         kind="counter-example",
         ior="matched",
-        choices={"interfaces": screen},  # of which matched media have none
+        choices={"interfaces": screen},  # matched media have none
         said="none: interfaces are left out",
     )
     for one in (front, screen):

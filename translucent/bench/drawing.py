@@ -38,10 +38,10 @@ Size = tuple[int, int]
 
 Made = TypeVar("Made")
 
-#: Passes of a plan that shade the thickness of a shortcut, those that find and shade an interface included.
+#: Passes of a plan that shade the thickness of a shortcut, including passes that find and shade an interface.
 _AFTER_SHORTCUTS = (PassName.INTERFACES, PassName.TRANSMITTANCE, PassName.SURFACES)
 
-#: Rounds that even the slowest takes part in, and that the fastest needs no more than.
+#: Least rounds of the slowest drawing, and most rounds of the fastest.
 FEWEST, MOST = 3, 60
 
 #: A drawing that is called long needs no more rounds than this, and less from `LONGEST` seconds on: its own noise
@@ -49,7 +49,7 @@ FEWEST, MOST = 3, 60
 FEWEST_LONG = 2
 FEWEST_LONGEST, LONGEST = 1, 2.0
 
-#: What differs much between rounds takes part in so many at least, while it and its floors have taken fewer seconds: of
+#: A drawing whose rounds differ much gets so many at least, while it and its floors have taken fewer seconds: among
 #: three rounds, one hiccup in a floor and one in a drawing are most.
 FEWEST_UNSURE, CHEAP = 9, 0.1
 
@@ -375,7 +375,7 @@ def timed_beside_floor(
     Returns
     -------
     samples, failures : dict
-        By the names of those that can be drawn, and of those that cannot.
+        By the names of drawings that work, and of drawings that fail.
     """
     targets = Targets(bench.gl, size)
     floor = FloorDrawing(bench, scene, targets)

@@ -1,4 +1,4 @@
-"""Engines' treatments of light that is scattered many times, as counter-examples: NumPy stands for their shaders.
+"""Engines' treatments of light that is scattered many times, as counter-examples: their shaders, in NumPy.
 
 Each takes reflections at the interface, and unscattered light, from our own frames: only the scattering differs.
 Shadows of the body on itself are exact.
@@ -198,7 +198,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class PaintLayer(Engine):
-    """Layer of paint as thick as the body along the ray (Kubelka & Munk 1931), without internal reflections."""
+    """Two-stream layer as thick as the body along the ray (Kubelka & Munk 1931), without internal reflections."""
 
     name: ClassVar[str] = "layer without inner mirrors"
     promise: ClassVar[str] = "none: what its interfaces mirror back inside is left out; computed here in NumPy"

@@ -41,7 +41,7 @@ class Experiment(Generic[SceneT]):
     part : str
         Of the report, that it belongs to.
     label : str
-        Words before the name of a scene where progress is told.
+        Words before the name of a scene in progress messages.
     into : str
         Field of the report, or of its shadows, that its records are added to: ``cases``, ``shadows.sky``.
     claims : tuple of callables

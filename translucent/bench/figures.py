@@ -199,7 +199,7 @@ def css_variables() -> str:
 
 
 def placeholder(name: str) -> str:
-    """A color that stands for a CSS variable while matplotlib draws; `to_svg` puts the variable there."""
+    """A color in place of a CSS variable while matplotlib draws; `to_svg` puts the variable there."""
     return f"#0102{list(COLORS).index(name) + 16:02x}"
 
 

@@ -143,7 +143,7 @@ class HardCheck:
             checks.failed.append(one_line(error))
         passed = not checks.failed
         result = "; ".join(checks.held) if passed else f"wrong: {'; '.join(checks.failed)}"
-        # JSON has no word for infinity: an error that is not finite is told in words.
+        # JSON has no word for infinity: an error that is not finite is in the words alone.
         worst = checks.worst if checks.worst is not None and np.isfinite(checks.worst) else None
         limit, unit = (self.limit, self.unit) if checks.worst is not None else (None, "")
         return HardCase(self.name, self.title, self.promise, result, passed, worst, limit, unit)
@@ -243,10 +243,10 @@ def _depths(checks: Checks) -> None:
         checks.holds("and finite", np.isfinite(frame.radiance).all() and np.isfinite(frame.optical_depth).all())
     clear = Medium(absorption=(1e-30,) * 3)
     thin = checks.render(_shown(ball, dataclasses.replace(clear, emission=(1e-3,) * 3)))
-    glow = thin.thickness.astype(np.float64) * 1e-3
+    expected = thin.thickness.astype(np.float64) * 1e-3
     emitted = thin.radiance[..., 0] - checks.render(_shown(ball, clear)).radiance[..., 0]
     # The two pictures differ by the emission, each rounded to float32 near 1.
-    checks.holds("emission without extinction is q d", np.abs(emitted - glow).max() <= 4 * np.finfo(np.float32).eps)
+    checks.holds("emission without extinction is q d", np.abs(emitted - expected).max() <= 4 * np.finfo(np.float32).eps)
 
 
 @hard(
@@ -476,7 +476,7 @@ def _inverted(checks: Checks) -> None:
 @hard(
     "H14",
     "repeated faces, coplanar walls, bodies that share a face",
-    f"repeated faces are told; bodies that share a face: {EXACTLY}",
+    f"repeated faces are reported; bodies that share a face: {EXACTLY}",
 )
 def _doubled(checks: Checks) -> None:
     box = Box((-1, -1, -1), (1, 1, 1)).tessellate()
@@ -580,13 +580,13 @@ def _marks(checks: Checks, mesh: Mesh, camera: Camera, policies: tuple[Overlap, 
 
 @hard(
     "H25",
-    "a closed body one lobe of which is inside out",
+    "a closed body with one lobe inside out",
     "marked by every method: no pixel of the lobe is valid",
     0.0,
     unit="pixels",
 )
 def _lobe(checks: Checks) -> None:
-    checks.holds("the lobe is told", bow_tie().diagnosis.inside_out)
+    checks.holds("the lobe is reported", bow_tie().diagnosis.inside_out)
     camera = Camera.look_at((1.5, 1.0, 3.5), (0, 0, 0), fov_y=45)
     _marks(checks, bow_tie(), camera, ("add", "union"))
 

@@ -102,7 +102,7 @@ def _guide(checks: Checks) -> None:
     _bent(checks, "end of a rod", [Object(rod, Medium(absorption=0.2, ior=1.5))], camera)
 
 
-#: Share of the power of a lamp that may be lost or won on its way through a wall.
+#: Fraction of the power of a light that may be lost or won on its way through a wall.
 POWER = 0.1
 
 #: Radiance of a part that cells do not resolve, in light of 1 from all sides, that diffusion may be off by.
@@ -113,22 +113,22 @@ NODES, BODIES, MEDIA = 2000, 300, 60
 
 @hard(
     "H30",
-    "a lamp inside a hollow of a scattering body",
-    f"bounded: of the power of the lamp, what leaves a lossless wall is within {POWER:.0%}; no pixel is marked",
+    "a light inside a hollow of a scattering body",
+    f"bounded: of the power of the light, what leaves a lossless wall is within {POWER:.0%}; no pixel is marked",
     POWER,
     unit="of the power",
 )
 def _hollow(checks: Checks) -> None:
-    """Balance of a lossless wall, which lets out all that the lamp inside sends, but for what passes unscattered: so
+    """Balance of a lossless wall, which lets out all that the light inside sends, but for what passes unscattered: so
     seen from afar the mean radiance of the ball is its intensity over the area of the disk.
     """
     side, height = 48, 2.2
     camera = Camera.orthographic((0, 0, 4), (0, 0, 0), height=height)
-    lamp, black = PointLight((0, 0, 0), (1.0, 1.0, 1.0)), Environment.constant((0, 0, 0))
+    light, black = PointLight((0, 0, 0), (1.0, 1.0, 1.0)), Environment.constant((0, 0, 0))
     mesh = SphericalShell(1.0, 0.6).tessellate(48)
     for depth in (2.5, 10.0):
         shell = Object(mesh, Medium(scattering=depth / 0.4, ior=1.33))
-        frame = checks.renderer.render(Scene([shell], camera, [lamp], black), (side, side), scattering=Diffusion())
+        frame = checks.renderer.render(Scene([shell], camera, [light], black), (side, side), scattering=Diffusion())
         shown = float(frame.radiance[..., 0].sum()) * (height / side) ** 2
         checks.error(f"wall of {depth:g} mean free paths: power", shown / (1.0 - np.exp(-depth)) - 1.0)
         checks.holds("no pixel marked", frame.valid.all())
@@ -224,25 +224,25 @@ def _ring(unit: float = 1.0, place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     return placed(Mesh(unit * ring.vertices, ring.faces), Medium(absorption=np.array((0.5, 2.0, 1.0)) / unit), place)
 
 
-@hard("H33", "H07 from the light's side: a lamp 10,000 diameters away", _EXACTLY, EXACT_SHADOW, unit="of 1")
-def _far_lamp(checks: Checks) -> None:
+@hard("H33", "H07 from the light's side: a point light 10,000 diameters away", _EXACTLY, EXACT_SHADOW, unit="of 1")
+def _far_light(checks: Checks) -> None:
     near = over_ground([_ring()], "sun")
     towards = -np.asarray(near.lights[0].direction)  # type: ignore[union-attr]
     for diameters in (1e2, 1e4):
         away = diameters * float(np.linalg.norm(np.ptp(near.objects[0].bounds, axis=0)))
-        lamp = PointLight(away * towards, np.pi * away**2)
-        _shadow(checks, f"{diameters:g} diameters", dataclasses.replace(near, lights=[lamp]))
+        light = PointLight(away * towards, np.pi * away**2)
+        _shadow(checks, f"{diameters:g} diameters", dataclasses.replace(near, lights=[light]))
 
 
 @hard("H34", "H09 from the light's side: a shadow 1e6 m from the origin", _EXACTLY, EXACT_SHADOW, unit="of 1")
 def _shadow_elsewhere(checks: Checks) -> None:
-    for light in ("sun", "lamp"):
+    for light in ("sun", "point light"):
         _shadow(checks, light, over_ground([_ring(place=(-1e6, 1e6, 1e6))], light))
 
 
 @hard("H35", "H10 from the light's side: units of 1e-6 m and 1e6 m", _EXACTLY, EXACT_SHADOW, unit="of 1")
 def _shadow_units(checks: Checks) -> None:
-    for unit, light in ((1e-6, "sun"), (1e6, "lamp")):
+    for unit, light in ((1e-6, "sun"), (1e6, "point light")):
         _shadow(checks, f"{unit:g} m, {light}", over_ground([_ring(unit)], light))
 
 

@@ -23,9 +23,9 @@ from translucent.bench.record import (
     ShadowRow,
 )
 
-#: Factor within which times are equal, as are those within `NOISES` standard errors: two runs differ by as
-#: much. A report compares some hundred pairs of rows of about the same time, of which chance takes five for different
-#: at two standard errors, and none at three.
+#: Factor within which times are equal, as are times within `NOISES` standard errors: two runs differ by as much. A
+#: report compares some hundred pairs of rows of about the same time. By chance five of them differ at two standard
+#: errors, and none at three.
 TIME_MARGIN = 1.05
 NOISES = 3.0
 
@@ -114,7 +114,7 @@ class Advice:
         Ratio to the floor, and RMS error, of `row`.
     good_enough : bool
     cheaper : MethodRow or None
-        The most accurate method of those that clearly cost less.
+        The most accurate of the methods that clearly cost less.
     constant : MethodRow or None
         One thickness for all pixels, as viewers of glTF files take it.
     times_better : float or None
@@ -243,7 +243,7 @@ class Agreement:
     within : int
         Number of those whose larger one exceeds the smaller one by no more than `RUN_NOISE` of it.
     farthest : str
-        Case and method of those that are farthest apart, with both ratios; empty without ratios.
+        Case and method whose ratios are farthest apart, with both; empty without ratios.
     """
 
     ratios: int

@@ -75,7 +75,7 @@ _LEAST, _LEAST_BY_PATHS = 1e-7, 5e-3
 #: bodies that only absorb do not need.
 _LEFT_OUT = {"cpu backend", "RayMarched on the CPU", "RayMarched"}
 
-#: Colors and symbols of the shortcuts of shadows, and of lines that are told apart by name alone.
+#: Colors and symbols of the shortcuts of shadows, and of lines that only their names identify.
 _SHORTCUTS = {OPAQUE: ("vermilion", "X"), CONSTANT: ("orange", "D"), HALF: ("olive", "s")}
 _LINES = (("green", "o"), ("blue", "^"), ("orange", "s"))
 

@@ -239,7 +239,7 @@ class CaseRecord:
     layers : int
         The most surfaces on one ray.
     size, compared_size : (width, height)
-        In pixels, of the timed frames, and of those that are compared with the reference.
+        In pixels, of the timed frames, and of the frames that are compared with the reference.
     diagonal : float
         Of the scene's bounds, in metres.
     compared_pixels : int
@@ -657,7 +657,7 @@ class Report:
     renewals : tuple of Renewal
         Parts measured anew after the rest; `provenance` and `seconds` are those of the rest.
     unmeasured : tuple of str
-        Scenes that the run did not come to, or did not finish.
+        Scenes that the run did not come to, or did not complete.
     """
 
     provenance: Provenance

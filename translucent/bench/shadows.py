@@ -57,8 +57,8 @@ WINE, LEAF = Medium(absorption=(0.5, 2.0, 1.0)), Medium(absorption=(2.0, 0.3, 1.
 
 #: Direction of sunlight: towards the eye, so that shadows lie in front of their occluders.
 SUNWARDS = (0.7, -1.0, 0.5)
-#: Position of lamps, from the middle of the objects, in diagonals of these.
-LAMP = (-0.9, 1.6, -0.8)
+#: Position of point and spot lights, from the middle of the objects, in diagonals of these.
+PLACE = (-0.9, 1.6, -0.8)
 
 #: Square ground of 2 x 2, as vertices and faces.
 QUAD = np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], dtype=np.float64)
@@ -112,7 +112,7 @@ def over_ground(
     Parameters
     ----------
     objects : sequence of Object
-    light : {"sun", "lamp", "spot"}
+    light : {"sun", "point light", "spot"}
         All about equally bright on the ground.
     gap : float
         Height above the ground, in diagonals of the objects.
@@ -132,17 +132,18 @@ def over_ground(
     )
     ground = Object(floor, color=(1.0, 1.0, 1.0)) if surface is None else Object(floor, surface=surface)
     box = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-    place, power = center + np.array(LAMP) * diagonal, 4.0 * np.pi * diagonal**2
-    lamp: Light
+    place, power = center + np.array(PLACE) * diagonal, 4.0 * np.pi * diagonal**2
+    shining: Light
     if light == "sun":
-        lamp = DirectionalLight(SUNWARDS, np.pi)
-        directions = np.broadcast_to(np.asarray(lamp.direction), box.shape)
+        shining = DirectionalLight(SUNWARDS, np.pi)
+        directions = np.broadcast_to(np.asarray(shining.direction), box.shape)
     else:
-        lamp = PointLight(place, power) if light == "lamp" else SpotLight(place, center - place, power, 14.0, 30.0)
+        spot = SpotLight(place, center - place, power, 14.0, 30.0)
+        shining = spot if light == "spot" else PointLight(place, power)
         directions = box - place
     thrown = box + ((height - box[:, 1]) / directions[:, 1])[:, None] * directions
     camera = Camera.framing(np.concatenate([box, thrown]), direction=(-0.1, -1.1, -1.0), fov_y=30.0)
-    return Scene([*objects, ground], camera, [lamp], DARK, overlap)
+    return Scene([*objects, ground], camera, [shining], DARK, overlap)
 
 
 def _body(mesh: Mesh) -> Object:
@@ -156,13 +157,13 @@ def _stack() -> Scene:
 
 def _two_media() -> Scene:
     ball, box = Sphere().tessellate(96), Box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)).tessellate()
-    return over_ground([Object(ball, WINE), placed(box, LEAF, (1.3, 0.1, 0.2))], "lamp")
+    return over_ground([Object(ball, WINE), placed(box, LEAF, (1.3, 0.1, 0.2))], "point light")
 
 
 def _textured() -> Scene:
     tiles = np.where(np.indices((64, 64)).sum(axis=0)[..., None] % 2, (0.85, 0.8, 0.7), (0.35, 0.4, 0.45))
     surface = Surface(roughness=1.0, color_texture=Texture(tiles))
-    return over_ground([_body(toolkit("knot"))], "lamp", surface=surface)
+    return over_ground([_body(toolkit("knot"))], "point light", surface=surface)
 
 
 def _in_a_glass() -> Scene:
@@ -189,9 +190,13 @@ def _single(name: str, light: str, *, pictured: bool = False, quick: bool = Fals
 
 SHADOW_SCENES: tuple[LightScene, ...] = (
     _single("bear", "sun", pictured=True, quick=True),
-    _single("bear", "lamp"),
+    _single("bear", "point light"),
     _single("bear", "spot"),
-    *(_single(name, light) for name in ("knot", "shell", "goblet", "bangle", "soap") for light in ("sun", "lamp")),
+    *(
+        _single(name, light)
+        for name in ("knot", "shell", "goblet", "bangle", "soap")
+        for light in ("sun", "point light")
+    ),
     LightScene(
         "fine ball",
         "Ball of 83,520 triangles, sun",
@@ -206,13 +211,13 @@ SHADOW_SCENES: tuple[LightScene, ...] = (
     ),
     LightScene(
         "two media",
-        "Two media, lamp",
+        "Two media, point light",
         "a ball and a box of other colors, whose shadows cross",
         _two_media,
         pictured=True,
         quick=True,
     ),
-    LightScene("textured", "Knot over tiles, lamp", "a ground with a texture", _textured, pictured=True),
+    LightScene("textured", "Knot over tiles, point light", "a ground with a texture", _textured, pictured=True),
     LightScene(
         "in a glass",
         "Wine in a glass, spot",
@@ -309,7 +314,7 @@ class ShadowMapComparison(Experiment[LightScene]):
 
 
 class Ground:
-    """Ground of a scene, its last object, in the light of its one lamp.
+    """Ground of a scene, its last object, in the light of its one light source.
 
     Parameters
     ----------
@@ -506,7 +511,7 @@ def _sums(renderer: Renderer, size: int) -> Array:
 def halve(bench: BenchContext, scene: Scene, size: int) -> None:
     """Round the sums of the renderer's shadow map to float16.
 
-    Signed distances are those that we add up, from the center of the media; only their sums have 11 bits.
+    Signed distances are added up as in pictures, from the center of the media; only their sums have 11 bits.
     """
     renderer, camera = bench.renderer, map_camera(scene)
     seen = dataclasses.replace(scene, objects=list(scene.bodies), camera=camera, lights=[])

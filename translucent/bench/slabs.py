@@ -70,7 +70,7 @@ class SlabComparison(Experiment[Whole]):
         return report.plus(self.into, record)
 
     def measure(self, bench: BenchContext | None, scene: Whole) -> tuple[Slab, ...]:
-        """Measure all slabs; no OpenGL takes part."""
+        """Measure all slabs, without OpenGL."""
         every = itertools.product(self.indices, self.anisotropies, self.albedos, self.depths)
         return tuple(
             one

@@ -77,7 +77,7 @@ class BakeOptions:
     mode: str = option(
         "cone",
         type=click.Choice(MODES),
-        help="What thickness means; or scatter: no thickness, but the light that a body gives back after scattering.",
+        help="What thickness means; or scatter: no thickness, but the light that leaves a body after scattering.",
     )
     size: int = option(1024, metavar="N", help=f"Texels along each side of the map; of --mode scatter, {SIZE}.")
     resolution: int = option(32, metavar="N", help="Of --mode scatter: the body has about N^3 / 4 cells, 8 to 128.")
@@ -124,10 +124,10 @@ def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
     """Bake the thickness of MODEL, a file or one of the toolkit's own meshes, into a map over its UVs.
 
     Values are metres; 0.2 in the map is 20 cm. A .glb gets thicknessFactor and thicknessTexture, and what else a .glb
-    or .gltf MODEL has stays. Beside each file goes a record, FILE.json. With --out-dir, many models: those that are
-    done are skipped, and those that fail stop no other.
+    or .gltf MODEL has stays. Beside each file goes a record, FILE.json. With --out-dir, many models: models
+    that are done are skipped, and a model that fails stops no other.
 
-    --mode scatter bakes the light that the body gives back after scattering, into an .exr map or the vertices of a
+    --mode scatter bakes the light that leaves the body after scattering, into an .exr map or the vertices of a
     .glb: translucent bake candle -o candle.exr --mode scatter --preset wax
     """
     output, out_dir, named = given.output, given.out_dir, _named()
@@ -358,7 +358,7 @@ def _scatter_lines(job: ScatterJob, record: dict[str, Any]) -> list[str]:
     found = [f"{job.output}: {size}scatter, nine coefficients for each channel"]
     for part in parts:
         mean = ", ".join(f"{value:.3g}" for value in part["mean_in_uniform_light"])
-        found.append(f"{part['mesh']['name']}: {part['cells']} cells; gives back {mean} of uniform light on average")
+        found.append(f"{part['mesh']['name']}: {part['cells']} cells; {mean} of uniform light leave it on average")
         found += part["warnings"]
     if "uv_file" in record:
         found.append(f"{job.output.with_name(record['uv_file']['file'])}: the model with the UVs made for this map")
@@ -464,7 +464,7 @@ def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
     """Make the relief of a plate that shows PICTURE before a light: thin where it is bright, thick where it is dark.
 
     The luminance that passes goes linearly from that of the thickest place, for black, to that of the thinnest, for
-    white. The relief is then rendered before an even white light, and the difference is told. Light is taken to go
+    white. The relief is then rendered before an even white light, and the difference is printed. Light is taken to go
     straight through, so give the filament's --td, or a --color that you saw before a light at a --distance.
     """
     from translucent.bake.lithophane import check_lithophane_output, lithophane

@@ -20,7 +20,7 @@ from translucent.errors import RenderError, printable
 _KEPT = re.compile(r"(\n|\t|\x1b\[48;2;\d{1,3};\d{1,3};\d{1,3}m {2,8}\x1b\[0m)")
 
 
-#: Seconds before anything is told, and between two tellings: in a terminal, and in a file.
+#: Seconds before the first line of progress, and between two: in a terminal, and in a file.
 TERMINAL, FILE = (1.0, 0.5), (10.0, 30.0)
 
 
@@ -70,7 +70,7 @@ def overwrite(text: str) -> None:
     click.echo(f"\r{printable(text)}", nl=False, err=True)
 
 
-class Progress:
+class ProgressLine:
     """Teller of the share of work that is done.
 
     Parameters

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 #: Suffixes of tables to fit to; all else but .toml are pictures.
 TABLES = (".csv", ".json")
 
-#: Metres from which plates are told to be thick: millimetres without their unit.
+#: Metres from which on a warning calls plates thick: millimetres without their unit.
 _THICK = 0.3
 
 #: Targets that draw no surface.
@@ -94,7 +94,7 @@ class ExtinctionOptions:
     td: str | None = option(metavar="D", help="Transmission distance of a filament for 3D printers instead: 4mm, or 4.")
     td_transmittance: float | None = option(
         metavar="T",
-        help="Share of light left after --td, and after the TD that is told. Default: 0.1, T = 10^(-d/TD).",
+        help="Share of light left after --td, and after the TD that is printed. Default: 0.1, T = 10^(-d/TD).",
     )
     model: str | None = option(
         names=("--on",), metavar="MODEL", help="A file, or a mesh of the toolkit: its color, see above."

@@ -118,7 +118,7 @@ def apply(model: str, given: ApplyOptions, as_json: bool) -> None:
     from translucent.gltf.write import write_medium
     from translucent.units import parse_length
 
-    draft: Any = given.draft_extensions  # one of those that the type lists
+    draft: Any = given.draft_extensions  # one that the type lists
     medium = given.medium.read(shows_scattering=draft is not None)
     if medium is None:
         raise InputError("material apply", "no medium is given", "add --color and --distance, or --preset")
@@ -162,7 +162,7 @@ def check(model: str, given: CheckOptions, as_json: bool) -> None:
     known viewers. The exit code is 1 if there is an error (with --fix: in OUTPUT), and else 0.
 
     --fix bakes thickness maps, sets metallicFactor of what transmits to 0 and removes doubleSided of volumes. Meshes,
-    units and attenuations are told, and not changed.
+    units and attenuations are reported, and not changed.
     """
     from translucent.bake.audit.check import check_materials, fix_materials
 

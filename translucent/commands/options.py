@@ -428,8 +428,9 @@ class ChoiceOptions:
         is_flag=False,
         flag_value=1_000_000,
         metavar="[N]",
-        help="Let N photons carry the light of lamps through interfaces onto opaque objects, into fog, wax and milk. "
-        "Default: none; without N: a million; at most 2^30. Four times as many halve the noise.",
+        help="Let N photons carry the light of point, spot and directional lights through interfaces onto opaque "
+        "objects, into fog, wax and milk. Default: none; without N: a million; at most 2^30. Four times as many halve "
+        "the noise.",
     )
     shadow_size: int | None = option(
         metavar="N",

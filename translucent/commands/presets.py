@@ -22,7 +22,7 @@ _LISTED = ("name", "kind", "group", "regime", "colors", "diffuse_color", "source
 
 @click.group(invoke_without_command=True, epilog="Example: translucent presets --search wine")
 @click.option("--group", metavar="G", help="List only one group, such as 'stone and resin', or a part of its name.")
-@click.option("--search", metavar="WORDS", help="List only those of which name, note or source have these words.")
+@click.option("--search", metavar="WORDS", help="List only presets whose name, note or source has these words.")
 @common_options
 @click.pass_context
 def presets(context: click.Context, group: str | None, search: str | None, as_json: bool) -> None:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from translucent.commands.console import Progress, echo
+from translucent.commands.console import ProgressLine, echo
 from translucent.commands.model import (
     ObjectCommand,
     SceneRequest,
@@ -195,7 +195,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     with quick_compiles(few and request.method is None and request.caustics is None):
         opened = tl.Renderer(given.backend)
     with opened as renderer:
-        progress = Progress(f"rendering on {renderer.provenance.get('renderer', 'the CPU')}")
+        progress = ProgressLine(f"rendering on {renderer.provenance.get('renderer', 'the CPU')}")
         draw = partial(renderer.render_requested, size=pixels, request=request, progress=progress)
         if given.opaque_with is not None:
             from translucent.interop.pyrender import render_scene
@@ -232,7 +232,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
 
 
 def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pictures) -> None:
-    """Raise `InputError` if options are given together of which one does not allow the other."""
+    """Raise `InputError` if two options exclude each other."""
     from translucent.scene.stages import NO_STAGE
 
     if given.transparent and given.opaque_with is None and given.output.suffix.lower() == ".mp4":

@@ -158,7 +158,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
     """Write MODEL, a file or one of the toolkit's own meshes, as a page that any browser with WebGL2 shows.
 
     One file, which fetches nothing: to turn around, with the material on a panel, the thickness in false colors, and a
-    probe. It runs the passes of the renderer; what it leaves out is told here and on the page.
+    probe. It runs the passes of the renderer; what it leaves out is printed here and stands on the page.
     """
     from translucent.page.plans import plan_page, simplified, triangles
     from translucent.page.write import check_output, check_page_size, poster_of, save_page

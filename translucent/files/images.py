@@ -43,7 +43,7 @@ def write_exr(path: Path, channels: Mapping[str, npt.NDArray[Any]], header: Mapp
     channels : mapping
         Of (h, w), or of (h, w, 3) and (h, w, 4) under the names ``RGB`` and ``RGBA``.
     header : mapping
-        Attributes beside those that every file has.
+        Attributes besides the ones of every file.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def write_exr_rows(
     blocks: Iterable[Mapping[str, npt.NDArray[Any]]],
     header: Mapping[str, str],
 ) -> None:
-    """Write float32 channels as `write_exr` does, of which blocks of rows come one after the other.
+    """Write float32 channels as `write_exr` does, in blocks of rows.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def write_exr_rows(
 
 
 def _flat(channels: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
-    """The channels (h, w) one by one, of which some come as ``RGB`` or ``RGBA``."""
+    """The channels (h, w) one by one; some come as ``RGB`` or ``RGBA``."""
     whole = ("RGB", "RGBA")
     flat = {name: values for name, values in channels.items() if name not in whole}
     for name in whole:

@@ -1,7 +1,7 @@
 """Reading of untrusted files: which may be opened, and how much memory they may take.
 
 Every reader of the toolkit begins here. Opened are regular files only, since a device may never end and a pipe may wait
-forever; a file that another one names has to lie below that one's folder, links followed. Nothing is allocated because
+forever; a linked file has to lie below the folder of its link, symlinks resolved. Nothing is allocated because
 a header says so: `require_room` is asked first. A file may unpack into `FREE` bytes, or into `RATIO` times its own
 size: honest files stay far below, and a few bytes cannot fill the memory.
 """

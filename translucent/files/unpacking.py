@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 # Without a handler of its own, what Pillow logs of a damaged file is printed.
 logging.getLogger("PIL").addHandler(logging.NullHandler())
 
-#: Formats of pictures that are read: Pillow knows more, some of which run other programs.
+#: Formats of pictures that are read: Pillow knows more, and some run other programs.
 PICTURES = ("PNG", "JPEG", "BMP", "GIF", "TIFF", "WEBP", "TGA", "PPM")
 
 

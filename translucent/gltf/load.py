@@ -163,7 +163,7 @@ def _read(path: str | Path, allow_outside: bool) -> GltfFile:
 
 
 def check_extensions(file: GltfFile, left_out: LeftOut, known: Collection[str] = ()) -> None:
-    """Refuse a file with unsupported required extensions, and record those that it merely uses; not those `known`."""
+    """Refuse a file with unsupported required extensions, and record the ones that it merely uses; not the `known`."""
     for key in ("extensionsRequired", "extensionsUsed"):
         names = file.tree.get(key, [])
         if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):

@@ -139,7 +139,7 @@ class DraftScattering:
         return hulst_albedo(self.strength * np.asarray(self.color), g)
 
     def medium(self, extinction: Array, ior: float) -> Medium:
-        """Medium with this extinction (3,) in 1/m, of which a part scatters."""
+        """Medium with this extinction (3,) in 1/m; its albedo scatters."""
         share = self.albedo
         return Medium((1.0 - share) * extinction, share * extinction, anisotropy=self.anisotropy, ior=ior)
 
@@ -268,7 +268,7 @@ class GltfMaterial:
         return head + html_strip(medium.extinction, distance if math.isfinite(distance) else None)
 
     def summary(self) -> dict[str, Any]:
-        """Fields and medium as values that JSON can hold; None stands for an infinite distance."""
+        """Fields and medium as values that JSON can hold; None is an infinite distance."""
         medium, textured = self.medium(), self.has_thickness_texture
         return {
             **{name: getattr(self, name) for name in _SUMMARIZED},

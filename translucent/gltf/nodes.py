@@ -15,7 +15,7 @@ the shorter arc) and CUBICSPLINE. Before the first key of a sampler its first va
 warning names a time after all keys.
 
 All animations of a file play at once, since exporters write one for each object as well as one for each take; where two
-move the same property of a node, the first does, and the other is told.
+move the same property of a node, the first does, with a warning.
 """
 
 from __future__ import annotations

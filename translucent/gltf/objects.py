@@ -31,7 +31,7 @@ Colors of vertices multiply the base color, and a mesh with them and without a m
 radiance where a ray first enters a body, and occlusion dims the light of the environment.
 
 Of all that, textures are read as far as `translucent.gltf.textures` does; normals are those of the mesh, smooth but at
-creases, and not the file's. What of a material has no meaning here is told by `LeftOut`.
+creases, and not the file's. `LeftOut` lists what has no meaning here.
 Source: glTF 2.0, section 3.9, and the extensions KHR_materials_transmission (infinitely thin), _volume, _ior,
 _dispersion, _diffuse_transmission, _iridescence, _clearcoat, _emissive_strength and _unlit.
 """

@@ -106,7 +106,7 @@ def _wrapped(index: Array, size: int, mode: object) -> npt.NDArray[np.intp]:
 
 
 class Textures:
-    """Textures of a file; those that are alike are one value.
+    """Textures of a file; equal ones are one value.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ class Textures:
             return None
         except InputError:
             raise
-        except Exception:  # noqa: BLE001 - each of Pillow's decoders raises its own kinds; it is told as left out
+        except Exception:  # noqa: BLE001 - each of Pillow's decoders raises its own kinds; the picture is left out
             return None
 
 

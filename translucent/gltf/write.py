@@ -166,7 +166,7 @@ def write_media(
 def _own_materials(file: GltfFile, object_name: str | None, entered: set[int]) -> dict[int, list[float]]:
     """Indices of the materials of the named objects and of them alone, each with the sizes of its objects.
 
-    Without a name: those that light enters, or all of them where nothing has one.
+    Without a name: materials that light enters, or all of them where it enters none.
     """
     meshes = file.items("meshes")
     mine = set(range(len(meshes))) if object_name is None else _meshes_named(file, object_name)

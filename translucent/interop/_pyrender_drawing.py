@@ -25,7 +25,7 @@ Flags = pyrender.RenderFlags
 
 #: Flags that change which fragments there are.
 _SHAPE_FLAGS = Flags.SKIP_CULL_FACES | Flags.ALL_WIREFRAME | Flags.FLIP_WIREFRAME | Flags.ALL_SOLID
-#: All those that make a picture. Shadows of point lights are not: pyrender has them not.
+#: All flags that make a picture, without shadows of point lights, which pyrender lacks.
 PICTURE_FLAGS = _SHAPE_FLAGS | Flags.SHADOWS_DIRECTIONAL | Flags.SHADOWS_SPOT
 
 

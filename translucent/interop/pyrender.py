@@ -238,7 +238,7 @@ def render(
     InputError
         As `scene_from_pyrender`, and if a flag makes no picture.
     RenderError
-        If pyrender cannot be imported or has no OpenGL, or cannot share the context although it is told to.
+        If pyrender cannot be imported or has no OpenGL, or cannot share the context although it is asked to.
     """
     from translucent.renderer import Renderer
 

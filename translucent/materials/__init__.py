@@ -1,6 +1,6 @@
 """Media written for other systems, and read from their files, each with its formula, its source and what it loses.
 
-`TARGETS` names the systems that `text_block` writes for; `load_medium` reads files of those that have files. Numbers of
+`TARGETS` names the systems that `text_block` writes for; `load_medium` reads their files. Numbers of
 the others: `translucent.materials.blender` and `translucent.materials.engines`. Each text that is written can be saved
 and read back, but for CSS; what each target cannot carry is lost. Reading and writing whole glTF files:
 `translucent.gltf.materials` and `translucent.gltf.write`.

@@ -17,7 +17,7 @@ Units: depths are in scene units; `unit` says which. Colors are linear Rec.709 (
 Not carried over: emission of the medium. When reading, inputs that are driven by nodes or textures are refused.
 Known losses elsewhere: renderers that draw Standard Surface by MaterialX's own graph see a tint of the surface, as that
 graph has no depth; from version 1.2 on, OpenPBR takes the scatter color for an albedo, mu_s = S mu_t, so that documents
-that scatter must be read as version 1.1 (those that only absorb mean the same).
+that scatter must be read as version 1.1 (media that only absorb mean the same).
 """
 
 from __future__ import annotations

@@ -139,7 +139,7 @@ class PagePlan:
     plan : RenderPlan
     request : RenderRequest
     texture_units : int
-        As the planner is told.
+        As the planner gets it.
     distance : float, optional
         In metres, at which panels show colors of media at first. Default: as far as each body is thick.
     """

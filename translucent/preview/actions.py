@@ -94,7 +94,7 @@ class SetOrbit:
 
 
 @dataclass(frozen=True)
-class Turn:
+class OrbitBy:
     """Orbit by degrees: to the right, and upwards."""
 
     right: float
@@ -118,7 +118,7 @@ class Zoom:
     down: float = 0.0
 
 
-Action = SetField | Open | ChoosePreset | Assign | Hide | Adopt | Replace | SetOrbit | Turn | Pan | Zoom
+Action = SetField | Open | ChoosePreset | Assign | Hide | Adopt | Replace | SetOrbit | OrbitBy | Pan | Zoom
 
 #: Fields with which a preset is none any more.
 _OF_PRESET = ("absorption", "scattering", "anisotropy", "phase", "emission")
@@ -159,7 +159,7 @@ def apply(document: Document, action: Action) -> Document:
             return replace(orbit=action.orbit)
         case _ if document.orbit is None:  # nothing is loaded yet, so that there is nothing to move
             return document
-        case Turn():
+        case OrbitBy():
             return replace(orbit=turned(document.orbit, action.right, action.up))
         case Pan():
             return replace(orbit=panned(document.orbit, action.right, action.down))
@@ -243,7 +243,7 @@ class History:
         """History after an action; one that changes nothing leaves no step, and a drag leaves one."""
         after = apply(self.present, action)
         # Moves of the camera are no steps, and undo leaves it where it is.
-        if isinstance(action, (SetOrbit, Turn, Pan, Zoom, Adopt)):
+        if isinstance(action, (SetOrbit, OrbitBy, Pan, Zoom, Adopt)):
             return dataclasses.replace(self, present=after)
         if after == self.present:
             return self

@@ -254,7 +254,7 @@ class _Window:
         if self.work.loaded is None:
             time.sleep(READING)
         runner = hello_imgui.get_runner_params()
-        runner.fps_idling.enable_idling = state.waits and self.script is None
+        runner.fps_idling.enable_idling = state.idle and self.script is None
         runner.fps_idling.fps_idle = WAITING_FPS if state.more else IDLE_FPS
         if self.script is not None and self.script.step(state):
             for text in filter(None, (state.view.problem, state.view.shader_problem)):

@@ -106,9 +106,9 @@ class Material:
     thickness: float = 0.001
 
     @property
-    def finish(self) -> dict[str, float]:
+    def surface_values(self) -> dict[str, float]:
         """Parameters of its surface, by their names in `Surface`."""
-        return {name: getattr(self, name) for name in FINISH}
+        return {name: getattr(self, name) for name in SURFACE_FIELDS}
 
     @property
     def unsaid(self) -> list[str]:
@@ -118,7 +118,7 @@ class Material:
 
 
 #: Fields of a material that its surface has, too; color and ior are those of its medium.
-FINISH = tuple(
+SURFACE_FIELDS = tuple(
     name for name in Material.__dataclass_fields__ if name in Surface.__dataclass_fields__.keys() - {"color", "ior"}
 )
 
@@ -192,7 +192,7 @@ class Display:
     converge : bool
         Path trace the picture while the view is still.
     caustics : bool
-        Add the light of photons from lamps to the picture while the view is still.
+        Add the light of photons from the lights to the picture while the view is still.
     unit : str
         In which lengths are shown.
     """
@@ -476,12 +476,12 @@ material.scattering = sigma_s in 1/m (multiscatterColor of glTF's drafts): light
 material.emission = Radiance that the medium adds, per metre of the ray. Typical: 0; a flame 1 to 100.
 material.anisotropy = g (scatterAnisotropy of glTF's drafts), -0.99 to 0.99: mean cosine of the angle of
     scattering. Typical: 0 isotropic, 0.8 milk and skin (forward), -0.3 backward.
-look.stage = A ground that catches shadows, lamps and soft boxes, as --stage of translucent render; auto:
+look.stage = A ground that catches shadows, lights and soft boxes, as --stage of translucent render; auto:
     studio, unless the model brings a camera, lights or a ground, or an environment is chosen. Quantities and
     the reference go without.
 look.environment = What lights the model from all directions: a name, a color, or a picture (.hdr, .exr, .png).
 look.background = What is seen behind the model; it does not light. Typical: the environment itself.
-look.rotation = Turn of the environment about +Y in degrees; of a stage with its lamps. Or drag with E held.
+look.rotation = Turn of the environment about +Y in degrees; of a stage with its lights. Or drag with E held.
 look.exposure = Brightness of the picture in stops: 1 is twice as bright. Typical: -2 to 2. Light stays as it
     is.
 look.tone = Curve from light to the screen; auto: neutral on a stage, where light sources are brighter than
@@ -502,12 +502,12 @@ display.mode = Quantity on show: the picture, thickness along the view ray in fa
 display.compare = What is right of the split: another method, the float64 reference, or the error of thickness.
 display.split = Position of the split, 0 to 1 from the left. Or drag the line.
 display.inset = The float64 reference as a small picture in the corner, while the view is still. It has straight
-    rays, paint and opaque surfaces with their textures, and the holes of leaves; nothing mirrors there, and
+    rays, diffuse bases and opaque surfaces with their textures, and the holes of leaves; nothing mirrors there, and
     what tints clear glass is left out.
 display.antialias = More samples of a pixel while the view is still.
 display.converge = Path trace the picture while nothing changes (C): all light, with less noise the longer it
     goes on.
-display.caustics = Photons carry the light of lamps through interfaces onto opaque objects while nothing changes
+display.caustics = Photons carry light through interfaces onto opaque objects while nothing changes
     (P): --caustics of translucent render, more and more of them. The picture that moves has none, and neither
     has one that converges.
 display.unit = Unit of the lengths in panels and scales.

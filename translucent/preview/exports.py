@@ -171,8 +171,8 @@ def painted(body: Object, baked: ThicknessMap) -> Scene:
     colors = false_colors()[np.rint(np.clip(values / most, 0.0, 1.0) * 255).astype(np.intp)]
     colors[~np.asarray(baked.coverage, dtype=bool)] = EMPTY
     texture = Texture(srgb_to_linear(colors / 255.0).astype(np.float32))
-    paint = Surface(transmission=0.0, roughness=1.0, color_texture=texture)
-    shown = dataclasses.replace(body, medium=Medium(absorption=1.0), surface=paint, sheet_thickness=None)
+    surface = Surface(transmission=0.0, roughness=1.0, color_texture=texture)
+    shown = dataclasses.replace(body, medium=Medium(absorption=1.0), surface=surface, sheet_thickness=None)
     return Scene([shown], camera_of(Orbit()), environment=Environment.constant((1.0, 1.0, 1.0)))
 
 
@@ -326,12 +326,12 @@ def _filling_lines(material: Material, number: int | None) -> list[str]:
     lines = [f"scene = filled(scene, tl.Medium({stated}){among})"]
     if material.source == "file" and number is None:
         return lines
-    finish = ", ".join(f"{name}={value:.12g}" for name, value in material.finish.items())
+    values = ", ".join(f"{name}={value:.12g}" for name, value in material.surface_values.items())
     return [
         *lines,
-        f"finish = dict({finish}, opacity=None)",
+        f"values = dict({values}, opacity=None)",
         "scene = dataclasses.replace(scene, objects=[",
-        "    dataclasses.replace(item, surface=dataclasses.replace(item.surface or tl.Surface(), **finish))",
+        "    dataclasses.replace(item, surface=dataclasses.replace(item.surface or tl.Surface(), **values))",
         f"    if {chosen} else item",
         "    for item in scene.objects",
         "])",

@@ -320,7 +320,7 @@ class ThumbnailCache:
             try:
                 made = self._make(task, *work)
             except TranslucentError:
-                return None  # an unreadable file has no picture; the user is told why on choosing it
+                return None  # an unreadable file has no picture; the user reads why on choosing it
             self._write(key, made)
             return made
 

@@ -164,7 +164,7 @@ class Compiler:
         *,
         presents: bool = False,
     ) -> Task:
-        """Request the programs and normals for plans; with `presents`, those that show a frame, too."""
+        """Request the programs and normals for plans; with `presents`, also the programs that show a frame."""
 
         def work(task: Task) -> Compiled:
             try:

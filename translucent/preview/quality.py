@@ -40,7 +40,7 @@ Factor = TypeVar("Factor", int, float)
 #: each step costs the window a frame.
 OVERDRAWN = 1.5
 
-#: Frames of which the quickest tells what the rest of a window takes; seconds of it that cost drawing nothing; and the
+#: Recent frames, whose quickest tells what the rest of a window takes; seconds of it that cost drawing nothing; and the
 #: least fraction of its budget that drawing keeps.
 RECENT, FREE, LEAST_SHARE = 16, 0.010, 1.0 / 3.0
 

@@ -27,7 +27,7 @@ from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import SCATTERINGS
 from translucent.preview.document import (
     AUTO,
-    FINISH,
+    SURFACE_FIELDS,
     Assigned,
     Document,
     Look,
@@ -307,7 +307,7 @@ def material_of(scene: Scene, number: int | None = None) -> Material:
         color=triple_of(color),
         distance=float(distance) if math.isfinite(distance) else reach,
         **medium_fields(medium),
-        **{name: getattr(surface, name) for name in FINISH},
+        **{name: getattr(surface, name) for name in SURFACE_FIELDS},
         thickness=body.sheet_thickness or thickness,
     )
 
@@ -378,7 +378,7 @@ def _objects_alike(material: Material, scene: Scene) -> tuple[Object, ...]:
 
 
 def _filled(item: Object, material: Material, medium: Medium) -> Object:
-    surface = dataclasses.replace(item.surface or Surface(), **material.finish, opacity=None)  # type: ignore[arg-type]
+    surface = dataclasses.replace(item.surface or Surface(), **material.surface_values, opacity=None)  # type: ignore[arg-type]
     return dataclasses.replace(item, medium=medium, surface=surface, sheet_thickness=None)
 
 

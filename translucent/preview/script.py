@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from translucent.errors import InputError
-from translucent.preview.actions import Pan, Turn, Zoom
+from translucent.preview.actions import OrbitBy, Pan, Zoom
 from translucent.preview.document import Model
 from translucent.preview.session import read_toml
 
@@ -44,7 +44,7 @@ VERBS: dict[str, Callable[..., object]] = {
     "change": lambda state, field=str, value=object: state.change(field, value, step=True),
     "open": lambda state, model=str, unit="m": state.work.open(Model(model, unit)),
     "preset": lambda state, name=str: state.choose_preset(name),
-    "turn": lambda state, right=0.0, up=0.0: state.work.do(Turn(right, up)),
+    "turn": lambda state, right=0.0, up=0.0: state.work.do(OrbitBy(right, up)),
     "pan": lambda state, right=0.0, down=0.0: state.work.do(Pan(right, down)),
     "zoom": lambda state, factor=1.0, right=0.0, down=0.0: state.work.do(Zoom(factor, right, down)),
     "library": lambda state, search="": setattr(state.work.library, "search", search),
@@ -113,7 +113,7 @@ class Script:
         state.hold_pointer()
         if self._waiting is not None:
             passed = time.monotonic() - self._waiting
-            if state.waits:
+            if state.idle:
                 time.sleep(PAUSE)
             busy = (state.more or state.work.thumbnails.busy) and passed <= PATIENCE
             if passed < self._until if self._until >= 0 else passed <= 0.5 or busy:

@@ -80,7 +80,7 @@ class ViewportRenderer:
         Simplifications while the picture moves, with their reason, or nothing.
     drawing : float
         Seconds that the last call of `draw` took.
-    waits : bool
+    idle : bool
         That call had nothing to draw before other work is done.
     """
 
@@ -99,7 +99,7 @@ class ViewportRenderer:
         self.plans: list[RenderPlan | None] = [None, None]
         self.timings = [StepTiming(), StepTiming()]
         self.problem = self.shader_problem = self.simpler = self.state = ""
-        self.drawing, self.waits, self._begun = 0.0, False, False
+        self.drawing, self.idle, self._begun = 0.0, False, False
         self._moving: RenderPlan | None = None
         self._held: Scene | None = None
         self._shown: tuple[object, ...] = ()
@@ -159,7 +159,7 @@ class ViewportRenderer:
         self.viewport.draw_into(self._window, part)
 
     def _draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
-        held, self._held, self.waits = self._held, None, False
+        held, self._held, self.idle = self._held, None, False
         scene, display = held or workspace.scene(), workspace.document.display
         self.viewport.resize(size)
         if scene is None:
@@ -178,7 +178,7 @@ class ViewportRenderer:
         request = self.quality.request
         wanted = (scene, request, second, self.viewport.size, self.renderer)
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
-            self.waits = True
+            self.idle = True
             return True
         fresh = wanted != self._shown
         stopped = (fresh or not display.converges) and self.paths.stop()
@@ -208,7 +208,7 @@ class ViewportRenderer:
         antialias = display.antialias and not workspace.relights
         drawn = not lit and not alone and any(self._step(side, scene, antialias) for side in sides)
         more = drawn or alone or workspace.relights
-        self.waits = more and not (drawn or alone or lit)
+        self.idle = more and not (drawn or alone or lit)
         if display.converges and still and not more:
             more, drawn = self.paths.step(scene, self.renderer, self.viewport, self._budget)
         if lit:
@@ -441,9 +441,9 @@ class Presenter:
             right = right if self.truth is not None else "same"
         lengths = thickest(workspace), worst(workspace)
         self._wanted = Shown(display.mode, right, display.split, *lengths, look.exposure, tone_of(look, scene)), key
-        waits = self._wanted != self.shown or (self._pending and time.perf_counter() - self._when > APART)
+        pending = self._wanted != self.shown or (self._pending and time.perf_counter() - self._when > APART)
         first = not viewport.presents_at_once(self._wanted[0])
-        self._alone = (first or (waits and self._seconds > QUICK)) and viewport.steps(0) > 0
+        self._alone = (first or (pending and self._seconds > QUICK)) and viewport.steps(0) > 0
         return self._alone
 
     def present(self, viewport: Viewport, *, changed: bool, last: bool) -> bool:

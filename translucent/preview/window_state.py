@@ -60,7 +60,7 @@ class ProbedPixel:
 
 @dataclass
 class WindowState:
-    """State of the window, none of which is part of the document.
+    """State of the window beside the document.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class WindowState:
         Number of the last drag: all changes in one are one step of undo.
     more, drawn : bool
         There is more to do for the view; its picture is done.
-    waits : bool
+    idle : bool
         Nothing can be drawn before other work is done.
     pressed_at : (x, y)
         Where a button of the mouse was pressed, in fractions of the viewport.
@@ -101,7 +101,7 @@ class WindowState:
     drag: int = 0
     more: bool = True
     drawn: bool = False
-    waits: bool = False
+    idle: bool = False
     pressed_at: tuple[float, float] = (0.0, 0.0)
     dragging_split: bool = False
     texts: dict[str, str] = field(default_factory=dict)
@@ -126,7 +126,7 @@ class WindowState:
         self.work.size = pixels
         self.work.update()
         more = self.view.draw(self.work, pixels)
-        self.drawn, self.waits = not more, self.view.waits or not more
+        self.drawn, self.idle = not more, self.view.idle or not more
         # All pixels are there; edges may become smooth later.
         self.work.thumbnails.begin_frame(idle=not more or self.view.state.startswith("full"))
         if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:

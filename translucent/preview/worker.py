@@ -58,7 +58,7 @@ NICENESS = 19
 #: Seconds that canceled work has to end, before its process is ended.
 PARTING = 5.0
 
-#: Largest number of processes, the last of which is for `Urgency.PICTURE`; and of those that stay without work.
+#: Largest number of processes, the last one for `Urgency.PICTURE`; and of processes that stay without work.
 MOST, MOST_IDLE = 5, 2
 
 #: Types of large immutable values: sent once, and cached for as long as they live here.

@@ -60,7 +60,7 @@ MAX_RECENT = 8
 #: Seconds after which a view is still.
 STILL = 0.25
 
-#: Names of background threads, each of which does one thing at a time.
+#: Names of background threads; each does one thing at a time.
 LANES = ("load", "draw", "diffuse", "trace", "truth", "bake", "ray", "light", "write", "thumbnails")
 
 #: Seconds for which a closed window waits for work, so that files are complete and no processes are left behind.

@@ -17,7 +17,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.bake.gltf_targets import Bodies, PrimitiveKey, primitive_name, read_primitive
-from translucent.bake.rays import OFFSET, Directions, Points, Rays, Surface
+from translucent.bake.rays import OFFSET, Directions, InwardRays, Points, PreparedMesh
 from translucent.bake.settings import BakeSettings
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
@@ -135,7 +135,7 @@ def measure_body(
     """
     mesh, whole, first = _surfaces(file, bodies, key)
     try:
-        surface = Surface.of(whole)
+        surface = PreparedMesh.of(whole)
     except InputError:
         return None  # flat, or inside out beyond repair
     points, weights, faces = _points(surface, first, len(mesh.faces))
@@ -175,7 +175,7 @@ def _surfaces(file: GltfFile, bodies: Bodies, key: PrimitiveKey) -> tuple[Mesh, 
     return bodies.wound(key, mesh), *joined
 
 
-def _points(surface: Surface, first: int, count: int) -> tuple[Points, Array, Integers]:
+def _points(surface: PreparedMesh, first: int, count: int) -> tuple[Points, Array, Integers]:
     """Points on `count` faces of the mesh from `first` on, their barycentric weights, and faces of the mesh."""
     own = np.flatnonzero((surface.faces >= first) & (surface.faces < first + count))
     corners = surface.corners[own]
@@ -221,15 +221,15 @@ def _uv_corners(file: GltfFile, key: PrimitiveKey, number: int, mesh: Mesh) -> A
     return np.asarray(np.where(same[:, None, None], corners, corners[:, ::-1]))
 
 
-def _rays(surface: Surface, points: Points) -> tuple[Array, Array, Array, Array]:
+def _rays(surface: PreparedMesh, points: Points) -> tuple[Array, Array, Array, Array]:
     """Thickness along the normals (n,), its mean around them (n,), and all inside along views (n, r), (r, n, 3)."""
     settings = BakeSettings(rays=RAYS)
     straight = -points.normal.T[:, :, None].astype(np.float32)
     spread = Directions.of(settings).at(points, 0, RAYS)
-    exits = Rays(surface, settings, np.inf)
+    exits = InwardRays(surface, settings, np.inf)
     beneath = exits.distances(points, straight)[0][:, 0]
     near = exits.distances(points, spread)[0]
-    total = Rays(surface, dataclasses.replace(settings, gaps="total"), np.inf).distances(points, spread)[0]
+    total = InwardRays(surface, dataclasses.replace(settings, gaps="total"), np.inf).distances(points, spread)[0]
     views = spread.transpose(2, 1, 0).astype(np.float64)
     with np.errstate(invalid="ignore"):
         around = near.mean(axis=1)
@@ -237,7 +237,7 @@ def _rays(surface: Surface, points: Points) -> tuple[Array, Array, Array, Array]
     return radius * beneath, radius * around, radius * total, views
 
 
-def _enter_first(surface: Surface, points: Points, views: Array) -> Any:
+def _enter_first(surface: PreparedMesh, points: Points, views: Array) -> Any:
     """(r, n): whether nothing of the body is before the point, on the view ray along each direction (r, n, 3)."""
     start = points.exact + OFFSET * surface.planes[points.face, :3] * 4.0
     origins = np.broadcast_to(start, views.shape).reshape(-1, 3)

@@ -41,7 +41,7 @@ from translucent.gltf.file import GltfFile, label, read_gltf, write_gltf
 from translucent.gltf.materials import materials_of
 from translucent.gltf.nodes import node_transforms
 
-#: Findings that a bake mends, and those that a change of the material does.
+#: Findings that a bake mends, and findings that a change of the material mends.
 BAKED = frozenset(
     {
         "thickness-too-large",
@@ -108,7 +108,7 @@ def check_file(file: GltfFile) -> MaterialCheck:
 
 
 def _gathered(found: list[MaterialFinding]) -> list[MaterialFinding]:
-    """Findings with one alone of those that are of the whole file, which tells how many bodies it is true of."""
+    """Findings with a single one about the whole file, which counts its bodies."""
     sizes = [one for one in found if one.code == "size-unusual"]
     if len(sizes) < 2:
         return found
@@ -133,7 +133,7 @@ def _bodies(file: GltfFile) -> list[Body]:
 
 
 def _placements(file: GltfFile) -> dict[int, list[Placement]]:
-    """Nodes that show each mesh, but those that flatten it."""
+    """Nodes that show each mesh, without nodes that flatten it."""
     transforms, nodes = node_transforms(file), file.items("nodes")
     placed: dict[int, list[Placement]] = defaultdict(list)
     for index, node in enumerate(nodes):

@@ -57,7 +57,7 @@ POINTS, MOST_WORK = 48, 5e7
 #: Winding numbers between these are those of points on a surface; shares of points that make bodies cross.
 ON_SURFACE, CROSSING = (0.2, 0.8), 0.05
 
-#: Ratios of stated to true thickness beyond which it is told, and beyond which it is an error.
+#: Ratios of stated to true thickness from which on it is a warning, and an error.
 SUSPECT, WRONG = 1.5, 3.0
 
 #: A wall is this share of the smallest side of the body at most; the thickness of the body is within this factor of it.
@@ -66,10 +66,10 @@ WALL_SHARE, OF_THE_BODY = 0.3, 2.0
 #: Rank correlation below which a map is dark where the body is thick, and the least spread that has a meaning.
 INVERTED, SPREAD = -0.3, 1.5
 
-#: Share of the true thickness below which a map has no value, and the share of the surface from which on it is told.
+#: Fraction of the true thickness below which a map has no value, and of the surface from which on that is a finding.
 NO_VALUE, MUCH = 0.01, 0.1
 
-#: Share of the surface from which on it is told that a map is off there by more than `WRONG`.
+#: Fraction of the surface from which on a map that is off there by more than `WRONG` is a finding.
 MUCH_OFF = 0.25
 
 #: Transmittance that an 8-bit picture shows as black, and the one that it shows as white.
@@ -84,7 +84,7 @@ UNITS = (("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254))
 #: Thickness in metres, along views, outside of which translucent bodies are rare.
 USUAL = (1e-5, 0.5)
 
-#: Names of viewers, in the order in which they are told.
+#: Names of viewers.
 VIEWERS = ("three.js", "Khronos sample viewer", "Filament", "Blender (Cycles)")
 
 

@@ -31,7 +31,7 @@ KEYS = (
     ("C", "converge: path trace the still picture"),
     ("P", "photons: caustics in the still picture"),
     ("L drag", "move the light"),
-    ("E drag", "turn the environment, or the stage with its lamps"),
+    ("E drag", "turn the environment, or the stage with its lights"),
     ("Ctrl Z, Ctrl Y", "undo, redo"),
     ("Ctrl O", "open"),
     ("Ctrl click", "type a number into a slider"),

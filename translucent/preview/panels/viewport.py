@@ -11,7 +11,7 @@ from imgui_bundle import ImVec2, imgui
 
 from translucent.arrays import Array
 from translucent.frames.aovs import false_colors, marks
-from translucent.preview.actions import Pan, Turn, Zoom
+from translucent.preview.actions import OrbitBy, Pan, Zoom
 from translucent.preview.document import camera_of, length_text, triple_text
 from translucent.preview.panels.widgets import accepts_preset, begin_drag, em, packed
 from translucent.preview.viewport_renderer import thickest, worst
@@ -40,7 +40,7 @@ def viewport_panel(state: WindowState) -> None:
         return  # panels have no places yet: a model would be framed for a viewport that nobody sees
     state.more = state.draw(pixels)
     if imgui.is_window_docked():
-        # Behind all panels, of which this one is transparent: on a software rasterizer imgui takes long for pictures.
+        # Behind all panels, where this one is transparent: on a software rasterizer imgui takes long for pictures.
         bottom = imgui.get_io().display_size.y - corner.y - room.y
         state.view.show_in((round(corner.x * scale.x), round(bottom * scale.y), *pixels))
     else:
@@ -84,7 +84,7 @@ def _mouse(state: WindowState, position: tuple[float, float], room: ImVec2) -> N
         elif turning and imgui.is_key_down(imgui.Key.e):
             state.change("look.rotation", math.remainder(state.get("look.rotation") + DEGREES * right / room.x, 360.0))
         elif turning and not io.key_shift:
-            state.work.do(Turn(-DEGREES * right / room.x, DEGREES * down / room.x))
+            state.work.do(OrbitBy(-DEGREES * right / room.x, DEGREES * down / room.x))
         else:
             state.work.do(Pan(right / room.y, down / room.y))
     if not imgui.is_mouse_down(0):

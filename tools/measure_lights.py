@@ -1,6 +1,6 @@
-"""Measure what lamps cost: ``python tools/measure_lamps.py [--rounds N]``.
+"""Measure what lights cost: ``python tools/measure_lights.py [--rounds N]``.
 
-First frames of a bear on a ground, whose maps are new, and those that follow, by the number of lamps. Then rays that
+First frames of a bear on a ground, whose maps are new, and those that follow, by the number of lights. Then rays that
 tell what bodies keep of highlights and paint: scenes whose bodies take next to no light against the same with clear
 ones, which cast no such rays, and else look alike. Frames take turns; times are those of the processor, so that what
 else runs counts little.
@@ -34,11 +34,11 @@ def scenes(lights: int) -> dict[str, tl.Scene]:
     rough, painted, polished = tl.Surface(roughness=0.3), tl.Surface(transmission=0.0, color=(0.8, 0.8, 0.7)), None
     camera = tl.Camera.look_at((0, 0.4, 2.6), (0, 0, 0), fov_y=32)
     turns = np.linspace(0.0, 1.5, lights)
-    lamps = [tl.PointLight((-1.5 * np.cos(a), 1.2, 1.5 * np.sin(a) + 0.6), np.full(3, 4 / lights)) for a in turns]
+    shining = [tl.PointLight((-1.5 * np.cos(a), 1.2, 1.5 * np.sin(a) + 0.6), np.full(3, 4 / lights)) for a in turns]
     found = {}
     for name, surface in {"polished": polished, "rough": rough, "painted": painted}.items():
         bodies = [stand("bear", glass, (0.3, 0, 0), surface), stand("sphere", wine, (-0.3, 0.05, 0.35), surface)]
-        found[f"{name}, {lights} lamps"] = tl.Scene(bodies, camera, lamps, tl.Environment.constant(0.1))
+        found[f"{name}, {lights} lights"] = tl.Scene(bodies, camera, shining, tl.Environment.constant(0.1))
     return found
 
 
@@ -57,7 +57,7 @@ def seconds(renderer: tl.Renderer, scene: tl.Scene, size: tuple[int, int], sampl
 
 
 def lit(bare: tl.Scene, count: int) -> tl.Scene:
-    """The scene under a square of lamps that shine as one."""
+    """The scene under a square of lights that shine as one."""
     body = bare.bodies[0]
     center, size = body.mesh.center, float(np.linalg.norm(body.bounds[1] - body.bounds[0]))
     side = round(count**0.5)
@@ -80,11 +80,11 @@ def measure_rays(renderer: tl.Renderer, rounds: int) -> None:
 
 
 def measure_maps(renderer: tl.Renderer, rounds: int) -> None:
-    """Print what maps of shadows of many lamps take, and those of the environment."""
+    """Print what maps of shadows of many lights take, and those of the environment."""
     red = tl.Medium.from_color((0.7, 0.2, 0.2), distance=0.005)
     staged = tl.showcase(tl.load_mesh(mesh_path("bear")), red, size=SIZE)
     bare = replace(staged, lights=[], environment_shadows=0)
-    cases = {f"{count} lamps": lit(bare, count) for count in (1, 4, 16)}
+    cases = {f"{count} lights": lit(bare, count) for count in (1, 4, 16)}
     cases["32 directions of the environment"] = replace(bare, environment_shadows=32)
     times: dict[str, list[tuple[float, float]]] = {name: [] for name in cases}
     for number in range(rounds + 1):
