@@ -1,10 +1,14 @@
 """Compare the speed of two checkouts of the project, which draw the same frames in turns.
 
-``python tools/compare_checkouts.py OLDER [NEWER] [--scene SCENE] [--rounds N]``; NEWER is this checkout unless given,
-and ``git worktree add`` makes others. Each draws in a process of its own; the times are processor time, which other
-programs hardly change. Scenes: ``absorbing`` is a body without interfaces, lights or scattering; ``glass`` a bear with
-interfaces, which covers a quarter of 640 x 480 pixels; ``empty`` the same with the bear out of view; ``staged`` the
-bear as `render` shows it, in 240 x 135 pixels; ``rim`` the rim of a goblet of glass on the same stage, from near by.
+``python tools/compare_checkouts.py OLDER [NEWER] [--scene SCENE] [--rounds N] [--pairs N] [--first]``; NEWER is this
+checkout unless given, and ``git worktree add`` makes others. Each draws in a process of its own; the times are
+processor time, which other programs hardly change. Processes of the same code differ by up to a fifth, by where their
+memory and threads come to lie, so several pairs of them draw one after the other. ``--first`` compares first frames
+without the caches of the driver instead, which compile all shaders.
+
+Scenes: ``absorbing`` is a body without interfaces, lights or scattering; ``glass`` a bear with interfaces, which covers
+a quarter of 640 x 480 pixels; ``empty`` the same with the bear out of view; ``staged`` the bear as `render` shows it,
+in 240 x 135 pixels; ``rim`` the rim of a goblet of glass on the same stage, from near by.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROUNDS = 40
+ROUNDS, PAIRS = 10, 6
 
 _BEAR = """
 mesh = tl.load_mesh("meshes/bear.ply")
@@ -52,10 +56,11 @@ DRAWS = """
 import time
 import translucent as tl
 {scene}
-renderer = tl.Renderer()
+renderer, begin = tl.Renderer(), time.process_time()
+renderer.render(scene, size, samples=1)
+print(time.process_time() - begin, flush=True)
 for _ in range(5):
     renderer.render(scene, size, samples=1)
-print("ready", flush=True)
 while input() != "end":
     begin = time.process_time()
     for _ in range(5):
@@ -65,20 +70,20 @@ while input() != "end":
 
 
 class Checkout:
-    """A process that draws with the code of a checkout."""
+    """A process that draws with the code of a checkout. `first` is the processor time of its first frame."""
 
-    def __init__(self, root: Path, scene: str) -> None:
+    def __init__(self, root: Path, scene: str, cached: bool) -> None:
         if not (root / "translucent" / "__init__.py").is_file():
             raise SystemExit(f"{root}: no checkout of this project; give the folder that holds translucent/")
         self._process = subprocess.Popen(
             [sys.executable, "-c", DRAWS.format(scene=SCENES[scene])],
             cwd=root,
-            env={**os.environ, "PYTHONPATH": str(root)},
+            env={**os.environ, "PYTHONPATH": str(root), "MESA_SHADER_CACHE_DISABLE": "false" if cached else "true"},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
         )
-        self._answer()
+        self.first = float(self._answer())
 
     def seconds(self) -> float:
         """Processor time of a frame."""
@@ -103,6 +108,18 @@ class Checkout:
         return line
 
 
+def _pair(chosen: argparse.Namespace) -> tuple[float, float]:
+    """Processor time of a frame, older and newer, by a process for each."""
+    older, newer = (Checkout(root.resolve(), chosen.scene, not chosen.first) for root in (chosen.older, chosen.newer))
+    times = [(older.first, newer.first)]
+    if not chosen.first:
+        times = [(older.seconds(), newer.seconds()) for _ in range(chosen.rounds)]
+    older.end()
+    newer.end()
+    before, after = map(statistics.median, zip(*times, strict=True))
+    return before, after
+
+
 def main() -> int:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -110,22 +127,14 @@ def main() -> int:
     parser.add_argument("newer", type=Path, nargs="?", default=Path(__file__).parents[1])
     parser.add_argument("--scene", choices=SCENES, default="absorbing")
     parser.add_argument("--rounds", type=int, default=ROUNDS)
+    parser.add_argument("--pairs", type=int, default=PAIRS)
+    parser.add_argument("--first", action="store_true")
     chosen = parser.parse_args()
-    older, newer = (Checkout(root.resolve(), chosen.scene) for root in (chosen.older, chosen.newer))
-    times: list[tuple[float, float]] = []
-    for number in range(chosen.rounds):
-        if number % 2:
-            after, before = newer.seconds(), older.seconds()
-        else:
-            before, after = older.seconds(), newer.seconds()
-        times.append((before, after))
-    older.end()
-    newer.end()
-    ratios = [after / before for before, after in times]
-    low, median, high = statistics.quantiles(ratios, n=4)
-    print(f"{1e3 * statistics.median(before for before, _ in times):.2f} ms of processor time for a frame before")
-    print(f"{1e3 * statistics.median(after for _, after in times):.2f} ms after")
-    print(f"ratio {median:.3f}, quartiles {low:.3f} and {high:.3f}")
+    pairs = [_pair(chosen) for _ in range(chosen.pairs)]
+    ratios = sorted(after / before for before, after in pairs)
+    print(f"{1e3 * statistics.median(before for before, _ in pairs):.2f} ms of processor time for a frame before")
+    print(f"{1e3 * statistics.median(after for _, after in pairs):.2f} ms after")
+    print(f"ratio {statistics.median(ratios):.3f}, from {ratios[0]:.3f} to {ratios[-1]:.3f} in {len(pairs)} pairs")
     return 0
 
 
