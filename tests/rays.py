@@ -8,7 +8,7 @@ import numpy as np
 
 import translucent as tl
 from translucent.arrays import Array, Integers, Mask
-from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.ray_caster import RayCaster
 
 #: Paths that differ by no more than this share of a body's radius are the same: corners in float32 are off by 6e-8 of
 #: it, origins and directions again, over cosines down to 0.02.
@@ -55,7 +55,7 @@ def embree_nearest(scene: tl.Scene, origins: Array, directions: Array) -> Found:
     """The nearest surface of any object, by an Embree scene for each mesh, in its coordinates."""
     found = Found.nothing(len(origins))
     for number, body in enumerate(scene.objects):
-        embree = EmbreeMesh(body.mesh)
+        embree = RayCaster(body.mesh)
         inverse = np.linalg.inv(body.matrix[:3, :3]) / embree.radius
         start = (origins - body.matrix[:3, 3]) @ inverse.T - embree.center / embree.radius
         along = directions @ inverse.T

@@ -25,8 +25,8 @@ from tests.ray_probe import RayProbe
 from tests.rays import agreeing, embree_nearest, inside_points, random_rays
 from translucent.assets import mesh_path
 from translucent.geometry.bvh import build_hierarchy, sah_cost
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.normals import drawn_normals
+from translucent.geometry.ray_caster import RayCaster
 from translucent.gpu.hierarchies import SceneHierarchies, packed_mesh
 
 #: Meshes of the toolkit: a shape of blobs, thin walls, many turns, and holes.
@@ -58,7 +58,7 @@ def built(mesh: tl.Mesh) -> dict[str, Any]:
 def checked(renderer: tl.Renderer, mesh: tl.Mesh, rays: int, rng: np.random.Generator) -> dict[str, Any]:
     """Comparison of random rays with Embree, and leaks of rays from inside."""
     scene = tl.Scene([tl.Object(mesh, tl.Medium())], tl.Camera.framing(mesh.vertices, (64, 64)))
-    embree = EmbreeMesh(mesh)
+    embree = RayCaster(mesh)
     found = {"different": 0, "hit": 0}
     seconds = np.zeros(2)
     with renderer.gpu.context.current() as gl:

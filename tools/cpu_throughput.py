@@ -17,8 +17,8 @@ from translucent.cpu.hits import TracedMesh, Tracer
 from translucent.cpu.picture import Band, Picture
 from translucent.cpu.renderer import CpuRenderer
 from translucent.cpu.threads import in_threads, processors
-from translucent.geometry.embree import starts
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.ray_caster import BEFORE
 from translucent.mesh_files import load_mesh
 from translucent.planning.plan import plan
 from translucent.scene.showcase import showcase
@@ -76,7 +76,7 @@ def _first_hits(tracer: Tracer, bands: list[Band], threads: int) -> Callable[[],
     rays = []
     for band in bands:
         origins, directions = tracer.rays(band, np.arange(band.pixels))
-        start = starts(origins, directions)
+        start = -np.einsum("ki,ki->k", origins, directions) - BEFORE
         with np.errstate(under="ignore"):
             at = (origins + start[:, None] * directions).astype(np.float32)
             rays.append((at, directions.astype(np.float32)))

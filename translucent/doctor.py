@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 from translucent.cpu.threads import processors
 from translucent.errors import RenderError
-from translucent.geometry.embree import embree_versions
+from translucent.geometry.ray_caster import embree_versions
 from translucent.gpu.context import Backend, NoContextError, open_context
 from translucent.gpu.targets import SHADER_STORAGE
 

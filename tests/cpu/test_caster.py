@@ -8,7 +8,7 @@ import pytest
 import translucent as tl
 from translucent.arrays import Array
 from translucent.assets import mesh_path
-from translucent.cpu.caster import Caster
+from translucent.cpu.hits import ExactRayCaster
 from translucent.geometry.solids import Box, Sphere
 from translucent.reference.tracer import Lines, Tracer
 
@@ -21,8 +21,8 @@ def body(mesh: tl.Mesh, x: float = 0.0) -> tl.Object:
     return tl.Object(mesh, GLASS, matrix)
 
 
-def caster_of(*objects: tl.Object) -> Caster:
-    return Caster(objects, tl.Scene(objects, tl.Camera.look_at((9, 9, 9), (0, 0, 0))).bounds)
+def caster_of(*objects: tl.Object) -> ExactRayCaster:
+    return ExactRayCaster(objects)
 
 
 def unit_vectors(count: int, rng: np.random.Generator) -> Array:
@@ -79,5 +79,5 @@ def test_rays_inside_a_closed_body_leave_it(name: str, rng: np.random.Generator)
     assert (~leaves(caster, again, directions[doubt])).sum() <= 2
 
 
-def leaves(caster: Caster, face: np.ndarray, directions: Array) -> np.ndarray:
+def leaves(caster: ExactRayCaster, face: np.ndarray, directions: Array) -> np.ndarray:
     return (face >= 0) & (np.einsum("ki,ki->k", caster.faces.outward[face], directions) > 0)

@@ -8,7 +8,7 @@ import pytest
 import translucent as tl
 from tests.ball_light import ball_parts
 from translucent.cpu.caustics import CausticLight
-from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.solids import Box, Sphere
 
 DEEP = 2.5
@@ -20,7 +20,7 @@ SCENE = tl.Scene([BALL, GROUND], tl.Camera.look_at((0, 4, 9), (0, -1, 0)), [SUN]
 
 def test_photons_light_the_ground_as_the_rays_of_the_ball_do() -> None:
     """In circles around the axis, beyond the focus; straight light ends at the ball."""
-    meshes = {item.mesh: EmbreeMesh(item.mesh) for item in SCENE.objects}
+    meshes = {item.mesh: RayCaster(item.mesh) for item in SCENE.objects}
     light = CausticLight(SCENE, (None, None), meshes, tl.Caustics(10_000), frozenset({0}))
     step = 0.06
     x = step * (np.arange(-50, 50) + 0.5)

@@ -11,9 +11,9 @@ import translucent as tl
 from translucent.arrays import Array
 from translucent.assets import mesh_path
 from translucent.cpu import surroundings
-from translucent.cpu.caster import Caster, dot, unit
 from translucent.cpu.renderer import CpuRenderer
 from translucent.formulas.interface import reflected_direction, refracted_direction
+from translucent.geometry.ray_caster import SceneRayCaster, dot, unit
 from translucent.geometry.solids import Sphere
 from translucent.scene.showcase import framing
 
@@ -50,13 +50,13 @@ def test_differentials_are_those_of_the_formulas(ior: float | None) -> None:
 
 def test_normals_change_as_they_are_interpolated() -> None:
     ball = tl.Object(Sphere().tessellate(96), tl.Medium(ior=1.5))
-    caster = Caster([ball], np.array([[-1.0] * 3, [1.0] * 3]) / np.sqrt(3.0))
+    caster = SceneRayCaster([ball])
     face = np.arange(0, len(caster.faces.number), 601)
     middle = caster.faces.corner[face] + caster.faces.edges[face].mean(axis=1) * 2.0 / 3.0
     points = np.cross(caster.faces.outward[face], np.eye(3)[:2, None]).transpose(1, 0, 2)
     found = surroundings.normal_differentials(caster, face, middle, points, caster.faces.outward[face])
     # A ball's normals turn by as much as a point moves on it, in radii of the ball.
-    np.testing.assert_allclose(found, points, atol=0.02)
+    np.testing.assert_allclose(found, caster.radius * points, atol=0.02)
     onwards = surroundings.onto_planes(points + 0.3, -middle, caster.faces.outward[face])
     np.testing.assert_allclose(np.einsum("kij,kj->ki", onwards, caster.faces.outward[face]), 0.0, atol=1e-12)
 

@@ -19,7 +19,7 @@ import translucent as tl
 from translucent.cpu import picture
 from translucent.cpu.hits import TracedMesh, Tracer, embree_hits
 from translucent.cpu.picture import Band, Picture
-from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.reference import Hits, line_hits
 
@@ -257,7 +257,7 @@ def test_rays_of_a_band_are_those_of_the_picture(perspective: bool) -> None:
         np.testing.assert_allclose(getattr(rays, name), found, rtol=0, atol=1e-15)
 
 
-class Forgetful(EmbreeMesh):
+class Forgetful(RayCaster):
     """Finds only some of the faces."""
 
     def candidates(self, *arguments: Any) -> Any:

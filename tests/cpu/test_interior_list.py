@@ -8,8 +8,8 @@ import pytest
 
 import translucent as tl
 from translucent.cpu.interior_list import MOST, InteriorMedia, empty_interior_lists, enter, has, leave
+from translucent.diffusion.interfaces import AIR, InterfaceTable
 from translucent.geometry.solids import Box
-from translucent.reference.interfaces import AIR, Optics
 from translucent.reference.segments import mix
 
 MESH = Box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)).tessellate()
@@ -40,7 +40,7 @@ def test_bodies_are_left_in_any_order() -> None:
 
 
 def test_a_body_that_winds_twice_is_left_twice_and_keeps_its_turn() -> None:
-    interior, media = empty_interior_lists(1), InteriorMedia(*(scene := scene_of(0, 0),), Optics(scene, (None, None)))
+    interior, media = empty_interior_lists(1), InteriorMedia(InterfaceTable(scene_of(0, 0), (None, None)))
     for item in (0, 1, 0):
         enter(interior, RAY, at(item))
     assert media.effective(interior).tolist() == [1], "of equal ones that which was entered last"
@@ -70,7 +70,7 @@ def test_mixtures_are_those_of_the_reference(overlap: str, rng: np.random.Genera
         for again in range(2):
             rays = np.flatnonzero(windings[item] > again)
             enter(interior, rays, np.full(len(rays), item, dtype=np.int16))
-    found = InteriorMedia(scene, Optics(scene, (None,) * 4)).coefficients(interior)
+    found = InteriorMedia(InterfaceTable(scene, (None,) * 4)).coefficients(interior)
     expected = mix(scene, np.arange(4), windings)
     for own, other in zip(found, expected[:2], strict=True):
         np.testing.assert_allclose(own, other, rtol=1e-14)
@@ -78,7 +78,7 @@ def test_mixtures_are_those_of_the_reference(overlap: str, rng: np.random.Genera
 
 def test_priority_decides_and_then_the_later_entry() -> None:
     scene = scene_of(5, 1, 5, overlap="priority")
-    media = InteriorMedia(scene, Optics(scene, (None,) * 3))
+    media = InteriorMedia(InterfaceTable(scene, (None,) * 3))
     for order, expected in (((0, 1, 2), 2), ((2, 1, 0), 0), ((0, 1), 0), ((1,), 1), ((), AIR)):
         interior = empty_interior_lists(1)
         for item in order:

@@ -12,7 +12,7 @@ from translucent.arrays import Array
 from translucent.assets import mesh_path
 from translucent.cpu.light_paths import EmbreeLightPaths
 from translucent.cpu.renderer import CpuRenderer
-from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.solids import Box, Sphere
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.sheets import sheet_thicknesses
@@ -55,7 +55,7 @@ BODIES: dict[str, Any] = {
 def test_transmittance_is_that_of_the_reference(name: str) -> None:
     scene = tl.Scene([*BODIES[name](), GROUND], CAMERA, [SUN, LAMP])
     sheets = sheet_thicknesses(scene)
-    meshes = {body.mesh: EmbreeMesh(body.mesh) for body in scene.objects}
+    meshes = {body.mesh: RayCaster(body.mesh) for body in scene.objects}
     rng = np.random.default_rng(3)
     # On the ground, a grid of places that edges and diagonals fall on, and anywhere.
     grid = np.stack(np.meshgrid(np.linspace(-3, 3, 25), [-1.0], np.linspace(-3, 3, 25)), axis=-1).reshape(-1, 3)

@@ -13,7 +13,7 @@ import translucent as tl
 from translucent.arrays import Array
 from translucent.assets import mesh_path
 from translucent.cpu import ray_tree
-from translucent.cpu.caster import Caster
+from translucent.cpu.hits import ExactRayCaster
 from translucent.cpu.interactions import Spread
 from translucent.cpu.ray_tree import DiffusedLight, RayTree, TracedLight
 from translucent.cpu.renderer import CpuRenderer
@@ -49,7 +49,7 @@ def moved(x: float, scale: float = 1.0) -> Array:
 
 
 def tree_of(scene: tl.Scene, size: tuple[int, int], depth: int, forks: int) -> RayTree:
-    caster = Caster(scene.objects, scene.bounds)
+    caster = ExactRayCaster(scene.objects)
     light = SurfaceLight(LightPaths(scene, sheet_thicknesses(scene)))
     return RayTree(light, caster, size[0] / size[1], depth, forks, DiffusedLight({}))
 
@@ -188,16 +188,16 @@ def test_paths_of_stronger_branches_keep_their_forks() -> None:
 
 def test_exits_that_embree_misses_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = scene_of(knot(), camera=around(knot()))
-    expected, nearest = traced_light(scene), Caster.nearest
+    expected, nearest = traced_light(scene), ExactRayCaster.nearest
 
-    def forgetful(caster: Caster, origins: Array, directions: Array, *more: Any) -> Any:
+    def forgetful(caster: ExactRayCaster, origins: Array, directions: Array, *more: Any) -> Any:
         face, distance = nearest(caster, origins, directions, *more)
         leaves = np.einsum("ki,ki->k", caster.faces.outward[face[:, 0]], directions) > 0
         lost = np.flatnonzero(leaves & (face[:, 0] >= 0))[::7]
         face[lost], distance[lost] = -1, np.inf
         return face, distance
 
-    monkeypatch.setattr(Caster, "nearest", forgetful)
+    monkeypatch.setattr(ExactRayCaster, "nearest", forgetful)
     found = traced_light(scene)
     assert found.valid.all()
     np.testing.assert_allclose(found.radiance, expected.radiance, rtol=1e-6)

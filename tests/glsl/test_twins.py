@@ -14,7 +14,7 @@ from translucent.assets import shader_library
 
 #: Functions of these modules that are no formulas of light, and so have no twin.
 HOST_ONLY = {
-    "bsdf": {"below_coat", "interface_lobes", "sampled_branches", "smooth_lobes", "thin_wall_lobes"},
+    "bsdf": {"below_coat", "sampled_branches"},
     "phase": {"parse_phase"},
     "color": {"to_hex"},
     "diffusion": {"haze_shares"},

@@ -36,8 +36,8 @@ from translucent.files.paths import write_atomically
 from translucent.formulas.color import linear_to_srgb
 from translucent.frames.frame import Frame
 from translucent.frames.metrics import Errors, compare
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.ray_caster import RayCaster
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.file import GltfFile, read_gltf
 from translucent.gltf.materials import GltfMaterial, materials_of
@@ -258,7 +258,7 @@ def first_hits(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | N
 
 def _first_faces(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[Integers, Array]:
     """(k,), (k,): the first face that the ray of each pixel hits, and the distance in metres; -1 and inf for none."""
-    traced = EmbreeMesh(mesh)
+    traced = RayCaster(mesh)
     origins, directions = (part.reshape(-1, 3) for part in camera.rays(size))
     starts = (origins - traced.center) / traced.radius
     # A far eye costs float32 its digits; begin where the ray comes near.

@@ -22,9 +22,9 @@ from translucent.arrays import Array, Floats, Integers
 from translucent.bake.settings import BakeSettings
 from translucent.errors import InputError
 from translucent.formulas.sampling import MOST_POINTS, sobol_points
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import CREASE, smooth_normals
+from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.winding import one_volume
 
 #: Smallest distance of a ray's start from the edges of its triangle, as a share of its height: a ray that runs down an
@@ -68,7 +68,7 @@ class PreparedMesh:
 
     Attributes
     ----------
-    embree : EmbreeMesh
+    embree : RayCaster
     faces : (m,) int64
         Indices of the mesh's faces that have an area; everywhere else a face is an index into this.
     corners : (m, 3, 3) float64
@@ -78,7 +78,7 @@ class PreparedMesh:
         Smooth, at the corners.
     """
 
-    embree: EmbreeMesh
+    embree: RayCaster
     faces: Integers
     corners: Array
     planes: Array
@@ -115,7 +115,7 @@ class PreparedMesh:
         offset = _dot(normals, (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0)
         with_area = Mesh(mesh.vertices, mesh.faces[faces], name=mesh.name)
         return cls(
-            EmbreeMesh(with_area),
+            RayCaster(with_area),
             faces,
             corners,
             np.column_stack([normals, offset]),

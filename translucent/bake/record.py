@@ -121,7 +121,7 @@ def write_record(path: Path, record: Record) -> Record:
 
 def add_record(files: OutputFiles, path: Path, record: Record) -> Record:
     """Write a record where that of the file at `path` belongs, together with other files; returns the record."""
-    from translucent.geometry.embree import embree_versions
+    from translucent.geometry.ray_caster import embree_versions
 
     versions = {"translucent": VERSION, "numpy": np.__version__, **embree_versions()}
     machine = {"python": platform.python_version(), "machine": platform.machine()}

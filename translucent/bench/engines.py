@@ -32,9 +32,9 @@ from translucent.formulas.two_stream import (
     two_stream_transmittance,
 )
 from translucent.frames.frame import Frame
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals
+from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
 from translucent.planning.scattering import SingleScattering
 from translucent.reference import camera_hits
@@ -102,14 +102,12 @@ class VisiblePoints:
         return diffuse_interface(self.medium.ior).entering
 
     @cached_property
-    def _caster(self) -> EmbreeMesh:
-        return EmbreeMesh(self.mesh)
+    def _caster(self) -> RayCaster:
+        return RayCaster(self.mesh)
 
     def distance(self, points: Array, directions: Array, sides: Array) -> Array:
         """(k,): distance from points of the surface, on the side of `sides` (k, 3), to where rays hit it again."""
-        origins = (points + OFF * self.mesh.diagonal * sides - self.mesh.center) / self._caster.radius
-        face, found = self._caster.first_hits(origins, directions)
-        return np.where(face >= 0, found * self._caster.radius, np.inf)
+        return self._caster.nearest(points + OFF * self.mesh.diagonal * sides, directions)[1]
 
     def irradiance(self, points: Array, normals: Array) -> Array:
         """Irradiance (k, 3) at points of the surface, shadowed by the body; light that it sends to itself left out."""

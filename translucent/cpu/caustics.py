@@ -11,10 +11,10 @@ from scipy.spatial import cKDTree
 
 from translucent.arrays import Array
 from translucent.cpu.light_paths import EmbreeLightPaths
-from translucent.diffusion.photon_flights import photon_flights
+from translucent.diffusion.photons import photon_segments
 from translucent.formulas import optics
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.ray_caster import RayCaster
 from translucent.planning.caustics import Caustics
 from translucent.planning.rendered import darkened
 from translucent.reference.surface_light import SurfaceLight
@@ -58,7 +58,7 @@ class CausticLight(SurfaceLight):
         self,
         scene: Scene,
         sheets: tuple[float | None, ...],
-        meshes: Mapping[Mesh, EmbreeMesh],
+        meshes: Mapping[Mesh, RayCaster],
         caustics: Caustics,
         bending: frozenset[int],
     ) -> None:
@@ -128,8 +128,8 @@ def _discs(points: Array, ways: Array, power: Array, scene: Scene) -> list[_Disc
 def _landed(scene: Scene, caustics: Caustics) -> tuple[Array, Array, Array]:
     """Points, directions and power (n, 3) of the photons that interfaces have turned, where they land."""
     parts = [np.zeros((3, 0, 3))]
-    for flights in photon_flights(scene, caustics.photons, caustics.seed):
-        ends = flights.where(flights.lands & flights.bent)
+    for segments in photon_segments(scene, caustics.photons, caustics.seed):
+        ends = segments.where(segments.lands & segments.bent)
         points = ends.origins + ends.length[:, None] * ends.directions
         with np.errstate(under="ignore"):
             left = ends.power * optics.transmittance(ends.extinction * ends.length[:, None])

@@ -5,7 +5,7 @@ The result is that of `translucent.reference.line_hits`, to the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain
@@ -15,9 +15,10 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.picture import Band, Picture
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
-from translucent.reference.hits import Hits, camera_vertices, cross_triangles, from_eye, pixel_span, sorted_hits
+from translucent.geometry.ray_caster import NEAREST, RayCaster, SceneRayCaster, point_from
+from translucent.reference.hits import Hits, camera_vertices, cross_triangles, pixel_span, sorted_hits
+from translucent.reference.tracer import Lines, TracedObject
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object
 
@@ -251,13 +252,13 @@ class Outline:
 class TracedMesh:
     """Mesh prepared for ray tracing, independent of the camera."""
 
-    embree: EmbreeMesh
+    embree: RayCaster
     edges: Edges
 
     @classmethod
     def of(cls, mesh: Mesh) -> TracedMesh:
         """Prepare a mesh; raises `RenderError` if embreex cannot be imported."""
-        return cls(EmbreeMesh(mesh), Edges.of(mesh))
+        return cls(RayCaster(mesh), Edges.of(mesh))
 
 
 class Tracer:
@@ -304,7 +305,7 @@ class Tracer:
         return hits, incomplete | (found != expected)
 
     def rays(self, band: Band, pixel: Integers) -> tuple[Array, Array]:
-        """Origins and unit directions (k, 3) of the rays of pixels (k,), in the ball of `EmbreeMesh`."""
+        """Origins and unit directions (k, 3) of the rays of pixels (k,), in the ball of `RayCaster`."""
         points = self._seen.picture.points(band, pixel)
         across = points[:, :1] * self._axes[0] + points[:, 1:] * self._axes[1]
         if self._seen.picture.perspective:
@@ -350,11 +351,35 @@ def embree_hits(
     return _joined(parts)
 
 
-def _camera_in_ball(embree: EmbreeMesh, body: Object, camera: Camera) -> tuple[Array, Array]:
+class ExactRayCaster(SceneRayCaster):
+    """Ray caster for the objects of a scene, which also finds in float64 what float32 does not."""
+
+    def __init__(self, objects: Sequence[Object]) -> None:
+        super().__init__(objects)
+        self._bodies = objects
+
+    def nearest_exactly(self, origins: Array, directions: Array) -> tuple[Integers, Array]:
+        """As `nearest`, for few rays: in float64, with exact decisions on edges and vertices."""
+        face, distance = np.full((len(origins), self.groups), -1), np.full((len(origins), self.groups), np.inf)
+        lines = Lines(origins, directions, np.full(len(origins), NEAREST), np.full(len(origins), np.inf))
+        for (group, first), traced in zip(self.places(), self._traced, strict=True):
+            hits = traced.hits(lines)
+            ray, nearest = np.unique(hits.pixel, return_index=True)
+            closer = hits.distance[nearest] < distance[ray, group]
+            ray, nearest = ray[closer], nearest[closer]
+            face[ray, group], distance[ray, group] = hits.face[nearest] + first, hits.distance[nearest]
+        return face, distance
+
+    @cached_property
+    def _traced(self) -> list[TracedObject]:
+        return [TracedObject(body, self.corners(i)) for i, body in enumerate(self._bodies)]
+
+
+def _camera_in_ball(caster: RayCaster, body: Object, camera: Camera) -> tuple[Array, Array]:
     """The eye (3,) and the camera's axes (3, 3), one a row, in the ball of a mesh."""
     linear = body.matrix[:3, :3]
-    axes = np.stack([-from_eye(embree.center, body.matrix, camera), camera.right, camera.up, camera.forward])
-    eye, *rows = np.linalg.solve(linear, axes.T).T / embree.radius
+    axes = np.stack([-point_from(caster.center, body.matrix, camera.eye), camera.right, camera.up, camera.forward])
+    eye, *rows = np.linalg.solve(linear, axes.T).T / caster.radius
     return eye, np.stack(rows)
 
 

@@ -9,13 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers, Mask
-from translucent.reference.interfaces import AIR, Optics
-from translucent.scene.scene import Scene
+from translucent.diffusion.interfaces import AIR, InterfaceTable
 
 InteriorList = npt.NDArray[np.int16]
 Items = npt.NDArray[np.int16] | Integers
 
-#: Entries of a interior.
+#: Entries of an interior list.
 MOST = 8
 
 #: Entry where no body is.
@@ -63,25 +62,23 @@ class InteriorMedia:
 
     Parameters
     ----------
-    scene : Scene
-    own : Optics
-        Which bodies decide the medium of light.
+    table : InterfaceTable
     """
 
-    def __init__(self, scene: Scene, own: Optics) -> None:
+    def __init__(self, table: InterfaceTable) -> None:
+        self.table, scene = table, table.scene
         self.overlap = scene.overlap
         media = [body.medium for body in scene.objects]
         # One row more, at index NOTHING.
         self.extinction = np.zeros((len(media) + 1, 3))
         self.emission = np.zeros((len(media) + 1, 3))
-        for i in own.solids:
+        for i in np.flatnonzero(table.is_solid).tolist():
             medium = media[i]
             assert medium is not None
             self.extinction[i], self.emission[i] = medium.extinction, scene.source(scene.objects[i])
         self.emits = bool((self.emission > 0).any())
-        _, rank = np.unique([body.priority for body in scene.objects], return_inverse=True)
         # A higher priority goes first, then the later entry; 0 is nobody.
-        self._keys = np.append(np.where(own.decides, (rank + 1) * MOST, 0), 0)
+        self._keys = np.append(np.where(table.decides, (table.rank + 1) * MOST, 0), 0)
         together = np.hstack([self.extinction, self.emission])
         self._slot = np.unique(together, axis=0, return_inverse=True)[1].ravel()
 
@@ -139,7 +136,7 @@ class Branches:
     forks : (n,) int64
         Interfaces at which it may still become two.
     last : (n, groups) int64
-        Faces that the origin is on, as `Caster.nearest` takes them.
+        Faces that the origin is on, as `SceneRayCaster.nearest` takes them.
     reflected : (n,) bool
         Whether an interface has reflected it.
     blur : (n,) float64

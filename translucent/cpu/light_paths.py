@@ -10,9 +10,9 @@ import numpy as np
 
 from translucent.arrays import Integers
 from translucent.cpu.threads import end_if_stopped
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
-from translucent.reference.hits import Hits, from_eye, sorted_hits
+from translucent.geometry.ray_caster import RayCaster, point_from
+from translucent.reference.hits import Hits, sorted_hits
 from translucent.reference.intervals import sum_signs
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.tracer import Lines, TracedObject, Tracer
@@ -33,11 +33,11 @@ class EmbreeLightPaths(LightPaths):
     scene : Scene
     sheets : sequence of float or None
         As `sheet_thicknesses` gives them.
-    meshes : mapping of Mesh to EmbreeMesh
+    meshes : mapping of Mesh to RayCaster
         All of the scene.
     """
 
-    def __init__(self, scene: Scene, sheets: tuple[float | None, ...], meshes: Mapping[Mesh, EmbreeMesh]) -> None:
+    def __init__(self, scene: Scene, sheets: tuple[float | None, ...], meshes: Mapping[Mesh, RayCaster]) -> None:
         super().__init__(scene, sheets)
         self._meshes = meshes
 
@@ -56,7 +56,7 @@ class EmbreeLightPaths(LightPaths):
 class _EmbreeObject(TracedObject):
     """Object whose candidate faces come from Embree."""
 
-    embree: EmbreeMesh
+    embree: RayCaster
     scene: Scene
 
     def hits(self, lines: Lines) -> Hits:
@@ -80,7 +80,9 @@ class _EmbreeObject(TracedObject):
         """Pairs (k,), (k,) of a line and a face, by rays in the ball of the mesh."""
         inverse = np.linalg.inv(self.body.matrix[:3, :3])
         with np.errstate(under="ignore"):
-            origins = (lines.origins - from_eye(self.embree.center, self.body.matrix, self.scene.camera)) @ inverse.T
+            origins = (
+                lines.origins - point_from(self.embree.center, self.body.matrix, self.scene.camera.eye)
+            ) @ inverse.T
             directions = lines.directions @ inverse.T
             directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         counted = np.ones(len(self.corners), dtype=bool)

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from translucent.arrays import Array, Integers, Mask
-from translucent.cpu.caster import Caster, dot, largest, unit
-from translucent.cpu.interactions import InterfaceHits, InterfaceInteractions, InterfaceLight, Interfaces, Spread
+from translucent.cpu.hits import ExactRayCaster
+from translucent.cpu.interactions import BranchInteractions, InterfaceHits, InterfaceLight, Spread, interact
 from translucent.cpu.interior_list import (
     NOTHING,
     Branches,
@@ -31,20 +31,20 @@ from translucent.cpu.interior_list import (
 from translucent.cpu.surroundings import Surroundings, first_footprints, moved_on, parted
 from translucent.cpu.threads import end_if_stopped
 from translucent.diffusion.field import DiffusionField
+from translucent.diffusion.interfaces import InterfaceTable
 from translucent.formulas import optics
 from translucent.formulas.diffusion import HAZE_ROUGHNESS
 from translucent.formulas.interface import reflected_direction
+from translucent.geometry.ray_caster import dot, unit
 from translucent.reference.compositing import composite
 from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits
-from translucent.reference.interfaces import Optics
 from translucent.reference.intervals import Intervals
 from translucent.reference.opaque import OpaqueHits, reflected_radiance
 from translucent.reference.rays import Rays
 from translucent.reference.sheets import scene_crossings
 from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import Volume, volume_segments
-from translucent.scene.scene import Scene
 
 
 class SegmentMedia:
@@ -52,17 +52,16 @@ class SegmentMedia:
 
     Parameters
     ----------
-    scene : Scene
-    own : Optics
     media : InteriorMedia
     light : SurfaceLight
         On layers.
     """
 
-    def __init__(self, scene: Scene, own: Optics, media: InteriorMedia, light: SurfaceLight) -> None:
-        self.scene, self.media, self.light, self.volume = scene, media, light, Volume(scene)
+    def __init__(self, media: InteriorMedia, light: SurfaceLight) -> None:
+        self.scene, self.media, self.light, self.volume = light.scene, media, light, Volume(light.scene)
         #: Sheets without an interface.
-        self.films = tuple(None if i in own.walls else metres for i, metres in enumerate(own.sheets))
+        table = media.table
+        self.films = tuple(None if wall else metres for wall, metres in zip(table.is_wall, table.sheets, strict=False))
 
     def along(self, rays: Rays, interior: InteriorList, length: Array) -> tuple[Array | None, Array]:
         """Emitted radiance, None if there is none, and transmittance (k, 3) over `length` metres (k,) of rays."""
@@ -163,8 +162,13 @@ TOGETHER = 1e-7
 #: Luminance of linear RGB (Rec. 709).
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
-#: Distance from the center of the scene, in radii, at which rays from afar begin.
-BEFORE = 1.01
+
+def largest(values: Array) -> Array:
+    """(k,): largest of the columns of (k, n), n at least 1."""
+    found = values[:, 0]
+    for column in values.T[1:]:
+        found = np.maximum(found, column)
+    return np.asarray(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +190,7 @@ class RayTree:
     ----------
     light : SurfaceLight
         On the surfaces of the scene.
-    caster : Caster
+    caster : ExactRayCaster
         Of the objects of the scene.
     aspect : float
         Width of the picture divided by its height.
@@ -203,7 +207,7 @@ class RayTree:
     def __init__(
         self,
         light: SurfaceLight,
-        caster: Caster,
+        caster: ExactRayCaster,
         aspect: float,
         depth: int,
         forks: int,
@@ -214,10 +218,8 @@ class RayTree:
         self.light, self.scene, self.caster, self.depth, self.forks = light, scene, caster, depth, forks
         self.diffused, self.pixel = diffused, pixel
         self.surroundings = Surroundings(scene, aspect)
-        dispersed = any(body.surface is not None and body.surface.dispersion > 0 for body in scene.bodies)
-        self._channels = [
-            Optics(scene, light.paths.sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))
-        ]
+        self.table = InterfaceTable(scene, light.paths.sheets)
+        self._channels = (0, 1, 2) if self.table.dispersed else (1,)
 
     def see(self, rays: Rays, hits: Sequence[Hits], pixel: Integers, spread: Spread | None) -> TracedLight:
         """Trace rays of the camera.
@@ -233,9 +235,9 @@ class RayTree:
             For the microfacets of rough interfaces. Without it all that they do is to blur the environment.
         """
         found = TracedLight(np.zeros((len(rays), 3)), np.ones(len(rays), dtype=bool))
-        for channel, own in enumerate(self._channels):
+        for channel in self._channels:
             carried = np.eye(3)[channel] if len(self._channels) > 1 else np.ones(3)
-            _Growth(self, own, found, rays.backdrop, pixel, spread).grow(rays, hits, carried)
+            _Growth(self, channel, found, rays.backdrop, pixel, spread).grow(rays, hits, carried)
         return found
 
 
@@ -243,23 +245,17 @@ class _Growth:
     """Growth of a ray tree, for light with the same indices of refraction."""
 
     def __init__(
-        self, tree: RayTree, own: Optics, found: TracedLight, backdrop: Array, pixel: Integers, spread: Spread | None
+        self, tree: RayTree, channel: int, found: TracedLight, backdrop: Array, pixel: Integers, spread: Spread | None
     ) -> None:
-        self.tree, self.own, self.found = tree, own, found
+        self.tree, self.table, self.channel, self.found = tree, tree.table, channel, found
         self.backdrop, self.pixel, self.spread = backdrop, pixel, spread
         self.scene, self.caster = tree.scene, tree.caster
-        self.media = InteriorMedia(tree.scene, own)
-        self.segments = SegmentMedia(tree.scene, own, self.media, tree.light)
-        self.interfaces, self.light = Interfaces(tree.caster, own), InterfaceLight(own, tree.light)
+        self.media = InteriorMedia(self.table)
+        self.segments, self.light = SegmentMedia(self.media, tree.light), InterfaceLight(self.table, tree.light)
         self.shift = tree.scene.camera.eye - tree.caster.center
-        # One entry more, at index -1, for nothing.
-        kinds = np.zeros((3, len(tree.scene.objects) + 1), dtype=bool)
-        kinds[0, own.solids] = kinds[1, own.walls] = True
-        kinds[2, [i for i, body in enumerate(tree.scene.objects) if body.medium is None]] = True
-        self.is_solid, self.is_wall, self.is_opaque = kinds
-        self.is_open = self.is_solid.copy()
-        self.is_open[own.solids] = [not tree.scene.objects[i].mesh.diagnosis.solid for i in own.solids]
-        self.is_film = np.append(~kinds[:, :-1].any(axis=0), False)
+        self.is_open = self.table.is_solid.copy()
+        for i in np.flatnonzero(self.is_open).tolist():
+            self.is_open[i] = not tree.scene.objects[i].mesh.diagnosis.solid
 
     def grow(self, rays: Rays, hits: Sequence[Hits], carried: Array) -> None:
         """Follow rays of the camera along their branches; each starts with the light `carried` (3,)."""
@@ -280,9 +276,6 @@ class _Growth:
             self._pixel_footprints(rays.directions),
             np.zeros((count, 3)),
         )
-        # The eye may be far away, where float32 is coarse.
-        start = np.maximum(-dot(origins, rays.directions) - BEFORE, 0.0)
-        branches = self._step(branches, start)
         while len(branches):
             branches = self._step(branches)
 
@@ -295,7 +288,7 @@ class _Growth:
     def _records(self, hits: Sequence[Hits], count: int) -> InteriorList:
         """Interior lists of rays at their origins, from all surfaces behind them."""
         interior = empty_interior_lists(count)
-        behind = [(i, hits[i].where(hits[i].distance < 0)) for i in self.own.solids]
+        behind = [(i, hits[i].where(hits[i].distance < 0)) for i in np.flatnonzero(self.table.is_solid).tolist()]
         pixel, distance, sign, item = (
             np.concatenate([np.empty(0, np.int64), *parts])
             for parts in (
@@ -319,10 +312,10 @@ class _Growth:
         self.found.valid[owner[on[enter(interior, ray[on], item[on])]]] = False
         self.found.valid[owner[off[leave(interior, ray[off], item[off])]]] = False
 
-    def _step(self, branches: Branches, start: Array | None = None) -> Branches:
+    def _step(self, branches: Branches) -> Branches:
         """Follow branches to the next surfaces; what continues from there."""
         end_if_stopped()
-        face, distance = self.caster.nearest(branches.origins, branches.directions, branches.last, start)
+        face, distance = self.caster.nearest(branches.origins, branches.directions, branches.last)
         self._correct(branches, face, distance)
         place = -largest(-distance)
         free = np.isinf(place)
@@ -343,7 +336,7 @@ class _Growth:
         for own, at in zip(face.T, distance.T, strict=True):
             ray = np.flatnonzero((own >= 0) & (at <= place + TOGETHER))
             item = self.caster.faces.item[own[ray]]
-            leaves = self.is_solid[item] & ~self._enters(own[ray], branches.directions[ray])
+            leaves = self.table.is_solid[item] & ~self._enters(own[ray], branches.directions[ray])
             doubt[ray[leaves & ~has(branches.interior[ray], item)]] = True
         some = np.flatnonzero(doubt)
         if some.size:
@@ -388,7 +381,7 @@ class _Growth:
         """Cross the surfaces that branches, with their origins there, have come to; what continues from there."""
         item = np.where(branches.last >= 0, self.caster.faces.item[branches.last], NOTHING)
         branches = self._through_films(branches, item)
-        opaque = self.is_opaque[item]
+        opaque = self.table.is_opaque[item]
         stopped = np.asarray(opaque.any(axis=1))
         if stopped.any():
             # Whether a ray is rightly in an open body, what is behind the opaque object would tell.
@@ -398,18 +391,13 @@ class _Growth:
             branches, item = branches.where(~stopped), item[~stopped]
         before, interior = self.media.effective(branches.interior), branches.interior.copy()
         for own, face in zip(item.T, branches.last.T, strict=True):
-            ray = np.flatnonzero(self.is_solid[own])
+            ray = np.flatnonzero(self.table.is_solid[own])
             entering = self._enters(face[ray], branches.directions[ray])
             self._cross(interior, ray, own[ray].astype(np.int16), entering, branches.owner[ray])
         after = self.media.effective(interior)
-        changed = self.own.matters(before, after) | (before != after) & self.tree.diffused.leaves(before, after)
-        wall = self.is_wall[item]
-        # With a wall of a body at the same place, the wall goes first.
-        sheet = ~changed & wall.any(axis=1)
-        # The interface is that of the body that is entered; where the ray only leaves one, of that.
-        entered = (item == after[:, None]) & (item != NOTHING)
-        column = np.where(entered.any(axis=1), entered.argmax(axis=1), (item == before[:, None]).argmax(axis=1))
-        column = np.where(sheet, wall.argmax(axis=1), column)
+        changed = self.table.alters_light(before, after, self.channel)
+        changed |= (before != after) & self.tree.diffused.leaves(before, after)
+        column, sheet = self.table.interfaces(item, before, after, changed, self.table.is_wall)
         met = np.flatnonzero(changed | sheet)
         places = InterfaceHits(
             item[met, column[met]], branches.last[met, column[met]], before[met], np.where(sheet, before, after)[met]
@@ -420,8 +408,8 @@ class _Growth:
 
     def _through_films(self, branches: Branches, item: Integers) -> Branches:
         """Dim branches by sheets without an interface, and add what these emit or show."""
-        for column in np.flatnonzero(self.is_film[item].any(axis=0)):
-            chosen = np.flatnonzero(self.is_film[item[:, column]])
+        for column in np.flatnonzero(self.table.is_film[item].any(axis=0)):
+            chosen = np.flatnonzero(self.table.is_film[item[:, column]])
             own = branches.where(chosen)
             face, ray = own.last[:, column], np.arange(len(own))
             sign = np.where(self._enters(face, own.directions), 1, -1).astype(np.int8)
@@ -437,16 +425,17 @@ class _Growth:
 
     def _branches(self, branches: Branches, there: InteriorList, places: InterfaceHits) -> list[Branches]:
         """Branches that are followed from interfaces; `there` are the interior lists behind these."""
-        met = self.interfaces.interact(branches, places, self.pixel[branches.owner], self.spread)
-        self._add(branches, self.light.radiance(self._rays(branches), met))
-        self._add_coats(branches, met)
+        pixel = self.pixel[branches.owner]
+        found = interact(self.table, self.channel, self.caster, branches, places, pixel, self.spread)
+        self._add(branches, self.light.radiance(self._rays(branches), found))
+        self._add_coats(branches, found)
         branches = replace(branches, met=branches.met + 1)
-        back, on = self._both(branches, there, met, places.before == places.after)
+        back, on = self._both(branches, there, found)
         if branches.footprint.size:
-            ways = parted(self.caster, branches, places, met)
+            ways = parted(self.caster, branches, places, found)
             back, on = (replace(branch, footprint=way) for branch, way in zip((back, on), ways, strict=True))
         if self.tree.diffused:
-            back, on = (self._from_inside(branch, met.normals) for branch in (back, on))
+            back, on = (self._from_inside(branch, found.at.normal) for branch in (back, on))
         brightness = largest(back.throughput), largest(on.throughput)
         is_back, is_on = (bright > 0.0 for bright in brightness)
         stronger = back.throughput @ LUMINANCE > on.throughput @ LUMINANCE
@@ -469,25 +458,23 @@ class _Growth:
         body = self.media.effective(branches.interior)
         return replace(branches, diffused=self.tree.diffused.radiance(body, points, branches.directions, normals))
 
-    def _add_coats(self, branches: Branches, met: InterfaceInteractions) -> None:
+    def _add_coats(self, branches: Branches, found: BranchInteractions) -> None:
         """Add the environment as clear coats mirror it that are not as rough as what is below."""
-        coated = np.flatnonzero(met.coated)
+        coated = np.flatnonzero(found.coated)
         if coated.size:
             own = branches.where(coated)
-            ways = reflected_direction(own.directions, met.normals[coated])
-            mirrored = self.tree.surroundings.blurred(own, ways, met.coat_roughness[coated])
-            self._add(own, met.coated[coated, None] * mirrored)
+            ways = reflected_direction(own.directions, found.at.normal[coated])
+            mirrored = self.tree.surroundings.blurred(own, ways, found.coat_roughness[coated])
+            self._add(own, found.coated[coated, None] * mirrored)
 
-    def _both(
-        self, branches: Branches, there: InteriorList, met: InterfaceInteractions, sheet: Mask
-    ) -> tuple[Branches, Branches]:
+    def _both(self, branches: Branches, there: InteriorList, found: BranchInteractions) -> tuple[Branches, Branches]:
         """Reflected and refracted branches at interfaces, those of sheets included; some carry no light."""
         with np.errstate(under="ignore"):
-            back, on = branches.throughput * met.reflectance, branches.throughput * met.passing
-        ways = met.reflected.copy()
+            back, on = branches.throughput * found.reflectance, branches.throughput * found.passing
+        ways = found.reflected.copy()
         # A path that ends under total reflection is taken to leave straight on: of all that it might see, this is
         # nearest to the truth.
-        trapped = (branches.met >= self.tree.depth) & (largest(met.passed) == 0.0) & ~sheet
+        trapped = (branches.met >= self.tree.depth) & (largest(found.transmittance) == 0.0) & ~found.at.thin_walled
         ways[trapped] = branches.directions[trapped]
         mirrored = np.ones(len(branches), dtype=bool)
         reflected = replace(
@@ -495,14 +482,14 @@ class _Growth:
             directions=unit(ways),
             throughput=back,
             reflected=mirrored,
-            blur=branches.blur + met.blur_reflected,
+            blur=branches.blur + found.blur_reflected,
         )
         refracted = replace(
             branches,
-            directions=unit(met.refracted),
+            directions=unit(found.refracted),
             throughput=on,
-            interior=np.where(sheet[:, None], branches.interior, there),
-            blur=branches.blur + met.blur_refracted,
+            interior=np.where(found.at.thin_walled[:, None], branches.interior, there),
+            blur=branches.blur + found.blur_refracted,
         )
         return reflected, refracted
 

@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Integers
-from translucent.cpu.caster import Caster
-from translucent.cpu.hits import TracedMesh, Tracer
+from translucent.cpu.hits import ExactRayCaster, TracedMesh, Tracer
 from translucent.cpu.interactions import Spread
 from translucent.cpu.picture import Band, Picture
 from translucent.cpu.ray_tree import DiffusedLight, RayTree
@@ -25,8 +24,8 @@ from translucent.errors import RenderError
 from translucent.files.reading import require_allowed
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
-from translucent.geometry.embree import EmbreeMesh, embree_versions
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.ray_caster import RayCaster, embree_versions
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.reference.hits import Hits
 from translucent.reference.rays import Rays
@@ -53,7 +52,12 @@ class BentLight:
 
     @classmethod
     def of(
-        cls, shader: Shader, caster: Caster, size: tuple[int, int], tree: tuple[int, int], diffused: DiffusedLight
+        cls,
+        shader: Shader,
+        caster: ExactRayCaster,
+        size: tuple[int, int],
+        tree: tuple[int, int],
+        diffused: DiffusedLight,
     ) -> BentLight:
         """Light for pictures of this size; `caster` has the objects of the shader's scene.
 
@@ -117,7 +121,7 @@ class CpuRenderer:
         self._threads = threads or processors()
         self._embree = embree_versions()
         self._meshes: WeakKeyDictionary[Mesh, TracedMesh] = WeakKeyDictionary()
-        self._caster: tuple[_Shapes, Caster] | None = None
+        self._caster: tuple[_Shapes, ExactRayCaster] | None = None
         self._fields = FieldCache()
         self._closed = False
 
@@ -188,7 +192,7 @@ class CpuRenderer:
         self._fields.clear()
         self._caster = None
 
-    def _embree_meshes(self, scene: Scene) -> dict[Mesh, EmbreeMesh]:
+    def _embree_meshes(self, scene: Scene) -> dict[Mesh, RayCaster]:
         """All meshes of a scene, ready for rays; they are kept as long as the meshes are."""
         for body in scene.objects:
             if body.mesh not in self._meshes:
@@ -202,7 +206,7 @@ class CpuRenderer:
             return None
         shapes = tuple((body.mesh, body.matrix.tobytes()) for body in scene.objects)
         if self._caster is None or self._caster[0] != shapes:
-            self._caster = shapes, Caster(scene.objects, scene.bounds)
+            self._caster = shapes, ExactRayCaster(scene.objects)
         diffused = DiffusedLight(self._fields.of(plan).surfaces)
         return BentLight.of(shader, self._caster[1], picture.size, plan.interfaces.tree, diffused)
 

@@ -13,8 +13,8 @@ from translucent.arrays import Integers
 from translucent.cpu.caustics import CausticLight
 from translucent.cpu.hits import slices
 from translucent.cpu.light_paths import EmbreeLightPaths
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.ray_caster import RayCaster
 from translucent.planning.assembly import FALLBACK_SHEET
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
@@ -53,7 +53,7 @@ class Shader:
     light: SurfaceLight
 
     @classmethod
-    def of(cls, scene: Scene, plan: RenderPlan, meshes: Mapping[Mesh, EmbreeMesh]) -> Shader:
+    def of(cls, scene: Scene, plan: RenderPlan, meshes: Mapping[Mesh, RayCaster]) -> Shader:
         """Shader for a plan of the scene; `meshes` are all of it, ready for rays."""
         sheets = sheet_thicknesses(scene, plan.method)
         drawn = {i for step in plan.passes if step.name is PassName.THIN_LAYER_FALLBACK for i in step.objects}

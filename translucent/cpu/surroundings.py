@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from translucent.arrays import Array, Integers
-from translucent.cpu.caster import Caster, dot
-from translucent.cpu.interactions import InterfaceHits, InterfaceInteractions
+from translucent.cpu.interactions import BranchInteractions, InterfaceHits
 from translucent.cpu.interior_list import Branches
 from translucent.formulas.footprint import ALPHA_OF_DEVIATION, FOOTPRINT_STEP, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
+from translucent.geometry.ray_caster import SceneRayCaster, dot
 from translucent.reference.rays import Rays
 from translucent.reference.refracted import places_on_backdrop
 from translucent.scene.camera import Camera
@@ -45,15 +45,15 @@ def moved_on(footprints: Array, path: Array) -> Array:
 
 
 def parted(
-    caster: Caster, branches: Branches, places: InterfaceHits, met: InterfaceInteractions
+    caster: SceneRayCaster, branches: Branches, places: InterfaceHits, found: BranchInteractions
 ) -> tuple[Array, Array]:
     """Footprints of the reflected and the refracted branches at interfaces."""
-    directions, normals, incident = branches.directions, met.normals, branches.footprint[:, 1]
+    directions, normals, incident = branches.directions, found.at.normal, branches.footprint[:, 1]
     points = onto_planes(branches.footprint[:, 0], directions, caster.faces.outward[places.face])
     turns = normal_differentials(caster, places.face, branches.origins, points, normals)
     mirrored = reflected_differentials(incident, turns, directions, normals)
-    refracted = refracted_differentials(incident, turns, directions, normals, met.ior)
-    refracted = np.where((places.before == places.after)[:, None, None], incident, refracted)
+    refracted = refracted_differentials(incident, turns, directions, normals, found.at.ior)
+    refracted = np.where(found.at.thin_walled[:, None, None], incident, refracted)
     return np.stack([points, mirrored], axis=1), np.stack([points, refracted], axis=1)
 
 
@@ -64,7 +64,9 @@ def onto_planes(points: Array, directions: Array, flat: Array) -> Array:
     return np.asarray(points - _outer(directions, _along(points, flat) / least[:, None]))
 
 
-def normal_differentials(caster: Caster, face: Integers, origins: Array, points: Array, normals: Array) -> Array:
+def normal_differentials(
+    caster: SceneRayCaster, face: Integers, origins: Array, points: Array, normals: Array
+) -> Array:
     """Differentials of smooth normals (k, 3), which are turned as these are, at places on faces."""
     corners = caster.smooth[face].astype(np.float64)
     weights = caster.barycentric(face, origins)

@@ -20,7 +20,7 @@ from translucent.diffusion.keys import (
 )
 from translucent.diffusion.photon_fluence import EnteringPhotons, FineCells, bent_light
 from translucent.diffusion.volume import DiffusingVolume, PhotonLight, VolumeField, VolumeGrid
-from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
 from translucent.planning.caustics import opaque_to_shadows
 from translucent.planning.render_plan import RenderPlan
@@ -68,7 +68,7 @@ class FieldCache:
     def __init__(self, *, warm_starts: bool = False) -> None:
         self._warm_starts = warm_starts
         self._lock = Lock()
-        self._opaque: OrderedDict[Hashable, EmbreeMesh | None] = OrderedDict()
+        self._opaque: OrderedDict[Hashable, RayCaster | None] = OrderedDict()
         self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
         self._diffusing: OrderedDict[Hashable, DiffusingBody] = OrderedDict()
         self._grids: OrderedDict[Hashable, VolumeGrid] = OrderedDict()
@@ -126,7 +126,7 @@ class FieldCache:
                 store.clear()
 
     def _body(
-        self, body: Object, medium: Medium, places: Hashable, opaque: EmbreeMesh | None, diffusion: Diffusion
+        self, body: Object, medium: Medium, places: Hashable, opaque: RayCaster | None, diffusion: Diffusion
     ) -> DiffusingBody:
         step, roughness = diffusion.cell_size(body), roughness_of(body)
         place = place_of(body), body.density, places, step
@@ -170,7 +170,7 @@ class _Bent:
 
     volumes: dict[int, PhotonLight]
     entering: dict[int, EnteringPhotons]
-    stops: dict[int, EmbreeMesh | None]
+    stops: dict[int, RayCaster | None]
 
 
 def _kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T], most: int) -> _T:

@@ -11,19 +11,19 @@ from scipy import sparse
 from translucent.arrays import Array, Mask
 from translucent.diffusion.keys import may_dim
 from translucent.formulas import optics
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.ray_caster import RayCaster
 from translucent.scene.scene import Object, Scene
 
 #: Faces of one body on a line that are looked for.
 MOST_FACES = 64
 
-_EMBREE: WeakKeyDictionary[Mesh, EmbreeMesh] = WeakKeyDictionary()
+_CASTERS: WeakKeyDictionary[Mesh, RayCaster] = WeakKeyDictionary()
 
 
-def embree_mesh(mesh: Mesh) -> EmbreeMesh:
-    """The mesh ready for rays, kept as long as it is."""
-    return _EMBREE.get(mesh) or _EMBREE.setdefault(mesh, EmbreeMesh(mesh))
+def ray_caster(mesh: Mesh) -> RayCaster:
+    """Ray caster of a mesh, kept as long as the mesh is."""
+    return _CASTERS.get(mesh) or _CASTERS.setdefault(mesh, RayCaster(mesh))
 
 
 def dimming_bodies(scene: Scene, body: int) -> list[Object]:
@@ -67,12 +67,12 @@ def _bounding_ball(body: Object) -> tuple[Array, float]:
 def path_inside(body: Object, points: Array, directions: Array, distance: Array) -> Array:
     """(k,): metres inside a body on ways, from where faces are crossed: exits are ahead of every start inside."""
     mesh = body.mesh
-    embree = embree_mesh(mesh)
+    caster = ray_caster(mesh)
     into = np.linalg.inv(body.matrix[:3, :3])
     origins, ways = (points - body.matrix[:3, 3]) @ into.T, directions @ into.T
     unit = ways / np.linalg.norm(ways, axis=1, keepdims=True)
-    line, face = embree.candidates(
-        (origins - embree.center) / embree.radius,
+    line, face = caster.candidates(
+        (origins - caster.center) / caster.radius,
         unit,
         np.full(len(points), MOST_FACES),
         np.ones(len(mesh.faces), dtype=bool),

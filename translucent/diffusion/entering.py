@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -12,15 +12,15 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Integers, Mask
-from translucent.diffusion.dimming import light_passed
+from translucent.diffusion.dimming import light_passed, ray_caster
 from translucent.diffusion.first_events import Beam
 from translucent.diffusion.grid import BodyGrid, other_plane_points
 from translucent.diffusion.photon_fluence import EnteringPhotons
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
 from translucent.formulas.interface import refracted_direction
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh, Triangles, joined
+from translucent.geometry.ray_caster import RayCaster
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import row_solid_angles, texel_directions
 from translucent.scene.lights import PositionalLight
@@ -57,27 +57,24 @@ class Casters:
     ----------
     body : Object
         Itself.
-    opaque : EmbreeMesh, optional
+    opaque : RayCaster, optional
         See `opaque_surfaces`.
     """
 
     body: Object
-    opaque: EmbreeMesh | None = None
-
-    @cached_property
-    def _mesh(self) -> EmbreeMesh:
-        return EmbreeMesh(self.body.mesh)
+    opaque: RayCaster | None = None
 
     def nearest(self, origins: Array, directions: Array) -> tuple[Array, Array]:
         """Distance in metres at which rays (k, 3), (k, 3) meet the body, and at which anything opaque; inf for none."""
         into = np.linalg.inv(self.body.matrix)
-        own = _nearest(self._mesh, origins @ into[:3, :3].T + into[:3, 3], directions @ into[:3, :3].T)
+        rays = origins @ into[:3, :3].T + into[:3, 3], directions @ into[:3, :3].T
+        own = ray_caster(self.body.mesh).nearest(*rays)[1]
         if self.opaque is None:
             return own, np.full(len(origins), np.inf)
-        return own, _nearest(self.opaque, origins, directions)
+        return own, self.opaque.nearest(origins, directions)[1]
 
 
-def opaque_surfaces(objects: Sequence[Object]) -> EmbreeMesh | None:
+def opaque_surfaces(objects: Sequence[Object]) -> RayCaster | None:
     """All opaque objects of a scene as one mesh in world coordinates, ready for rays; None if there are none."""
     parts: list[Triangles] = [
         (item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3], item.mesh.faces, None)
@@ -87,7 +84,7 @@ def opaque_surfaces(objects: Sequence[Object]) -> EmbreeMesh | None:
     if not parts:
         return None
     vertices, faces, _ = joined(parts, "opaque objects")
-    return EmbreeMesh(Mesh(vertices, faces))
+    return RayCaster(Mesh(vertices, faces))
 
 
 def flux_of(photons: EnteringPhotons, grid: BodyGrid) -> Array:
@@ -98,13 +95,6 @@ def flux_of(photons: EnteringPhotons, grid: BodyGrid) -> Array:
         for channel in range(3):
             flux[:, channel] = np.bincount(sample, photons.power[:, channel], len(flux)) / grid.area
     return flux
-
-
-def _nearest(mesh: EmbreeMesh, origins: Array, directions: Array) -> Array:
-    """(k,): how often the direction has to be gone until a mesh is met, in its coordinates; inf for never."""
-    length = np.linalg.norm(directions, axis=1, keepdims=True)
-    face, distance = mesh.first_hits((origins - mesh.center) / mesh.radius, directions / length)
-    return np.where(face >= 0, distance * mesh.radius / length[:, 0], np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +256,7 @@ def from_light(
     ior: float,
     interface: DiffuseInterface,
     dimming: Sequence[Object] = (),
-    stops: EmbreeMesh | None = None,
+    stops: RayCaster | None = None,
 ) -> Beam:
     """Light of a lamp or a sun that enters at the samples, as far as nothing is in its way, and other bodies let it.
 
@@ -286,7 +276,7 @@ def from_light(
     start = grid.points[lit] + BEFORE * grid.cells.step * grid.face_normals[lit]
     nearest = np.minimum(*casters.nearest(start, direction[lit]))
     if stops is not None:
-        nearest = np.minimum(nearest, _nearest(stops, start, direction[lit]))
+        nearest = np.minimum(nearest, stops.nearest(start, direction[lit])[1])
     free = nearest >= distance[lit]
     lit, start = lit[free], start[free]
     towards, normals = direction[lit], grid.normals[lit]

@@ -35,8 +35,8 @@ from translucent.diffusion.solution import BodySystem, SurfaceLight
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_cosine, emergent_fluxes
 from translucent.formulas.diffusion import emergent_radiance, haze_shares
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Object, Scene
@@ -222,7 +222,7 @@ class LitBody:
         return self._entrances[ior, roughness]
 
 
-def lit_body(body: Object, opaque: EmbreeMesh | None, step: float) -> LitBody:
+def lit_body(body: Object, opaque: RayCaster | None, step: float) -> LitBody:
     """Geometry of a body with cells of this side, shadowed by itself and by `opaque_surfaces`."""
     grid = body_grid(body, step)
     casters = Casters(body, opaque)
@@ -255,7 +255,7 @@ class DiffusingBody:
 
     @np.errstate(under="ignore")
     def field(
-        self, scene: Scene, body: int, photons: EnteringPhotons | None = None, stops: EmbreeMesh | None = None
+        self, scene: Scene, body: int, photons: EnteringPhotons | None = None, stops: RayCaster | None = None
     ) -> DiffusionField:
         """Light that the body gives back in a scene, of which it has this number, for its environment and lights.
 

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Integers, Mask
-from translucent.diffusion.dimming import embree_mesh
+from translucent.diffusion.dimming import ray_caster
 from translucent.formulas import optics
 from translucent.geometry.normals import corner_normals
 from translucent.geometry.voxels import Voxels, voxels
@@ -97,14 +97,13 @@ class BodyGrid:
         """(w, s, 3), (w, s): `ways` below each sample, and metres to where they leave the body."""
         if ior not in self._crossings:
             start = self.points - START * self.cells.step * self.face_normals
-            into, embree = np.linalg.inv(self.body.matrix), embree_mesh(self.body.mesh)
-            origins = (start @ into[:3, :3].T + into[:3, 3] - embree.center) / embree.radius
+            into, caster = np.linalg.inv(self.body.matrix), ray_caster(self.body.mesh)
+            origins = start @ into[:3, :3].T + into[:3, 3]
             ways = np.stack([self.ways(ior, number) for number in range(WAYS)])
             metres = np.zeros(ways.shape[:2])
             for number, way in enumerate(ways @ into[:3, :3].T):
-                length = np.linalg.norm(way, axis=1)
-                face, distance = embree.first_hits(origins, way / length[:, None])
-                metres[number] = np.where(face >= 0, distance * embree.radius / length, 0.0)
+                face, distance = caster.nearest(origins, way)
+                metres[number] = np.where(face >= 0, distance, 0.0)
             self._crossings.clear()
             self._crossings[ior] = ways, metres
         return self._crossings[ior]

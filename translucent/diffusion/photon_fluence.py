@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from translucent.arrays import Array, Integers
-from translucent.diffusion.photon_flights import Flights, photon_flights
+from translucent.diffusion.photons import PhotonSegments, photon_segments
 from translucent.formulas import optics
 from translucent.planning.caustics import Caustics
 from translucent.scene.scene import Scene
@@ -101,10 +101,10 @@ class BentLight:
 def bent_light(scene: Scene, caustics: Caustics, grids: Mapping[int, FineCells], bodies: Sequence[int]) -> BentLight:
     """Light that interfaces of a scene turn into these cells of objects, and through the interfaces of bodies."""
     sums = {body: np.zeros((int(np.prod(cells.shape)), 3)) for body, cells in grids.items()}
-    parts: dict[int, list[Flights]] = {body: [] for body in bodies}
+    parts: dict[int, list[PhotonSegments]] = {body: [] for body in bodies}
     rng = np.random.default_rng((caustics.seed, len(grids)))
-    for flights in photon_flights(scene, caustics.in_media, caustics.seed):
-        turned = flights.where(flights.bent)
+    for segments in photon_segments(scene, caustics.in_media, caustics.seed):
+        turned = segments.where(segments.bent)
         for body, cells in grids.items():
             _add(sums[body], turned.where(turned.filling[:, body] > 0.0), body, cells, rng)
         for body, found in parts.items():
@@ -113,7 +113,7 @@ def bent_light(scene: Scene, caustics: Caustics, grids: Mapping[int, FineCells],
     return BentLight(fluence, {body: _entering(found) for body, found in parts.items()})
 
 
-def _entering(parts: list[Flights]) -> EnteringPhotons:
+def _entering(parts: list[PhotonSegments]) -> EnteringPhotons:
     none = np.zeros((0, 3))
     return EnteringPhotons(
         np.concatenate([none, *(part.origins for part in parts)]),
@@ -121,10 +121,10 @@ def _entering(parts: list[Flights]) -> EnteringPhotons:
     )
 
 
-def _add(sums: Array, flights: Flights, body: int, cells: FineCells, rng: np.random.Generator) -> None:
-    """Add power times length of flights in a body to its cells (n, 3)."""
-    first = np.where(flights.before[:, body] == 0.0, BEYOND * cells.step, 0.0)
-    last = flights.length + np.where(flights.after[:, body] == 0.0, BEYOND * cells.step, 0.0)
+def _add(sums: Array, segments: PhotonSegments, body: int, cells: FineCells, rng: np.random.Generator) -> None:
+    """Add power times length of segments in a body to its cells (n, 3)."""
+    first = np.where(segments.before[:, body] == 0.0, BEYOND * cells.step, 0.0)
+    last = segments.length + np.where(segments.after[:, body] == 0.0, BEYOND * cells.step, 0.0)
     length = first + last
     parts = np.ceil(length / (PART * cells.step)).astype(np.int64)
     ends = np.cumsum(parts)
@@ -134,13 +134,13 @@ def _add(sums: Array, flights: Flights, body: int, cells: FineCells, rng: np.ran
         end = max(int(np.searchsorted(ends, done + _TOGETHER, side="right")), begin + 1)
         own = np.repeat(np.arange(begin, end), parts[begin:end])
         number = np.arange(len(own)) - np.repeat(ends[begin:end] - parts[begin:end] - done, parts[begin:end])
-        _add_parts(sums, flights, cells, own, number, first, length / parts, rng)
+        _add_parts(sums, segments, cells, own, number, first, length / parts, rng)
         begin = end
 
 
 def _add_parts(
     sums: Array,
-    flights: Flights,
+    segments: PhotonSegments,
     cells: FineCells,
     own: Integers,
     number: Integers,
@@ -148,19 +148,19 @@ def _add_parts(
     size: Array,
     rng: np.random.Generator,
 ) -> None:
-    """Add parts of flights, with these numbers and sizes in metres, the first of which begin so far behind.
+    """Add parts of segments, with these numbers and sizes in metres, the first of which begin so far behind.
 
     Each counts in the cell of a random place on it, and with the light that is there.
     """
     along = (number + rng.random(len(own))) * size[own] - first[own]
-    points = flights.origins[own] + along[:, None] * flights.directions[own]
+    points = segments.origins[own] + along[:, None] * segments.directions[own]
     place = np.floor((points - cells.low) / cells.step).astype(np.int64)
     inside = ((place >= 0) & (place < cells.shape)).all(axis=1)
     own, along, place = own[inside], along[inside], place[inside]
     at = np.ravel_multi_index(tuple(place.T), cells.shape)
     with np.errstate(under="ignore"):
         # Behind the surface where it begins there is as much light as at it.
-        left = optics.transmittance(flights.extinction[own] * np.maximum(along, 0.0)[:, None])
-        weight = flights.power[own] * left * size[own, None]
+        left = optics.transmittance(segments.extinction[own] * np.maximum(along, 0.0)[:, None])
+        weight = segments.power[own] * left * size[own, None]
     for channel in range(3):
         sums[:, channel] += np.bincount(at, weight[:, channel], len(sums))

@@ -24,7 +24,7 @@ from translucent.diffusion.sweeps import condensed, swept
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffusion_coefficient
 from translucent.formulas.light import cone_attenuation
-from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight, SpotLight
 from translucent.scene.scene import Object, Scene
@@ -89,13 +89,13 @@ class PhotonLight:
         Which divide those of a `VolumeGrid`.
     fluence : (x, y, z, 3) float64
         See `BentLight`.
-    stops : EmbreeMesh, optional
+    stops : RayCaster, optional
         These bodies.
     """
 
     cells: FineCells
     fluence: Array
-    stops: EmbreeMesh | None
+    stops: RayCaster | None
 
 
 class VolumeGrid:
@@ -275,7 +275,7 @@ def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: flo
 
 
 def _from_lights(
-    volume: VolumeGrid, density: Array, scene: Scene, medium: Medium, stops: EmbreeMesh | None = None
+    volume: VolumeGrid, density: Array, scene: Scene, medium: Medium, stops: RayCaster | None = None
 ) -> tuple[Array, Array]:
     """(x, y, z, 3) twice: fluence of lights that nothing has turned aside, and of that what was scattered ahead.
 
@@ -317,12 +317,9 @@ def _from_lights(
     return unturned, ahead
 
 
-def _in_the_way(stops: EmbreeMesh, points: Array, places: Array) -> npt.NDArray[np.bool_]:
+def _in_the_way(stops: RayCaster, points: Array, places: Array) -> npt.NDArray[np.bool_]:
     """(k,): whether surfaces are between points (k, 3) and places (k, 3)."""
-    way = places - points
-    distance = np.maximum(np.linalg.norm(way, axis=1), np.finfo(np.float64).tiny)
-    face, found = stops.first_hits((points - stops.center) / stops.radius, way / distance[:, None])
-    return np.asarray((face >= 0) & (found * stops.radius < distance))
+    return np.asarray(stops.nearest(points, places - points)[1] < 1.0)
 
 
 def _mean_shares(light: SpotLight, points: Array, step: float) -> Array:

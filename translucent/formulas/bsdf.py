@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Mask
+from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import interface, optics
 from translucent.formulas.thin_film import film_slab_reflectance, film_slab_transmittance, thin_film_reflectance
 
@@ -57,27 +57,6 @@ def filmed_reflectance(
     return found
 
 
-def smooth_lobes(reflectance: Array) -> Lobes:
-    """Lobes of a smooth interface."""
-    return Lobes(reflectance, 1.0 - reflectance)
-
-
-@np.errstate(over="ignore", under="ignore")
-def thin_wall_lobes(front: Array, back: Array, optical_depth: Array) -> Lobes:
-    """Lobes of both sides of a thin wall at once, with all reflections between them.
-
-    Parameters
-    ----------
-    front : (..., 3)
-        Reflectance of the side towards the light.
-    back : (...)
-        Of the other side.
-    optical_depth : (..., 3)
-        Of one passage.
-    """
-    return Lobes(film_slab_reflectance(front, back, optical_depth), film_slab_transmittance(front, back, optical_depth))
-
-
 @np.errstate(over="ignore", under="ignore")
 def thin_wall_exitance(front: npt.ArrayLike, back: npt.ArrayLike, optical_depth: npt.ArrayLike) -> Array:
     """Fraction of what a thin wall emits that leaves through its front, as it goes back and forth in it, too."""
@@ -87,41 +66,101 @@ def thin_wall_exitance(front: npt.ArrayLike, back: npt.ArrayLike, optical_depth:
     return np.asarray((1.0 - front) / np.maximum(kept, 1e-300) * (1.0 + back * optics.transmittance(depth)))
 
 
+class Interaction(NamedTuple):
+    """Interactions of light with interfaces, one a row: their geometry, and the parameters of the bsdf.
+
+    Attributes
+    ----------
+    direction, normal, face_normal : (k, 3)
+        Of the light, for shading, and of the face.
+    ior, ior_before : (k,)
+        Index of refraction of the other side relative to this one, and of this one.
+    film : (k, 3)
+        See `filmed_reflectance`.
+    coat : (k,)
+        Fraction of the interface that has a clear coat on this side.
+    base : (k, 3)
+        Factor of the transmitted light: what the base lets pass, with its color where light enters.
+    thin_walled : (k,) bool
+    thickness : (k,)
+        Of thin walls, in metres.
+    extinction, emission : (k, 3)
+        Of thin walls, in 1/m and in radiance per metre.
+    """
+
+    direction: Array
+    normal: Array
+    face_normal: Array
+    ior: Array
+    ior_before: Array
+    film: Array
+    coat: Array
+    base: Array
+    thin_walled: Mask
+    thickness: Array
+    extinction: Array
+    emission: Array
+
+    def where(self, chosen: Integers) -> Interaction:
+        """Selection of interactions by indices."""
+        return Interaction._make(column[chosen] for column in self)
+
+    def cosine(self, facet: Array) -> Array:
+        """(k,): cosine of the light with normals (k, 3) of microfacets, 0 to 1."""
+        return np.asarray(np.clip(-np.einsum("ki,ki->k", facet, self.direction), 0.0, 1.0))
+
+    def lobes(self, bare: Array, cosine: Array) -> tuple[Lobes, Array]:
+        """Lobes of interfaces without their clear coats and bases, and the radiance (k, 3) that thin walls emit.
+
+        Parameters
+        ----------
+        bare : (k,)
+            Reflectance without films.
+        cosine : (k,)
+            With the normals of microfacets.
+        """
+        front = filmed_reflectance(bare, cosine, self.ior, self.film, self.ior_before)
+        lobes, emitted = Lobes(front, 1.0 - front), np.zeros(front.shape)
+        if not self.thin_walled.any():
+            return lobes, emitted
+        path = optics.thin_layer_thickness(self.thickness, cosine, self.ior)[:, None]
+        with np.errstate(over="ignore", under="ignore"):
+            depth = self.extinction * path
+            wall = film_slab_reflectance(front, bare, depth), film_slab_transmittance(front, bare, depth)
+            if (own := np.flatnonzero(self.thin_walled & self.emission.any(axis=1))).size:
+                leaving = thin_wall_exitance(front[own], bare[own], depth[own])
+                emitted[own] = leaving * optics.emitted_radiance(self.emission[own], self.extinction[own], path[own])
+        thin = self.thin_walled[:, None]
+        return Lobes(*(np.where(thin, both, one) for both, one in zip(wall, lobes, strict=True))), emitted
+
+    def coat_reflectance(self) -> Array:
+        """(k, 1): fraction of the light that clear coats reflect."""
+        return (self.coat * optics.fresnel_dielectric(self.cosine(self.normal), interface.CLEARCOAT_IOR))[:, None]
+
+    def reflected(self, facet: Array) -> Array:
+        """(k, 3): directions of light that microfacets with these normals (k, 3) reflect."""
+        return kept_on_side(interface.reflected_direction(self.direction, facet), self.face_normal)
+
+    def refracted(self, facet: Array) -> Array:
+        """(k, 3): directions of light that microfacets refract; straight on through thin walls."""
+        bent = kept_on_side(interface.refracted_direction(self.direction, facet, self.ior), -self.face_normal)
+        return np.where(self.thin_walled[:, None], self.direction, bent)
+
+
 def below_coat(lobes: Lobes, coat: Array) -> Lobes:
-    """What clear coats that reflect a fraction (..., 1) of the light leave of lobes, without their own reflection."""
+    """Lobes below clear coats that reflect a fraction (..., 1) of the light, without the reflection of the coats."""
     return Lobes((1.0 - coat) * lobes.reflection, (1.0 - coat) * lobes.transmission)
 
 
-def interface_lobes(
-    bare: Array, cosine: Array, ior: Array, film: Array, ior_before: Array, thin_walled: Mask, optical_depth: Array
-) -> tuple[Lobes, Array]:
-    """Lobes of interfaces that reflect `bare` (k,) without films, and the reflectance (k, 3) of their fronts alone.
-
-    Parameters
-    ----------
-    bare, cosine, ior, film, ior_before
-        See `filmed_reflectance`.
-    thin_walled : (k,) bool
-    optical_depth : (k, 3)
-        Of one passage through a thin wall.
-    """
-    front = filmed_reflectance(bare, cosine, ior, film, ior_before)
-    smooth = smooth_lobes(front)
-    if not thin_walled.any():
-        return smooth, front
-    wall, thin = thin_wall_lobes(front, bare, optical_depth), thin_walled[:, None]
-    return Lobes(*(np.where(thin, both, one) for both, one in zip(wall, smooth, strict=True))), front
-
-
 def sampled_branches(lobes: Lobes, throughput: Array, share: Array) -> tuple[Mask, Array]:
-    """Branches of light at interfaces, one each, as likely as the light that it carries.
+    """Sample one branch of light at each interface, as likely as the light that it carries.
 
     Parameters
     ----------
     lobes : Lobes
         (k, 3) each.
     throughput : (k, 3)
-        What of the light has come as far.
+        Fraction of the light that has come as far.
     share : (k,)
         Random numbers, 0 to 1.
 

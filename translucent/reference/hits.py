@@ -8,7 +8,6 @@ whatever vertices and edges it passes through.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -17,6 +16,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.ray_caster import point_from
 from translucent.scene.camera import Camera, check_size
 from translucent.scene.scene import Object
 
@@ -127,14 +127,8 @@ def world_normals(body: Object, face: Integers) -> Array:
 def camera_vertices(mesh: Mesh, matrix: Array, camera: Camera) -> Array:
     """(n, 3): vertices right of, above and in front of the eye, in metres."""
     # The mesh keeps its shape to the last digit wherever it is: only the one offset to the eye is large.
-    world = _rotate(matrix[:3, :3], mesh.vertices - mesh.center) + from_eye(mesh.center, matrix, camera)
+    world = _rotate(matrix[:3, :3], mesh.vertices - mesh.center) + point_from(mesh.center, matrix, camera.eye)
     return _rotate(np.stack([camera.right, camera.up, camera.forward]), world)
-
-
-def from_eye(point: Array, matrix: Array, camera: Camera) -> Array:
-    """(3,): a point of an object from the eye along world axes, in metres, rounded once."""
-    terms = np.column_stack([matrix[:3, :3] * point, matrix[:3, 3], -camera.eye])
-    return np.array([math.fsum(row) for row in terms])
 
 
 def _rotate(matrix: Array, vectors: Array) -> Array:

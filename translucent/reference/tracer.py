@@ -6,7 +6,6 @@ mesh is seen as in `translucent.reference.hits`, and the same exact edge functio
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
+from translucent.geometry.ray_caster import point_from
 from translucent.reference.hits import Hits, cross_triangles, sorted_hits
 from translucent.scene.scene import Object, Scene
 
@@ -173,7 +173,7 @@ class TracedObject:
         """Object relative to `eye` (3,)."""
         x, y, z = (body.mesh.vertices - body.mesh.center).T[:, :, None] * body.matrix[:3, :3].T[:, None]
         # The mesh keeps its shape to the last digit wherever it is: only the one offset to the eye is large.
-        corners = (x + y + z + center_from(body, eye))[body.mesh.faces]
+        corners = (x + y + z + point_from(body.mesh.center, body.matrix, eye))[body.mesh.faces]
         return cls(body, corners)
 
     @cached_property
@@ -194,12 +194,6 @@ class TracedObject:
             keep, *found = cross_triangles(seen, np.ones(seen.shape[:2]), np.zeros((len(seen), 2)), perspective=False)
             parts.append((line[keep], face[keep], *found))
         return sorted_hits(parts, -1 if self.body.faces_inwards else 1)
-
-
-def center_from(body: Object, eye: Array) -> Array:
-    """(3,): the center of an object's mesh in metres from `eye` (3,), rounded once."""
-    terms = np.column_stack([body.matrix[:3, :3] * body.mesh.center, body.matrix[:3, 3], -eye])
-    return np.array([math.fsum(row) for row in terms])
 
 
 class Tracer:

@@ -9,12 +9,12 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 from translucent.formulas.phase import ISOTROPIC
+from translucent.geometry.ray_caster import point_from
 from translucent.reference.intervals import Intervals
 from translucent.reference.phase import phase_value
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments, _pieces, scene_segments
 from translucent.reference.sheets import Crossings
-from translucent.reference.tracer import center_from
 from translucent.scene.scene import Scene
 
 
@@ -113,7 +113,7 @@ class _UnitBox:
         inverse = np.linalg.inv(body.matrix[:3, :3])
         # All of a flat mesh is in the middle of its box.
         self._linear = np.where(extent > 0, 1.0 / np.where(extent > 0, extent, 1.0), 0.0)[:, None] * inverse
-        self._center = center_from(body, scene.camera.eye)
+        self._center = point_from(body.mesh.center, body.matrix, scene.camera.eye)
 
     def positions(self, points: Array) -> Array:
         """(k, 3): coordinates of points (k, 3) in the box."""

@@ -1,0 +1,344 @@
+"""Paths of photons from the lights of a scene through its interfaces and media.
+
+The CPU's twin of ``shaders/transport/photons.frag``: the same aims and starts, and the same choices by chance. It
+yields each segment between two surfaces, and not only where photons land.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array, Integers, Mask
+from translucent.diffusion.grid import plane_points
+from translucent.diffusion.interfaces import AIR, InterfaceTable
+from translucent.formulas import optics
+from translucent.formulas.bsdf import Interaction, Lobes, below_coat, microfacet_normal, sampled_branches
+from translucent.formulas.light import cone_attenuation
+from translucent.geometry.ray_caster import SceneRayCaster, dot
+from translucent.media.medium import Medium
+from translucent.planning.bodies import same_medium
+from translucent.planning.caustics import PhotonAim, photon_aims
+from translucent.planning.rendered import scatterer_of
+from translucent.scene.scene import Object, Scene
+
+#: Photons that are followed together.
+BATCH = 1 << 15
+
+#: Surfaces on the path of a photon after which it is given up.
+MOST_SURFACES = 96
+
+#: Fraction of its power below which a photon ends by Russian roulette, or continues with this.
+ROULETTE = 0.05
+
+#: Largest distance between surfaces in one place, in radii of the scene.
+TOGETHER = 2e-7
+
+
+@dataclass(frozen=True, eq=False)
+class PhotonSegments:
+    """Straight segments of the paths of photons, from one surface to the next.
+
+    Attributes
+    ----------
+    origins, directions : (n, 3) float64
+        In metres in the world; directions have unit length.
+    length : (n,) float64
+        In metres.
+    power : (n, 3) float64
+        In W, where they begin.
+    extinction : (n, 3) float64
+        In 1/m, of all that fills the place; what is scattered ahead counts as unscattered.
+    filling : (n, objects) float64
+        How often each object's medium fills the place.
+    before, after : (n, objects) float64
+        The same on the other sides of the two surfaces, where light passes these straight on; else as `filling`.
+    bent : (n,) bool
+        An interface has refracted or reflected them.
+    entered : (n,) int64
+        Object of the effective medium here and not before, -1 for none.
+    bent_before : (n,) bool
+        An interface has refracted or reflected them before they have entered.
+    lands : (n,) bool
+        They end on an opaque surface.
+    """
+
+    origins: Array
+    directions: Array
+    length: Array
+    power: Array
+    extinction: Array
+    filling: Array
+    before: Array
+    after: Array
+    bent: Mask
+    entered: Integers
+    bent_before: Mask
+    lands: Mask
+
+    def where(self, chosen: Mask | Integers) -> PhotonSegments:
+        """Selection of segments."""
+        return PhotonSegments(*(getattr(self, one.name)[chosen] for one in fields(self)))
+
+
+@dataclass(eq=False)
+class _Photons:
+    """Photons on their paths; `last` (n, groups) are the faces that they are on, -1 for none.
+
+    `windings` and `since` (n, objects) count how often they are in each object, and when they came in.
+    """
+
+    origins: Array
+    directions: Array
+    power: Array
+    started: Array
+    windings: npt.NDArray[np.int16]
+    since: Integers
+    last: Integers
+    before: Array
+    bent: Mask
+    entered: Integers
+    bent_before: Mask
+    channel: Integers
+
+    def where(self, chosen: Mask | Integers) -> _Photons:
+        return _Photons(*(getattr(self, one.name)[chosen] for one in fields(self)))
+
+
+def photon_segments(scene: Scene, photons: int, seed: int) -> Iterator[PhotonSegments]:
+    """Segments of the paths of about so many photons from the lights of a scene.
+
+    At a rough interface a photon interacts with one microfacet, and no other one is in the way.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its bodies are closed, even, or sheets.
+    photons : int
+    seed : int
+        Of the random numbers.
+    """
+    tracer = _PhotonTracer(scene, np.random.default_rng((seed, 0x6D656469)))
+    for aim in photon_aims(scene, np.zeros(3), photons):
+        starts = (plane_points(aim.photons) + tracer.rng.random(2)) % 1.0
+        for first in range(0, aim.photons, BATCH):
+            going = tracer.begun(aim, starts[first : first + BATCH])
+            for _ in range(MOST_SURFACES):
+                if not len(going.origins):
+                    break
+                segments, going = tracer.step(going)
+                yield segments
+
+
+class _PhotonTracer:
+    """Tracer of photons through one scene."""
+
+    def __init__(self, scene: Scene, rng: np.random.Generator) -> None:
+        self.scene, self.rng, objects = scene, rng, scene.objects
+        seen = [i for i, item in enumerate(objects) if not item.covers]
+        self._caster = SceneRayCaster([objects[i] for i in seen])
+        #: Object of each face; at index -1, of none.
+        self._item = np.append(np.array(seen)[self._caster.faces.item], AIR)
+        self._table = InterfaceTable(scene, [item.sheet_thickness for item in objects])
+        #: (objects, 3): in 1/m; what is scattered ahead counts as unscattered.
+        self._extinction = np.stack([_reduced_extinction(item) for item in objects])
+
+    def begun(self, aim: PhotonAim, starts: Array) -> _Photons:
+        """Photons at the light, or where they come near the scene."""
+        scene, count, objects = self.scene, len(starts), len(self.scene.objects)
+        if aim.right.any():
+            power = np.tile(aim.flux / aim.photons, (count, 1))
+            target = aim.middle + (2.0 * starts - 1.0) @ np.stack([aim.right, aim.up])
+            directions = np.tile(aim.light[:3], (count, 1))
+            origins = target - 2.0 * scene.diagonal * directions
+            if aim.light[3]:
+                to_target = target - aim.light[:3]
+                distance = np.linalg.norm(to_target, axis=1)
+                directions = to_target / distance[:, None]
+                across = np.cross(aim.right, aim.up)
+                cosine = np.abs(directions @ (across / np.linalg.norm(across)))
+                power *= (cosine / distance**2 * cone_attenuation(directions, aim.cone))[:, None]
+                origins = np.tile(aim.light[:3], (count, 1))
+        else:
+            up, angle = 2.0 * starts[:, 0] - 1.0, 2.0 * np.pi * starts[:, 1]
+            level = np.sqrt(np.maximum((1.0 - up) * (1.0 + up), 0.0))
+            directions = np.stack([level * np.cos(angle), level * np.sin(angle), up], axis=1)
+            origins = np.tile(aim.light[:3], (count, 1))
+            power = cone_attenuation(directions, aim.cone)[:, None] * aim.flux / aim.photons
+        channel = np.full(count, 1)
+        if self._table.dispersed:
+            channel = self.rng.integers(3, size=count)
+            power = power * 3.0 * np.eye(3)[channel]
+        windings = np.zeros((count, objects), np.int16)
+        windings[:, list(aim.inside)] = 1
+        lit = np.flatnonzero(power.any(axis=1))
+        since, last = np.zeros((count, objects), np.int64), np.full((count, self._caster.groups), -1)
+        filling = self._filling(windings, since)
+        unbent, nothing = np.zeros(count, dtype=bool), np.full(count, AIR)
+        begun = _Photons(
+            origins, directions, power, power, windings, since, last, filling, unbent, nothing, unbent, channel
+        )
+        return begun.where(lit)
+
+    def step(self, going: _Photons) -> tuple[PhotonSegments, _Photons]:
+        """Follow photons to the next surface, and on from there."""
+        caster = self._caster
+        face, distance = caster.nearest((going.origins - caster.center) / caster.radius, going.directions, going.last)
+        nearest = distance.min(axis=1)
+        found = np.isfinite(nearest)
+        face = np.where(distance <= nearest[:, None] + TOGETHER, face, -1)[found]
+        going, length = going.where(found), nearest[found] * caster.radius
+        filling = self._filling(going.windings, going.since)
+        extinction = filling @ self._extinction
+        points = going.origins + length[:, None] * going.directions
+        with np.errstate(under="ignore"):
+            power = going.power * optics.transmittance(extinction * length[:, None])
+        windings, since = self._crossed(going, face)
+        beyond = self._filling(windings, since)
+        after, straight, lands = self._interacted(going, face, points, power, windings, since)
+        segments = PhotonSegments(
+            going.origins,
+            going.directions,
+            length,
+            going.power,
+            extinction,
+            filling,
+            going.before,
+            np.where(straight[:, None], beyond, filling),
+            going.bent,
+            going.entered,
+            going.bent_before,
+            lands,
+        )
+        # Behind a surface that refracts or reflects, no light comes straight from the other side.
+        after.before = np.where(straight[:, None], filling, self._filling(after.windings, after.since))
+        return segments, self._surviving(after.where(np.flatnonzero(~lands & after.power.any(axis=1))))
+
+    def _crossed(self, going: _Photons, face: Integers) -> tuple[npt.NDArray[np.int16], Integers]:
+        """Winding numbers (n, objects) beyond surfaces, and when photons came in."""
+        windings, since = going.windings.copy(), going.since.copy()
+        time = since.max(axis=1, initial=0) + 1
+        for own, item in zip(face.T, self._item[face].T, strict=True):
+            ray = np.flatnonzero(self._table.is_solid[item])
+            enters = dot(self._caster.faces.outward[own[ray]], going.directions[ray]) < 0.0
+            windings[ray, item[ray]] += np.where(enters, 1, -1).astype(np.int16)
+            first = ray[enters & (windings[ray, item[ray]] == 1)]
+            since[first, item[first]] = time[first]
+        return windings, since
+
+    def _interacted(
+        self,
+        going: _Photons,
+        face: Integers,
+        points: Array,
+        power: Array,
+        windings: npt.NDArray[np.int16],
+        since: Integers,
+    ) -> tuple[_Photons, Mask, Mask]:
+        """Photons behind interactions with surfaces, one branch by chance; which go straight on, and which land.
+
+        `power` is left of them there, and `windings` and `since` are those on the other side.
+        """
+        table, item = self._table, self._item[face]
+        before, after = self._effective(going.windings, going.since), self._effective(windings, since)
+        lands = table.is_opaque[item].any(axis=1)
+        # No light moves through edges of meshes unseen: what would be in the air again leaves.
+        changes = table.alters_light(before, after, going.channel) & ~lands
+        column, sheet = table.interfaces(item, before, after, changes, table.is_wall | table.is_film)
+        row = np.arange(len(face))
+        sheet &= ~lands
+        own = np.flatnonzero((changes | sheet) & (item[row, column] != AIR))
+        directions, power = going.directions.copy(), power.copy()
+        passes, straight = np.ones(len(face), dtype=bool), ~changes
+        bent = np.zeros(len(face), dtype=bool)
+        if own.size:
+            hit, hit_item = face[own, column[own]], item[own, column[own]]
+            local = (points[own] - self._caster.center) / self._caster.radius
+            at = table.interaction(
+                hit_item,
+                before[own],
+                np.where(sheet, before, after)[own],
+                going.channel[own],
+                directions[own],
+                self._caster.facing_normals(hit, local, directions[own]),
+            )
+            transmitted, weight, onward = self._sampled(at, table.alpha[hit_item], power[own])
+            directions[own], passes[own] = onward, transmitted
+            power[own] *= weight
+            straight[own] = transmitted & (at.thin_walled | (at.ior == 1.0))
+            bent[own] = ~straight[own]
+        photons = _Photons(
+            points,
+            directions,
+            power,
+            going.started,
+            np.where(passes[:, None], windings, going.windings),
+            np.where(passes[:, None], since, going.since),
+            face,
+            going.before,
+            going.bent | bent,
+            np.where(passes & (before != after), after, AIR),
+            going.bent,
+            going.channel,
+        )
+        return photons, straight, lands
+
+    def _sampled(self, at: Interaction, alpha: Array, power: Array) -> tuple[Mask, Array, Array]:
+        """Whether photons are transmitted (k,), factors (k, 3) of their power, and their directions (k, 3)."""
+        facets = at.normal.copy()
+        rough = np.flatnonzero((alpha > 0.0) & ~at.thin_walled & (at.ior != 1.0))
+        if rough.size:
+            shares = self.rng.random((rough.size, 2))
+            facets[rough] = microfacet_normal(at.normal[rough], at.direction[rough], alpha[rough], shares)
+        cosine, coat = at.cosine(facets), at.coat_reflectance()
+        below = below_coat(at.lobes(optics.fresnel_dielectric(cosine, at.ior), cosine)[0], coat)
+        lobes = Lobes(below.reflection + coat, below.transmission * at.base)
+        transmitted, weight = sampled_branches(lobes, power, 1.0 - self.rng.random(len(alpha)))
+        onward = np.where(transmitted[:, None], at.refracted(facets), at.reflected(facets))
+        return transmitted, weight, onward / np.linalg.norm(onward, axis=1, keepdims=True)
+
+    def _effective(self, windings: npt.NDArray[np.int16], since: Integers) -> Integers:
+        """(n,): object of the effective medium, or `AIR` (Schmidt & Budge 2002)."""
+        key = np.where((windings > 0) & self._table.decides, self._table.rank * (1 << 40) + since, -1)
+        best = key.argmax(axis=1)
+        return np.where(key[np.arange(len(key)), best] >= 0, best, AIR)
+
+    def _filling(self, windings: npt.NDArray[np.int16], since: Integers) -> Array:
+        """(n, objects): how often each medium fills the places of photons."""
+        found = np.where(self._table.is_solid[:-1], np.maximum(windings, 0), 0).astype(np.float64)
+        if self.scene.overlap == "priority":
+            own = np.arange(found.shape[1]) == self._effective(windings, since)[:, None]
+            return np.where(own & (found > 0.0), 1.0, 0.0)
+        if self.scene.overlap == "union":
+            found = np.minimum(found, 1.0)
+            for one, other in self._alike:
+                found[:, other] *= found[:, one] == 0.0
+        return found
+
+    @cached_property
+    def _alike(self) -> list[tuple[int, int]]:
+        """Pairs of objects with one medium."""
+        objects, solid = self.scene.objects, np.flatnonzero(self._table.is_solid).tolist()
+        return [(i, j) for j in solid for i in solid if i < j and same_medium(objects[i], objects[j])]
+
+    def _surviving(self, photons: _Photons) -> _Photons:
+        """Photons that continue by Russian roulette: the less of their power is left, the fewer."""
+        left = np.max(photons.power / np.maximum(photons.started.max(axis=1, keepdims=True), 1e-300), axis=1)
+        chance = np.minimum(left / ROULETTE, 1.0)
+        lives = self.rng.random(len(chance)) < chance
+        found = photons.where(lives)
+        found.power = found.power / chance[lives, None]
+        return found
+
+
+def _reduced_extinction(item: Object) -> Array:
+    """(3,): extinction in 1/m of an object's medium, without what it scatters ahead."""
+    medium = scatterer_of(item)
+    if medium is None or item.sheet_thickness is not None:
+        return np.zeros(3)
+    assert isinstance(medium, Medium)
+    return np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
