@@ -322,7 +322,7 @@ def test_the_same_record_gives_the_same_bytes(page: str) -> None:
     assert figure(report()) == figure(report())
 
 
-EVIL = """<script>alert('1')</script>"><img src=x onerror="alert(1)"> {{ 7 * 7 }} & ]]> $x^2$"""
+EVIL = """<script>alert('1')</script>"><img src=x onerror="alert(1)"> {{ 7 * 7 }} & ]]> $x^2$ \x1b]0;x\x07"""
 
 
 def poisoned(value: Any) -> Any:

@@ -327,6 +327,11 @@ def test_models_of_one_name_are_told_apart() -> None:
     assert {case.effect for case in cases} == {"absorption"}
 
 
+def test_what_no_font_can_show_of_a_files_name_is_escaped() -> None:
+    (case,) = model_cases({"a/\x1b[31m\n.stl": showcase(load_mesh(mesh_path("bear")), stage="none")})
+    assert (case.name, case.title) == (r"model \x1b[31m\n.stl", r"\x1b[31m\n.stl")
+
+
 def test_media_decide_what_is_worth_measuring() -> None:
     mesh = load_mesh(mesh_path("bear"))
     mist = Medium(absorption=(1, 1, 1), scattering=(1, 1, 1))

@@ -15,7 +15,7 @@ from translucent import reference
 from translucent.bench.contenders import Effect
 from translucent.bench.drawing import Size
 from translucent.bench.shapes import lens_row, lying_torus, menger_sponge, nested_shells, placed, subdivided, toolkit
-from translucent.errors import InputError
+from translucent.errors import InputError, printable
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere, SphericalShell, Torus
 from translucent.media.density import DensityGrid
@@ -388,7 +388,7 @@ def model_cases(scenes: Mapping[str, Scene]) -> list[Case]:
     shared = Counter(Path(model).name for model in scenes)
     found = []
     for model, scene in scenes.items():
-        title = model if shared[Path(model).name] > 1 else Path(model).name
+        title = printable(model if shared[Path(model).name] > 1 else Path(model).name)
         why, bare = "a model of yours", [_without_interface(item) for item in scene.objects]
         if any(item is not own for item, own in zip(bare, scene.objects, strict=True)):
             why, scene = f"{why}, without its interfaces", dataclasses.replace(scene, objects=bare)

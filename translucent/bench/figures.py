@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, ParamSpec
 import numpy as np
 
 from translucent.arrays import Array
+from translucent.errors import printable
 from translucent.extras import require_package
 
 if TYPE_CHECKING:
@@ -304,10 +305,12 @@ def to_svg(figure: Figure, name: str, description: str, tooltips: dict[str, str]
     text = re.sub(r'xlink:href="#([^"]+)"', rf'href="#{name}-\1"', text)
     text = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", text)
     for gid, tooltip in (tooltips or {}).items():
-        text = text.replace(f'<g id="{name}-{gid}">', f'<g id="{name}-{gid}"><title>{escape(tooltip)}</title>')
+        shown = escape(printable(tooltip))
+        text = text.replace(f'<g id="{name}-{gid}">', f'<g id="{name}-{gid}"><title>{shown}</title>')
     view = re.search(r'viewBox="[^"]*"', text)
     assert view is not None, "matplotlib always writes one"
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(description)}" {view.group()}>'
+    label = escape(printable(description))
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{label}" {view.group()}>'
     return head + text[text.index(">") + 1 :].strip()
 
 
@@ -321,7 +324,8 @@ def standalone(svg: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """A name that fits into a plot; tables and tooltips have all of it."""
+    """A name that fits into a plot, and that a font can show; tables and tooltips have all of it."""
+    text = printable(text)
     return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
 

@@ -44,6 +44,7 @@ from translucent.bench.record import (
     ShadowRow,
     Shadows,
 )
+from translucent.errors import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -154,7 +155,7 @@ def pareto_svg(
         _symbol(axes, row, point, f"point{i}")
     above = (34.0 if floor else 10.0) + (28.0 if title else 0.0)
     figure.subplots_adjust(left=72 / size[0], right=1 - 12 / size[0], bottom=56 / size[1], top=1 - above / size[1])
-    figure.text(12 / size[0], 1 - 20 / size[1], title, weight="bold", size=FONT_SIZE + 2, va="center")
+    figure.text(12 / size[0], 1 - 20 / size[1], printable(title), weight="bold", size=FONT_SIZE + 2, va="center")
     _labels(axes, rows, points, names)
     tooltips = {
         f"point{i}": f"{row.method}: {ratio_text(_cost(row))} x depth-only, RMS error "
@@ -387,7 +388,7 @@ def cost_svg(shadows: Shadows) -> str:
         text, beside = f"{ratio:.2f}", {"xytext": (8, 0), "textcoords": "offset points", "va": "center"}
         axes.annotate(text, (ratio, place), size=FONT_SIZE - 1, color=color, **beside)
     axes.axvline(MOST_OF_DEPTH, color=placeholder("muted"), linestyle=(0, (4, 3)), linewidth=1.2)
-    axes.set_yticks(range(len(found)), [title for title, _ in reversed(found)])
+    axes.set_yticks(range(len(found)), [printable(title) for title, _ in reversed(found)])
     axes.set_ylim(-0.7, len(found) - 0.3)
     most = max(ratio for _, ratio in found)
     axes.set_xscale("log")
