@@ -1,11 +1,12 @@
 """Ctrl-C and SIGTERM at random moments: no process may crash, and what is made next is what it would have been.
 
-``python tools/fuzz_interrupts.py [RUNS] [SEED]`` interrupts RUNS processes (60), in turn ``render``, ``bake``,
-``page`` and ``preview`` from the command line, and rendering, baking, pages and pictures for notebooks in Python, with
-no shaders compiled before. A command fails if it ends by a signal, shows a traceback, takes 20 s to end, or leaves
+``python tools/fuzz_interrupts.py [RUNS] [SEED] [--only KIND]`` interrupts RUNS processes (60), in turn ``render``,
+``bake``, ``page`` and ``preview`` from the command line, and rendering, baking, pages and cells of notebooks in Python,
+with no shaders compiled before. A command fails if it ends by a signal, shows a traceback, takes 20 s to end, or leaves
 anything but the old output or a new one that is whole. In Python, the same is made again in that process, and has to be
-equal to what an uninterrupted one makes. Prints each failure, and a line at the end; exits with 1 if there was one. The
-window is left out where there is neither a display nor Xvfb.
+equal to what an uninterrupted one makes. Cells are run by the shell of IPython, which kernels are made of. Where there
+is no display the window opens on none: see tools/headless_window.py. ``--keep FILE`` keeps what each process prints,
+and its exit code. Prints each failure, and at the end how many there were of each kind; exits with 1 if there was one.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ import hashlib
 import os
 import random
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -24,6 +24,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import translucent as tl
@@ -50,6 +51,8 @@ def scene() -> tl.Scene:
 
 def made_by(kind: str) -> Callable[[], bytes]:
     """What makes bytes in Python; each time from nothing but a renderer that lives on."""
+    if kind == "notebook":
+        return made_by_cell("scene()")
     renderer, mesh = tl.Renderer(), tl.load_mesh(mesh_path("bear"), unit="m")
     page = Path(tempfile.mkdtemp()) / "out.html"
 
@@ -61,8 +64,24 @@ def made_by(kind: str) -> Callable[[], bytes]:
         "render": lambda: renderer.render(scene(), (64, 48)).radiance.tobytes(),
         "bake": lambda: tl.bake_thickness(mesh, size=128, rays=64).values.tobytes(),
         "page": of_page,
-        "notebook": lambda: re.sub(r"drawn in [\d.]+ s", "", scene()._repr_html_()).encode(),
     }[kind]
+
+
+def made_by_cell(code: str) -> Callable[[], bytes]:
+    """What a cell of a notebook shows."""
+    from IPython.core.interactiveshell import InteractiveShell
+    from traitlets.config import Config
+
+    shell = InteractiveShell.instance(config=Config({"HistoryManager": {"enabled": False}}), user_ns={"scene": scene})
+    shown: list[dict[str, str]] = []
+    shell.displayhook.write_format_data = lambda data, _: shown.append(data)
+
+    def run() -> bytes:
+        shown.clear()
+        shell.run_cell(code).raise_error()
+        return re.sub(r"drawn in [\d.]+ s", "", shown[-1]["text/html"]).encode()
+
+    return run
 
 
 def in_python(kind: str, after: float) -> None:
@@ -85,32 +104,21 @@ def in_python(kind: str, after: float) -> None:
 class Fuzzer:
     """Interrupted processes, and what uninterrupted ones make."""
 
-    def __init__(self, folder: Path, seed: int) -> None:
-        self.folder, self.random = folder, random.Random(seed)
+    def __init__(self, folder: Path, seed: int, kept: Path | None) -> None:
+        self.folder, self.random, self._kept = folder, random.Random(seed), kept
         self.environment = {**os.environ, "MESA_SHADER_CACHE_DISABLE": "true", "XDG_CONFIG_HOME": str(folder)}
-        self.display = subprocess.Popen(["true"])
-        self.found: Counter[str] = Counter()
+        self.interrupted = 0
         #: Seconds of commands, and seconds and digest of what Python makes, where nothing interrupts it.
         self._seconds: dict[str, float] = {}
         self._made: dict[str, tuple[float, str]] = {}
-
-    def open_display(self) -> bool:
-        """Open a display of its own where there is none; false if that cannot be."""
-        if "DISPLAY" in os.environ or shutil.which("Xvfb") is None:
-            return "DISPLAY" in os.environ
-        read, write = os.pipe()
-        command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"]
-        self.display = subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL)
-        os.close(write)
-        with os.fdopen(read) as line:
-            self.environment["DISPLAY"] = f":{line.readline().strip()}"
-        return True
 
     def command(self, verb: str) -> str:
         """Interrupt a command; what is wrong with how it ends, or nothing."""
         options, name = COMMANDS[verb]
         output = self.folder / name if name else None
-        words = [sys.executable, "-m", "translucent", verb, *options, *(["-o", str(output)] if output else [])]
+        shown = verb != "preview" or "DISPLAY" in os.environ
+        main = ["-m", "translucent"] if shown else [str(Path(__file__).with_name("headless_window.py"))]
+        words = [sys.executable, *main, verb, *options, *(["-o", str(output)] if output else [])]
         if verb not in self._seconds:
             begin = time.monotonic()
             if output:
@@ -120,7 +128,7 @@ class Fuzzer:
             output.write_bytes(OLD)
         number = self.random.choice([signal.SIGINT, signal.SIGTERM])
         code, error = self._ended(words, self.random.uniform(0.0, self._seconds[verb]), number)
-        self.found["interrupted"] += code in (130, 143)
+        self.interrupted += code in (130, 143)
         # Before its first line runs, Python itself answers: SIGTERM ends it, Ctrl-C shows where it was.
         early = (code, error) == (-signal.SIGTERM, "") or (code == -signal.SIGINT and "translucent" not in error)
         if code not in (0, 130, 143) and not early:
@@ -138,15 +146,16 @@ class Fuzzer:
         words = [sys.executable, __file__, "--inside", kind]
         if kind not in self._made:
             done = subprocess.run([*words, "3600"], env=self.environment, capture_output=True, text=True, check=True)
-            _, took, digest = done.stdout.split()
+            _, took, digest = done.stdout.split()[-3:]
             self._made[kind] = float(took), digest
         seconds, digest = self._made[kind]
         after = self.random.uniform(0.001, seconds)
         done = subprocess.run([*words, str(after)], env=self.environment, capture_output=True, text=True, check=False)
-        if done.returncode:
+        self._keep([*words, str(after)], done.returncode, done.stdout + done.stderr)
+        if done.returncode or not done.stdout:
             return f"exit code {done.returncode} after {after:.3f} s: {done.stderr[-300:]}"
-        interrupted, _, found = done.stdout.split()
-        self.found["interrupted"] += int(interrupted)
+        interrupted, _, found = done.stdout.split()[-3:]
+        self.interrupted += int(interrupted)
         return "" if found == digest else f"after {after:.3f} s the next one is another"
 
     def _ended(self, words: list[str], after: float | None, number: int | None) -> tuple[int, str]:
@@ -164,38 +173,45 @@ class Fuzzer:
         except subprocess.TimeoutExpired:
             process.kill()
             error = f"it goes on {process.communicate()[1]}"
+        self._keep(
+            [*words, f"{signal.Signals(number or 0)!r} after {after} s" if number else ""], process.returncode, error
+        )
         return process.returncode, error
 
+    def _keep(self, words: list[str], code: int, said: str) -> None:
+        if self._kept is not None:
+            with self._kept.open("a", encoding="utf-8") as stream:
+                stream.write(f"{' '.join(words)}\nexit code {code}\n{said}\n")
 
-def main(runs: int, seed: int) -> int:
+
+def main(runs: int, seed: int, only: str | None, kept: Path | None) -> int:
     with tempfile.TemporaryDirectory() as name:
-        fuzzer = Fuzzer(Path(name), seed)
-        kinds: list[tuple[str, Callable[[], str]]] = []
-        for verb in COMMANDS if fuzzer.open_display() else [verb for verb in COMMANDS if verb != "preview"]:
-            kinds.append((verb, lambda verb=verb: fuzzer.command(verb)))  # type: ignore[misc]
+        fuzzer = Fuzzer(Path(name), seed, kept)
+        kinds: dict[str, Callable[[], str]] = {verb: partial(fuzzer.command, verb) for verb in COMMANDS}
         for kind in ("render", "bake", "page", "notebook"):
-            kinds.append((f"{kind} in Python", lambda kind=kind: fuzzer.python(kind)))  # type: ignore[misc]
-        try:
-            for run in range(runs):
-                said, act = kinds[run % len(kinds)]
-                if problem := act():
-                    fuzzer.found["failed"] += 1
-                    print(f"run {run}, {said}: {problem}", flush=True)
-        finally:
-            fuzzer.display.terminate()
-            fuzzer.display.wait()
-        found = fuzzer.found
-    print(f"{runs} runs, {found['interrupted']} interrupted at work, {found['failed']} failed")
-    return int(found["failed"] > 0)
+            kinds[f"{kind} in Python"] = partial(fuzzer.python, kind)
+        chosen = [kind for kind in kinds if only is None or only in kind]
+        counts, failed = Counter[str](), Counter[str]()
+        for run in range(runs):
+            said = chosen[run % len(chosen)]
+            counts[said] += 1
+            if problem := kinds[said]():
+                failed[said] += 1
+                print(f"run {run}, {said}: {problem}", flush=True)
+    each = ", ".join(f"{kind} {failed[kind]} of {count}" for kind, count in counts.items())
+    print(f"{runs} runs, {fuzzer.interrupted} interrupted at work; failed: {each}")
+    return int(failed.total() > 0)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", nargs="?", type=int, default=60)
     parser.add_argument("seed", nargs="?", type=int, default=0)
+    parser.add_argument("--only", metavar="KIND", help="those whose name has this word")
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="where to write what each process prints")
     parser.add_argument("--inside", nargs=2, metavar=("KIND", "SECONDS"), help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.inside:
         in_python(given.inside[0], float(given.inside[1]))
     else:
-        sys.exit(main(given.runs, given.seed))
+        sys.exit(main(given.runs, given.seed, given.only, given.keep))

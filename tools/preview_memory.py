@@ -1,6 +1,6 @@
 """Memory that the previewer takes for a large mesh: ``python tools/preview_memory.py [SUBDIVISIONS] [--stage auto]``.
 
-On a display (where there is none: ``xvfb-run -a -s "-screen 0 2000x900x24"``), where Linux tells what processes hold.
+Where Linux tells what processes hold; on a display, or on none: see tools/headless_window.py.
 Writes a dented ball of 20 * 4^SUBDIVISIONS triangles (9: 5.2 million), opens it in a window, waits until the picture is
 at rest, turns the camera, and waits again. Meanwhile the memory of the window and of all the processes that it has
 started is summed up, with what several of them share counted once (PSS). Tells when the first picture was there, and
@@ -17,6 +17,8 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+
+from headless_window import open_nowhere
 
 #: When the process was asked for, in the environment of the process.
 BEGUN = "TRANSLUCENT_BEGUN"
@@ -130,6 +132,8 @@ def show(path: Path, stage: str, inset: bool, patience: float) -> None:
     from translucent.preview.script import PAUSE, Script
     from translucent.preview.window_state import WindowState
 
+    if "DISPLAY" not in os.environ:
+        open_nowhere()
     begun = float(os.environ[BEGUN])
 
     class Waiting(Script):
