@@ -13,8 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from translucent.assets import mesh_path
-from translucent.cpu.hits import TracedMesh, Tracer
-from translucent.cpu.picture import Band, Picture
+from translucent.cpu.hits import Band, PictureRays, PixelTracer, TracedMesh
 from translucent.cpu.renderer import CpuRenderer
 from translucent.cpu.threads import in_threads, processors
 from translucent.geometry.mesh import Mesh
@@ -49,8 +48,8 @@ def throughput(
     threads = threads or processors()
     scene = showcase(mesh, size=size, stage="none")
     (body,) = scene.objects
-    picture = Picture.of(scene.camera, size)
-    tracer = Tracer(TracedMesh.of(mesh), body, picture)
+    picture = PictureRays.of(scene.camera, size)
+    tracer = PixelTracer(TracedMesh.of(mesh), body, picture)
     bands, pixels = list(picture.bands()), size[0] * size[1]
     renderer, chosen = CpuRenderer(threads), plan(scene)
     work: dict[str, Callable[[], object]] = {
@@ -71,7 +70,7 @@ def throughput(
     return {**rates, "hits_per_ray": hits / pixels, "last_resort": incomplete / pixels}
 
 
-def _first_hits(tracer: Tracer, bands: list[Band], threads: int) -> Callable[[], object]:
+def _first_hits(tracer: PixelTracer, bands: list[Band], threads: int) -> Callable[[], object]:
     """Let Embree find the nearest hit of all rays of a picture, these made ready beforehand."""
     rays = []
     for band in bands:

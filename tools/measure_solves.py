@@ -16,7 +16,7 @@ import numpy as np
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.diffusion import cells
+from translucent.diffusion import solution
 from translucent.diffusion.field import DiffusingBody, lit_body
 
 CAMERA = tl.Camera.look_at((0, 0, 5), (0, 0, 0))
@@ -55,8 +55,8 @@ def main() -> None:
         return timing
 
     with (
-        patch.object(cells, "cg", timed("solver", cells.cg)),
-        patch.object(cells, "_balance", timed("matrix", cells._balance)),
+        patch.object(solution, "cg", timed("solver", solution.cg)),
+        patch.object(solution, "_balance", timed("matrix", solution._balance)),
     ):
         body = bear(1.0)
         geometry = lit_body(body, None, tl.Diffusion(asked.resolution).cell_size(body))

@@ -1,7 +1,8 @@
-"""Array types for annotations, and the base class of immutable values that hold arrays."""
+"""Array types for annotations, ranges of indices, and the base class of immutable values that hold arrays."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,23 @@ Mask = npt.NDArray[np.bool_]
 
 #: Pictures with 8 bits for each channel.
 Pixels = npt.NDArray[np.uint8]
+
+
+def expanded(first: Integers, count: Integers) -> tuple[Integers, Integers]:
+    """Ranges first, first + 1, ... of `count` numbers each, one after the other: index of the range, and number."""
+    part = np.repeat(np.arange(len(count)), count)
+    return part, np.arange(len(part)) + np.repeat(first - (np.cumsum(count) - count), count)
+
+
+def slices(count: Integers, most: int) -> Iterator[slice]:
+    """Slices of items with a sum of `count` (n,) up to `most`, or of one item."""
+    ends = np.cumsum(count)
+    begin = 0
+    while begin < len(ends):
+        before = int(ends[begin - 1]) if begin else 0
+        end = max(int(np.searchsorted(ends, before + most, side="right")), begin + 1)
+        yield slice(begin, end)
+        begin = end
 
 
 class Frozen:

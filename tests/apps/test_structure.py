@@ -46,20 +46,7 @@ MODULES = {".".join(("translucent", *path.relative_to(PACKAGE).with_suffix("").p
 MODULES = {module.removesuffix(".__init__"): path for module, path in MODULES.items()}
 
 # Names that several classes still share. A class that gets a name of its own leaves this list; nothing joins it.
-SHARED = {
-    "BentLight",
-    "DiffusedLight",
-    "Interfaces",
-    "Layer",
-    "PhotonLight",
-    "Picture",
-    "Steps",
-    "SurfaceLight",
-    "Tracer",
-    "_Channel",
-    "_Spans",
-    "_Tree",
-}
+SHARED = {"Tracer"}
 
 
 def test_no_module_imports_itself_through_others() -> None:

@@ -16,9 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import translucent as tl
-from translucent.cpu import picture
-from translucent.cpu.hits import TracedMesh, Tracer, embree_hits
-from translucent.cpu.picture import Band, Picture
+from translucent.cpu import hits as picture
+from translucent.cpu.hits import Band, PictureRays, PixelTracer, TracedMesh, embree_hits
 from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.reference import Hits, line_hits
@@ -224,10 +223,10 @@ def test_bands_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_threads_do_not_show() -> None:
     mesh = Sphere().tessellate(64)
     camera = tl.Camera.look_at((0.3, 0.2, 3.0), (0.0, 0.1, 0.0))
-    seen = Picture.of(camera, (160, 160))
-    tracer = Tracer(TracedMesh.of(mesh), tl.Object(mesh), seen)
+    seen = PictureRays.of(camera, (160, 160))
+    tracer = PixelTracer(TracedMesh.of(mesh), tl.Object(mesh), seen)
     alone = [tracer.hits(band) for band in seen.bands()]
-    fresh = Tracer(TracedMesh.of(mesh), tl.Object(mesh), seen)
+    fresh = PixelTracer(TracedMesh.of(mesh), tl.Object(mesh), seen)
     with ThreadPoolExecutor(8) as pool:
         for hits, expected in zip(pool.map(fresh.hits, list(seen.bands()) * 4), alone * 4, strict=True):
             assert_same(hits, expected)
@@ -251,7 +250,7 @@ def test_rays_of_a_band_are_those_of_the_picture(perspective: bool) -> None:
     camera = tl.Camera.look_at(eye, target) if perspective else tl.Camera.orthographic(eye, target, height=2.0)
     offset = (0.2, -0.3)
     expected = tl.reference.pixel_rays(camera, (40, 30), offset)
-    rays = Picture.of(camera, (40, 30), offset).rays(Band(7, 5, 40))
+    rays = PictureRays.of(camera, (40, 30), offset).rays(Band(7, 5, 40))
     for name in ("origins", "directions", "backdrop"):
         found = getattr(expected.where(slice(280, 480)), name)
         np.testing.assert_allclose(getattr(rays, name), found, rtol=0, atol=1e-15)
@@ -268,9 +267,9 @@ class Forgetful(RayCaster):
 
 def test_what_embree_misses_is_noticed_and_found(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = Sphere().tessellate(48)
-    seen = Picture.of(tl.Camera.look_at((0.3, 0.2, 3.0), (0.0, 0.1, 0.0)), (60, 60))
+    seen = PictureRays.of(tl.Camera.look_at((0.3, 0.2, 3.0), (0.0, 0.1, 0.0)), (60, 60))
     traced = TracedMesh(Forgetful(mesh), TracedMesh.of(mesh).edges)
-    tracer = Tracer(traced, tl.Object(mesh), seen)
+    tracer = PixelTracer(traced, tl.Object(mesh), seen)
     (band,) = seen.bands()
     expected = line_hits(mesh, IDENTITY, seen.camera, seen.size)
     found, incomplete = tracer.search(band)
@@ -284,9 +283,9 @@ def test_what_embree_misses_is_noticed_and_found(monkeypatch: pytest.MonkeyPatch
 def test_the_last_resort_is_rare(name: str) -> None:
     # Thousands of rays meet faces; those through the middle of one are sure in float32, and edges are 10^-6 as wide.
     mesh = Torus().tessellate(64)
-    seen = Picture.of(cameras(mesh, (96, 96))[name], (96, 96))
+    seen = PictureRays.of(cameras(mesh, (96, 96))[name], (96, 96))
     (band,) = seen.bands()
-    hits, incomplete = Tracer(TracedMesh.of(mesh), tl.Object(mesh), seen).search(band)
+    hits, incomplete = PixelTracer(TracedMesh.of(mesh), tl.Object(mesh), seen).search(band)
     assert len(hits.pixel) > 2500
     assert np.count_nonzero(incomplete) <= 2
 

@@ -15,7 +15,8 @@ import pytest
 
 import translucent as tl
 from tools.cpu_throughput import throughput
-from translucent.cpu import light_paths, picture, ray_tree, shading
+from translucent.cpu import hits, ray_tree, shading
+from translucent.cpu import shading as light_paths
 from translucent.cpu import threads as pool
 from translucent.cpu.renderer import CpuRenderer
 from translucent.formulas.sampling import sample_shifts
@@ -131,7 +132,7 @@ def test_as_opengl(name: str, renderer: tl.Renderer) -> None:
 def test_threads_and_pieces_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = SCENES["opaque"]
     alone = frame_of(scene, samples=4, threads=1)
-    monkeypatch.setattr(picture, "BAND", 100)
+    monkeypatch.setattr(hits, "BAND", 100)
     monkeypatch.setattr(shading, "SURFACES", 64)
     for threads in (1, 2, 5):
         frame = frame_of(scene, samples=4, threads=threads)

@@ -14,8 +14,8 @@ from translucent.arrays import Array
 from translucent.assets import mesh_path
 from translucent.cpu import ray_tree
 from translucent.cpu.hits import ExactRayCaster
-from translucent.cpu.interactions import Spread
-from translucent.cpu.ray_tree import DiffusedLight, RayTree, TracedLight
+from translucent.cpu.interactions import MicrofacetSamples
+from translucent.cpu.ray_tree import DiffusionFields, RayTree, TracedLight
 from translucent.cpu.renderer import CpuRenderer
 from translucent.formulas.interface import slab_reflectance, slab_transmittance
 from translucent.geometry.solids import Box, Sphere
@@ -51,11 +51,15 @@ def moved(x: float, scale: float = 1.0) -> Array:
 def tree_of(scene: tl.Scene, size: tuple[int, int], depth: int, forks: int) -> RayTree:
     caster = ExactRayCaster(scene.objects)
     light = SurfaceLight(LightPaths(scene, sheet_thicknesses(scene)))
-    return RayTree(light, caster, size[0] / size[1], depth, forks, DiffusedLight({}))
+    return RayTree(light, caster, size[0] / size[1], depth, forks, DiffusionFields({}))
 
 
 def traced_light(
-    scene: tl.Scene, size: tuple[int, int] = SIZE, depth: int = 8, forks: int = 2, spread: Spread | None = None
+    scene: tl.Scene,
+    size: tuple[int, int] = SIZE,
+    depth: int = 8,
+    forks: int = 2,
+    spread: MicrofacetSamples | None = None,
 ) -> TracedLight:
     rays = pixel_rays(scene.camera, size)
     return tree_of(scene, size, depth, forks).see(rays, scene_hits(scene, size), np.arange(len(rays)), spread)
@@ -148,7 +152,7 @@ def test_deep_trees_are_those_of_the_reference(name: str, monkeypatch: pytest.Mo
 def test_lossless_bodies_vanish_in_a_furnace(depth: int, roughness: float) -> None:
     body = replace(knot(), medium=CLEAR, surface=tl.Surface(roughness=roughness))
     scene = scene_of(body, camera=around(body), environment=tl.Environment.constant((1.0, 1.0, 1.0)))
-    for spread in (None, Spread(3, 16)):
+    for spread in (None, MicrofacetSamples(3, 16)):
         light = traced_light(scene, depth=depth, spread=spread)
         np.testing.assert_allclose(light.radiance, 1.0, atol=1e-12)
 
@@ -217,7 +221,9 @@ def test_open_bodies_and_full_records_are_told() -> None:
 def test_rough_bodies_are_as_the_reference_has_them() -> None:
     scene = scene_of(glass(surface=tl.Surface(roughness=0.4)), environment=tl.Environment.studio())
     samples, size = 64, (10, 10)
-    mean = np.mean([traced_light(scene, size, spread=Spread(i, samples)).radiance for i in range(samples)], axis=0)
+    mean = np.mean(
+        [traced_light(scene, size, spread=MicrofacetSamples(i, samples)).radiance for i in range(samples)], axis=0
+    )
     truth = tl.reference.render(scene, size, paths=128).radiance.reshape(-1, 3)
     one = traced_light(scene, size).radiance
     assert abs(mean.mean() / truth.mean() - 1.0) < 0.03

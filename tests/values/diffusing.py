@@ -14,7 +14,7 @@ from translucent.diffusion.first_events import (
     Beam,
 )
 from translucent.diffusion.grid import BodyGrid, body_grid
-from translucent.diffusion.solution import BodySystem, SurfaceLight
+from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.geometry.solids import Sphere
 from translucent.planning.scattering import Diffusion
 
@@ -35,14 +35,16 @@ def grid_of(mesh: tl.Mesh, resolution: int) -> BodyGrid:
     return body_grid(body, Diffusion(resolution).cell_size(body))
 
 
-def lit(grid: BodyGrid, medium: tl.Medium, entering: npt.ArrayLike = 1.0, inside: Array | None = None) -> SurfaceLight:
+def lit(
+    grid: BodyGrid, medium: tl.Medium, entering: npt.ArrayLike = 1.0, inside: Array | None = None
+) -> DiffuseSolution:
     """Light of a body on which none of its light falls again."""
     flux = np.broadcast_to(np.asarray(entering, np.float64), (len(grid.points), 3)).copy()
     nothing = sparse.csr_array((len(flux), len(flux)))
     return BodySystem(grid, medium, 0.0).solved(flux, nothing, np.zeros((grid.count, 3)) if inside is None else inside)
 
 
-def beamed(grid: BodyGrid, medium: tl.Medium, beam: Beam) -> SurfaceLight:
+def beamed(grid: BodyGrid, medium: tl.Medium, beam: Beam) -> DiffuseSolution:
     """Light of a body in a beam, on which none of its light falls again."""
     dark, nothing = np.zeros((len(grid.points), 3)), sparse.csr_array((len(grid.points),) * 2)
     return BodySystem(grid, medium, 0.0).solved(dark, nothing, np.zeros((grid.count, 3)), [beam])

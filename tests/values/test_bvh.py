@@ -122,7 +122,7 @@ def test_hierarchies_in_blocks_are_hierarchies_and_as_good(
 @pytest.mark.parametrize("kind", ["equal", "one point", "collinear", "growing"])
 def test_clusters_halve_in_few_rounds(kind: str, rng: np.random.Generator) -> None:
     corners = np.tile(degenerate(kind, rng), (40, 1, 1)).astype(np.float32)
-    tree = bvh._Tree(np.ascontiguousarray(corners.min(axis=1).T), np.ascontiguousarray(corners.max(axis=1).T))
+    tree = bvh._BinaryTree(np.ascontiguousarray(corners.min(axis=1).T), np.ascontiguousarray(corners.max(axis=1).T))
     # Each but the last merges a share of the clusters: their work adds up to that of a few.
     left = len(corners) - np.cumsum([end - begin for begin, end in tree.rounds])
     work = len(corners) + left.sum()

@@ -10,9 +10,8 @@ import pytest
 from scipy import sparse
 
 import translucent as tl
-from translucent.diffusion.densities import densities
 from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
-from translucent.diffusion.grid import BodyGrid, body_grid
+from translucent.diffusion.grid import BodyGrid, body_grid, densities
 from translucent.diffusion.solution import BodySystem
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.solids import Box, Sphere

@@ -20,8 +20,6 @@ from tests.values.diffusing import (
     seen_field,
 )
 from translucent.bench.shapes import joined
-from translucent.diffusion.cells import TOLERANCE
-from translucent.diffusion.densities import even_densities
 from translucent.diffusion.entering import from_light
 from translucent.diffusion.field import DiffusionField, lit_body
 from translucent.diffusion.first_events import (
@@ -32,8 +30,8 @@ from translucent.diffusion.first_events import (
     half_space_excess,
     tails,
 )
-from translucent.diffusion.grid import BodyGrid, box_points
-from translucent.diffusion.solution import _Channel
+from translucent.diffusion.grid import BodyGrid, box_points, even_densities
+from translucent.diffusion.solution import TOLERANCE, _ChannelSystem
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.scattering import Diffusion
@@ -279,7 +277,7 @@ def test_the_system_is_symmetric_and_positive() -> None:
     """So light goes both ways between any two places alike, and conjugate gradients get there."""
     grid = ball_grid(10)
     dense = even_densities(grid)
-    channel = _Channel(grid, 1.4, 0.0, 0.5, 5.0, dense, diffuse_ways(grid, dense, 1.4), corrected=False)
+    channel = _ChannelSystem(grid, 1.4, 0.0, 0.5, 5.0, dense, diffuse_ways(grid, dense, 1.4), corrected=False)
     matrix = channel._cells._matrix.toarray()
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-14 * np.abs(matrix).max())
     np.linalg.cholesky(matrix)  # raises unless all is positive

@@ -6,11 +6,9 @@ import numpy as np
 from scipy import sparse
 
 import translucent as tl
-from translucent.diffusion.cells import TOLERANCE
 from translucent.diffusion.field import DiffusingBody, lit_body
 from translucent.diffusion.grid import body_grid
-from translucent.diffusion.known_solutions import MOST, KnownSolutions
-from translucent.diffusion.solution import BodySystem
+from translucent.diffusion.solution import MOST, TOLERANCE, BodySystem, KnownSolutions
 from translucent.diffusion.volume import DiffusingVolume, VolumeGrid
 from translucent.geometry.solids import Sphere
 from translucent.planning.scattering import Diffusion

@@ -14,7 +14,7 @@ from translucent.arrays import Array
 from translucent.diffusion import cache
 from translucent.diffusion.entering import flux_of
 from translucent.diffusion.grid import body_grid
-from translucent.diffusion.photon_fluence import FineCells, bent_light
+from translucent.diffusion.photons import FineCells, photons_in_media
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning import caustics
 from translucent.planning.plan import plan
@@ -41,7 +41,7 @@ def scene(*objects: tl.Object, light: Any = SUN, **options: Any) -> tl.Scene:
 
 
 def fluence(one: tl.Scene, cells: FineCells = CELLS, body: int = 1) -> Array:
-    return bent_light(one, tl.Caustics(1), {body: cells}, ()).fluence[body][..., 0]
+    return photons_in_media(one, tl.Caustics(1), {body: cells}, ()).fluence[body][..., 0]
 
 
 @pytest.mark.parametrize(("light", "lamp"), [(SUN, None), (tl.PointLight((0, 5, 0), 1.0), 5.0)])
@@ -65,7 +65,7 @@ def test_haze_below_a_ball_has_the_light_of_its_rays(light: Any, lamp: float | N
 def test_a_body_has_what_its_interface_lets_in() -> None:
     """Light in a ball, by Fresnel, as flux at its samples: around the focus, and in all."""
     milk = tl.Object(Box((-2, -3, -2), (2, -1.5, 2)).tessellate(), tl.Medium(scattering=9.0, ior=1.33))
-    photons = bent_light(scene(GLASS, milk), tl.Caustics(1), {}, (1,)).entering[1]
+    photons = photons_in_media(scene(GLASS, milk), tl.Caustics(1), {}, (1,)).entering[1]
     flux, distance, cosine = ball_parts(1.5, 1.5, rays=20_000)
     entering = flux * (1.0 - fresnel(np.clip(cosine, 0.0, 1.0), 1.33))
     landed = np.hypot(photons.points[:, 0], photons.points[:, 2])
@@ -136,8 +136,8 @@ def test_what_goes_straight_is_no_light_of_photons() -> None:
 def test_photons_are_followed_again_where_something_moves_them(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(caustics, "LEAST_IN_MEDIA", 256)
     followed = []
-    original = cache.bent_light
-    monkeypatch.setattr(cache, "bent_light", lambda *given: followed.append(given) or original(*given))
+    original = cache.photons_in_media
+    monkeypatch.setattr(cache, "photons_in_media", lambda *given: followed.append(given) or original(*given))
     fields, asked, coarse = cache.FieldCache(), tl.Caustics(1), tl.Diffusion(8)
     fog = replace(HAZE, medium=tl.Medium(scattering=0.5))
     one, moved = scene(GLASS, fog), np.diag([0.9, 0.9, 0.9, 1.0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from translucent.diffusion.entering import even_directions, nearest_parts
-from translucent.diffusion.sweeps import condensed, swept
+from translucent.diffusion.volume import condensed, swept
 
 STEP = 0.25
 SHAPE = (6, 5, 7)

@@ -14,9 +14,8 @@ import pytest
 
 import translucent as tl
 from translucent.bench.shapes import joined
-from translucent.diffusion.grid import body_grid
+from translucent.diffusion.grid import LINES, Voxels, body_grid, voxels
 from translucent.geometry.solids import Box, Sphere, Torus
-from translucent.geometry.voxels import LINES, Voxels, voxels
 
 Array = npt.NDArray[np.float64]
 

@@ -1,7 +1,6 @@
-"""Complete intersections of pixel rays with a mesh: found by Embree, decided in float64, and proved complete.
+"""Rays of a picture and all their intersections with meshes: found by Embree, decided in float64, and proved complete.
 
-The result is that of `translucent.reference.line_hits`, to the last bit.
-"""
+The hits are those of `translucent.reference.line_hits`, to the last bit."""
 
 from __future__ import annotations
 
@@ -13,14 +12,106 @@ from itertools import chain
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Integers, Mask
-from translucent.cpu.picture import Band, Picture
+from translucent.arrays import Array, Integers, Mask, expanded, slices
+from translucent.files.reading import require_memory
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.ray_caster import NEAREST, RayCaster, SceneRayCaster, point_from
-from translucent.reference.hits import Hits, camera_vertices, cross_triangles, pixel_span, sorted_hits
+from translucent.reference.hits import Hits, PictureGrid, camera_vertices, cross_triangles, pixel_span, sorted_hits
+from translucent.reference.rays import Rays
 from translucent.reference.tracer import Lines, TracedObject
-from translucent.scene.camera import Camera
+from translucent.scene.camera import Camera, check_size
 from translucent.scene.scene import Object
+
+#: Bytes of memory that each pixel takes, at least: the arrays of a frame.
+_PIXEL_BYTES = 100
+
+#: Pixels of a band: enough to hide Python's own time, few enough that the working arrays stay below 50 MB.
+BAND = 1 << 15
+
+#: Rows of a band: of a narrow picture, too, an edge must not cross too many at a time.
+BAND_ROWS = 256
+
+
+@dataclass(frozen=True)
+class Band:
+    """Whole rows of a picture. Its pixels count from 0 at its first one: row * width + column, as those of its hits.
+
+    Attributes
+    ----------
+    first_row, rows, width : int
+    """
+
+    first_row: int
+    rows: int
+    width: int
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels."""
+        return self.rows * self.width
+
+
+@dataclass(frozen=True, eq=False)
+class PictureRays:
+    """Picture plane: positions of the rays of a camera.
+
+    Attributes
+    ----------
+    camera : Camera
+    size : (width, height)
+        In pixels.
+    offset : (right, down)
+        Shift of the rays from the pixel centers, in pixels.
+    grid : PictureGrid
+        The points of the picture's plane through which they pass.
+    """
+
+    camera: Camera
+    size: tuple[int, int]
+    offset: tuple[float, float]
+    grid: PictureGrid
+
+    @classmethod
+    def of(cls, camera: Camera, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)) -> PictureRays:
+        """Picture of a camera; raises `InputError` if the size is invalid."""
+        width, height = check_size(size)
+        found = f"{width * height / 1e6:.0f} million pixels"
+        require_memory(f"frame size {width}x{height}", found, _PIXEL_BYTES * width * height, "give a smaller size")
+        centered = PictureGrid.of(camera, size)
+        return cls(camera, size, offset, PictureGrid(centered.center - offset, centered.scale))
+
+    @property
+    def perspective(self) -> bool:
+        """True if the rays meet in the eye."""
+        return self.camera.fov_y is not None
+
+    def bands(self) -> Iterator[Band]:
+        """Bands of the picture from top to bottom."""
+        width, height = self.size
+        rows = min(max(BAND // width, 1), BAND_ROWS)
+        for first in range(0, height, rows):
+            yield Band(first, min(rows, height - first), width)
+
+    def points(self, band: Band, pixel: Integers) -> Array:
+        """(k, 2): positions of the rays of pixels (k,) in the picture's plane, right and up."""
+        row, column = np.divmod(pixel, band.width)
+        return self.grid.points(row + band.first_row, column)
+
+    def rays(self, band: Band) -> Rays:
+        """The rays of a band, as `pixel_rays` has them."""
+        pixel = np.arange(band.pixels)
+        points, camera = self.points(band, pixel), self.camera
+        across = points[:, :1] * camera.right + points[:, 1:] * camera.up
+        row, column = np.divmod(pixel, band.width)
+        left, top, _, more_rows = camera.beyond(self.size)
+        place = np.stack([column + left, row + band.first_row + top], axis=-1)
+        backdrop = (place + 0.5 + self.offset) / (self.size[1] + more_rows)
+        if not self.perspective:
+            return Rays(across, np.broadcast_to(camera.forward, across.shape), backdrop)
+        directions = across + camera.forward
+        directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+        return Rays(np.zeros(across.shape), directions, backdrop)
+
 
 _Pairs = tuple[Integers, Integers]
 
@@ -36,7 +127,7 @@ class ProjectedObject:
     """One object, projected into one picture."""
 
     body: Object
-    picture: Picture
+    picture: PictureRays
 
     @cached_property
     def vertices(self) -> Array:
@@ -100,12 +191,12 @@ class ProjectedObject:
         if chosen is not None:
             keep &= chosen[face]
         box = np.flatnonzero(keep)
-        part, row = expand(start[box], stop[box] - start[box])
+        part, row = expanded(start[box], stop[box] - start[box])
         box = box[part]
         first = row * band.width + left[box]
         low, high = before[first], before[first + columns[box]]
         for some in slices(high - low, PAIRS):
-            part, index = expand(low[some], high[some] - low[some])
+            part, index = expanded(low[some], high[some] - low[some])
             yield pixels[index], face[box[some][part]]
 
     @cached_property
@@ -120,24 +211,6 @@ class ProjectedObject:
             face = np.flatnonzero((columns > 0) & (rows > 0))
             parts.append((face, *(array[face] for array in (top, rows, left, columns))))
         return tuple(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-
-
-def expand(first: Integers, count: Integers) -> tuple[Integers, Integers]:
-    """Ranges first, first + 1, ... of `count` numbers each, one after the other: index of the range, and number."""
-    ends = np.cumsum(count)
-    part = np.repeat(np.arange(len(count)), count)
-    return part, np.arange(len(part)) + np.repeat(first - (ends - count), count)
-
-
-def slices(count: Integers, most: int) -> Iterator[slice]:
-    """Slices of items with a sum of `count` (n,) up to `most`, or of one item."""
-    ends = np.cumsum(count)
-    begin = 0
-    while begin < len(ends):
-        before = int(ends[begin - 1]) if begin else 0
-        end = max(int(np.searchsorted(ends, before + most, side="right")), begin + 1)
-        yield slice(begin, end)
-        begin = end
 
 
 #: Generous bound of the relative rounding of positions in the picture: doubt costs time, and errors lose surfaces.
@@ -219,7 +292,7 @@ class Outline:
         # A column more, for what changes to the right of the picture.
         change = np.zeros((2, band.rows * (band.width + 1)))
         for some in slices(rows, CROSSINGS):
-            edge, row = expand(first[some], rows[some])
+            edge, row = expanded(first[some], rows[some])
             self._add_changes(change, band, edge + some.start, row, tolerance[some][edge])
         number, doubt = np.cumsum(change.reshape(2, band.rows, band.width + 1), axis=2)[..., :-1].reshape(2, -1)
         return number.astype(np.int64), doubt > 0
@@ -261,7 +334,7 @@ class TracedMesh:
         return cls(RayCaster(mesh), Edges.of(mesh))
 
 
-class Tracer:
+class PixelTracer:
     """Tracer of all surfaces of one object in one picture. Any number of threads may ask at once.
 
     Parameters
@@ -272,7 +345,7 @@ class Tracer:
     picture : Picture
     """
 
-    def __init__(self, traced: TracedMesh, body: Object, picture: Picture) -> None:
+    def __init__(self, traced: TracedMesh, body: Object, picture: PictureRays) -> None:
         self.embree = traced.embree
         self._seen = ProjectedObject(body, picture)
         self._outline = Outline.of(self._seen, traced.edges)
@@ -342,8 +415,8 @@ def embree_hits(
     RenderError
         If embreex cannot be imported.
     """
-    body, picture = Object(mesh, transform=matrix), Picture.of(camera, size, offset)
-    tracer = Tracer(TracedMesh.of(mesh), body, picture)
+    body, picture = Object(mesh, transform=matrix), PictureRays.of(camera, size, offset)
+    tracer = PixelTracer(TracedMesh.of(mesh), body, picture)
     parts = []
     for band in picture.bands():
         hits = tracer.hits(band)

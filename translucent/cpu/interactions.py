@@ -24,7 +24,7 @@ from translucent.scene.lights import PositionalLight
 INTERFACES = 8
 
 
-class Spread:
+class MicrofacetSamples:
     """Points of one sample of all pixels.
 
     Parameters
@@ -150,7 +150,7 @@ def interact(
     branches: Branches,
     places: InterfaceHits,
     pixel: Integers,
-    spread: Spread | None,
+    spread: MicrofacetSamples | None,
 ) -> BranchInteractions:
     """Reflection and refraction of branches that have come to interfaces, on microfacets if there is a `spread`."""
     directions, item = branches.directions, places.item

@@ -15,7 +15,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.hits import ExactRayCaster
-from translucent.cpu.interactions import BranchInteractions, InterfaceHits, InterfaceLight, Spread, interact
+from translucent.cpu.interactions import BranchInteractions, InterfaceHits, InterfaceLight, MicrofacetSamples, interact
 from translucent.cpu.interior_list import (
     NOTHING,
     Branches,
@@ -110,7 +110,7 @@ def _no_hits() -> Hits:
     return Hits(none, np.empty(0), np.empty(0, np.int8), none, np.empty((0, 3)))
 
 
-class DiffusedLight:
+class DiffusionFields:
     """Diffused light of the bodies of a scene.
 
     Parameters
@@ -211,7 +211,7 @@ class RayTree:
         aspect: float,
         depth: int,
         forks: int,
-        diffused: DiffusedLight,
+        diffused: DiffusionFields,
         pixel: float = 0.0,
     ) -> None:
         scene = light.scene
@@ -221,7 +221,7 @@ class RayTree:
         self.table = InterfaceTable(scene, light.paths.sheets)
         self._channels = (0, 1, 2) if self.table.dispersed else (1,)
 
-    def see(self, rays: Rays, hits: Sequence[Hits], pixel: Integers, spread: Spread | None) -> TracedLight:
+    def see(self, rays: Rays, hits: Sequence[Hits], pixel: Integers, spread: MicrofacetSamples | None) -> TracedLight:
         """Trace rays of the camera.
 
         Parameters
@@ -245,7 +245,13 @@ class _Growth:
     """Growth of a ray tree, for light with the same indices of refraction."""
 
     def __init__(
-        self, tree: RayTree, channel: int, found: TracedLight, backdrop: Array, pixel: Integers, spread: Spread | None
+        self,
+        tree: RayTree,
+        channel: int,
+        found: TracedLight,
+        backdrop: Array,
+        pixel: Integers,
+        spread: MicrofacetSamples | None,
     ) -> None:
         self.tree, self.table, self.channel, self.found = tree, tree.table, channel, found
         self.backdrop, self.pixel, self.spread = backdrop, pixel, spread

@@ -13,10 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Integers
-from translucent.cpu.hits import ExactRayCaster, TracedMesh, Tracer
-from translucent.cpu.interactions import Spread
-from translucent.cpu.picture import Band, Picture
-from translucent.cpu.ray_tree import DiffusedLight, RayTree
+from translucent.cpu.hits import Band, ExactRayCaster, PictureRays, PixelTracer, TracedMesh
+from translucent.cpu.interactions import MicrofacetSamples
+from translucent.cpu.ray_tree import DiffusionFields, RayTree
 from translucent.cpu.shading import Arrays, Shader, on_rays
 from translucent.cpu.threads import in_threads, processors
 from translucent.diffusion.cache import FieldCache
@@ -37,7 +36,7 @@ BATCH = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
-class BentLight:
+class TracedRadiance:
     """Light along rays that bend at the interfaces of a scene.
 
     Attributes
@@ -57,8 +56,8 @@ class BentLight:
         caster: ExactRayCaster,
         size: tuple[int, int],
         tree: tuple[int, int],
-        diffused: DiffusedLight,
-    ) -> BentLight:
+        diffused: DiffusionFields,
+    ) -> TracedRadiance:
         """Light for pictures of this size; `caster` has the objects of the shader's scene.
 
         `tree`: depth and forks, as of `TracedInterfaces`.
@@ -68,7 +67,9 @@ class BentLight:
         rays = RayTree(shader.light, caster, size[0] / size[1], *tree, diffused, pixel)
         return cls(rays, tuple(i for i, body in enumerate(scene.objects) if body.has_interface))
 
-    def put_into(self, shaded: Arrays, rays: Rays, hits: Sequence[Hits], band: Band, spread: Spread | None) -> None:
+    def put_into(
+        self, shaded: Arrays, rays: Rays, hits: Sequence[Hits], band: Band, spread: MicrofacetSamples | None
+    ) -> None:
         """Replace radiance and validity of those rays that bend; parameters as for `Shader.shade` and `RayTree.see`."""
         touched = np.zeros(len(rays), dtype=bool)
         for i in self.bending:
@@ -78,7 +79,13 @@ class BentLight:
             self._put(shaded, rays, hits, chosen[begin : begin + BATCH], band.first_row * band.width, spread)
 
     def _put(
-        self, shaded: Arrays, rays: Rays, hits: Sequence[Hits], some: Integers, first: int, spread: Spread | None
+        self,
+        shaded: Arrays,
+        rays: Rays,
+        hits: Sequence[Hits],
+        some: Integers,
+        first: int,
+        spread: MicrofacetSamples | None,
     ) -> None:
         own = [on_rays(line, some, len(rays)) for line in hits]
         light = self.tree.see(rays.where(some), own, some + first, spread)
@@ -164,7 +171,7 @@ class CpuRenderer:
         started = time.perf_counter()
         scene, samples = plan.scene, plan.request.samples
         shader = Shader.of(scene, plan, self._embree_meshes(scene))
-        picture = Picture.of(scene.camera, size)
+        picture = PictureRays.of(scene.camera, size)
         arrays = _empty(picture.size)
         bent = self._bent_light(shader, picture, plan)
         prepared = time.perf_counter() - started
@@ -172,8 +179,8 @@ class CpuRenderer:
         seconds["prepare"] += prepared
         if samples > 1:
             for number, shift in enumerate(sample_shifts(samples).tolist(), 1):
-                picture = Picture.of(scene.camera, size, tuple(shift))
-                spread = Spread(number - 1, samples)
+                picture = PictureRays.of(scene.camera, size, tuple(shift))
+                spread = MicrofacetSamples(number - 1, samples)
                 spent = self._draw(shader, picture, bent, partial(_average, arrays, number), spread)
                 seconds = {name: seconds[name] + spent[name] for name in seconds}
         seconds["total"] = time.perf_counter() - started
@@ -199,7 +206,7 @@ class CpuRenderer:
                 self._meshes[body.mesh] = TracedMesh.of(body.mesh)
         return {body.mesh: self._meshes[body.mesh].embree for body in scene.objects}
 
-    def _bent_light(self, shader: Shader, picture: Picture, plan: RenderPlan) -> BentLight | None:
+    def _bent_light(self, shader: Shader, picture: PictureRays, plan: RenderPlan) -> TracedRadiance | None:
         """Rays that bend in a scene, if its bodies have interfaces; the last scene's shapes are kept."""
         scene = shader.scene
         if not bends(scene) or plan.interfaces is None:
@@ -207,21 +214,21 @@ class CpuRenderer:
         shapes = tuple((body.mesh, body.matrix.tobytes()) for body in scene.objects)
         if self._caster is None or self._caster[0] != shapes:
             self._caster = shapes, ExactRayCaster(scene.objects)
-        diffused = DiffusedLight(self._fields.of(plan).surfaces)
-        return BentLight.of(shader, self._caster[1], picture.size, plan.interfaces.tree, diffused)
+        diffused = DiffusionFields(self._fields.of(plan).surfaces)
+        return TracedRadiance.of(shader, self._caster[1], picture.size, plan.interfaces.tree, diffused)
 
     def _draw(
         self,
         shader: Shader,
-        picture: Picture,
-        bent: BentLight | None,
+        picture: PictureRays,
+        bent: TracedRadiance | None,
         keep: Callable[[Band, Arrays], None],
-        spread: Spread | None = None,
+        spread: MicrofacetSamples | None = None,
     ) -> Seconds:
         """Shade a picture, and pass each band of it to `keep`; returns the seconds of each part."""
         started = time.perf_counter()
         objects = shader.scene.objects
-        tracers = in_threads(lambda body: Tracer(self._meshes[body.mesh], body, picture), objects, self._threads)
+        tracers = in_threads(lambda body: PixelTracer(self._meshes[body.mesh], body, picture), objects, self._threads)
         prepared = time.perf_counter()
 
         def draw(band: Band) -> tuple[float, float]:

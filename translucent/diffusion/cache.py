@@ -18,8 +18,8 @@ from translucent.diffusion.keys import (
     place_of,
     roughness_of,
 )
-from translucent.diffusion.photon_fluence import EnteringPhotons, FineCells, bent_light
-from translucent.diffusion.volume import DiffusingVolume, PhotonLight, VolumeField, VolumeGrid
+from translucent.diffusion.photons import EnteringPhotons, FineCells, photons_in_media
+from translucent.diffusion.volume import DiffusingVolume, PhotonFluence, VolumeField, VolumeGrid
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
 from translucent.planning.caustics import opaque_to_shadows
@@ -158,17 +158,17 @@ class FieldCache:
         fogs = [i for i in lit if treatment_of(scene.objects[i]) is Treatment.VOLUME]
         grids = {i: self._grid(scene.objects[i], plan.diffusion).grid for i in fogs}
         cells = {i: FineCells.of(own.cells.low, own.cells.step, own.number.shape) for i, own in grids.items()}
-        found = bent_light(scene, caustics, cells, [i for i in lit if i not in fogs])
+        found = photons_in_media(scene, caustics, cells, [i for i in lit if i not in fogs])
         bending = opaque_to_shadows(scene)
         stops = {i: opaque_surfaces([scene.objects[k] for k in sorted(bending - {i})]) for i in lit}
-        return _Bent({i: PhotonLight(cells[i], found.fluence[i], stops[i]) for i in fogs}, found.entering, stops)
+        return _Bent({i: PhotonFluence(cells[i], found.fluence[i], stops[i]) for i in fogs}, found.entering, stops)
 
 
 @dataclass(frozen=True, eq=False)
 class _Bent:
     """Light of photons in bodies without an interface, in others, and what stops straight light to each."""
 
-    volumes: dict[int, PhotonLight]
+    volumes: dict[int, PhotonFluence]
     entering: dict[int, EnteringPhotons]
     stops: dict[int, RayCaster | None]
 

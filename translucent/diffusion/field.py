@@ -13,12 +13,11 @@ from scipy.ndimage import map_coordinates, uniform_filter
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array
-from translucent.diffusion.densities import Densities, densities
-from translucent.diffusion.dimming import dimming_bodies, sky_paths
 from translucent.diffusion.entering import (
     BEFORE,
     Casters,
     Sky,
+    dimming_bodies,
     environment_parts,
     flux_of,
     from_itself,
@@ -26,12 +25,13 @@ from translucent.diffusion.entering import (
     nearest_parts,
     sky_light,
     sky_of,
+    sky_paths,
     transfer,
 )
 from translucent.diffusion.first_events import Beam
-from translucent.diffusion.grid import BodyGrid, body_grid
-from translucent.diffusion.photon_fluence import EnteringPhotons
-from translucent.diffusion.solution import BodySystem, SurfaceLight
+from translucent.diffusion.grid import BodyGrid, Densities, body_grid, densities
+from translucent.diffusion.photons import EnteringPhotons
+from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_cosine, emergent_fluxes
 from translucent.formulas.diffusion import emergent_radiance, haze_shares
@@ -313,7 +313,7 @@ def _cell_at(grid: BodyGrid, point: Array) -> int:
     return int(grid.number[tuple(place)])
 
 
-def _field(lit: LitBody, medium: Medium, roughness: float, found: SurfaceLight) -> DiffusionField:
+def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolution) -> DiffusionField:
     grid, extinction = lit.grid, medium.extinction
     reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
     total = reduced + np.asarray(medium.absorption)

@@ -15,8 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from translucent.arrays import Array, Integers
-from translucent.diffusion.densities import Densities
-from translucent.diffusion.grid import BodyGrid, box_points
+from translucent.diffusion.grid import BodyGrid, Densities, box_points
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
     diffuse_interface,
@@ -67,7 +66,7 @@ class Beam:
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
+class LayerSolution:
     """One-dimensional solutions between the surface (depth 0) and the depth at which the fluence is read, per sample.
 
     u is 1 at the surface, where it satisfies the condition; the fluence below is that at the depth over u there, and
@@ -194,7 +193,7 @@ class FirstEvents:
     def __init__(
         self,
         grid: BodyGrid,
-        layer: Layer,
+        layer: LayerSolution,
         ior: float,
         absorption: float,
         scattering: float,

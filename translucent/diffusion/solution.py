@@ -18,16 +18,153 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import cg
 
 from translucent.arrays import Array
-from translucent.diffusion.cells import CellSystem
-from translucent.diffusion.densities import Densities, even_densities
-from translucent.diffusion.first_events import Beam, FirstEvents, Layer, Ways, diffuse_ways, scattered_shares, ways_of
-from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.first_events import (
+    Beam,
+    FirstEvents,
+    LayerSolution,
+    Ways,
+    diffuse_ways,
+    scattered_shares,
+    ways_of,
+)
+from translucent.diffusion.grid import BodyGrid, Densities, even_densities
+from translucent.errors import RenderError
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient, half_space_reflectance
 from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 from translucent.media.medium import Medium
+
+#: Solutions that are kept, and numbers in all of them together.
+MOST, MOST_NUMBERS = 32, 1 << 23
+
+#: Share of the largest energy of mixtures below which one of unit size is rounding.
+ROUNDING = 1e-13
+
+
+class KnownSolutions:
+    """Span of the last solutions, for a starting point that is nearest in energy (Fischer 1998).
+
+    Diffusion is linear in the light: once environments and lamps have been solved for, mixtures of them, dimmed or
+    tinted, need no more steps; and as diffusion is smooth, turns of an environment need few.
+
+    Parameters
+    ----------
+    matrix : (n, n) csr_array
+        Symmetric, positive definite.
+    """
+
+    def __init__(self, matrix: sparse.csr_array) -> None:
+        self._matrix = matrix
+        count = matrix.shape[0]
+        most = max(2, min(MOST, MOST_NUMBERS // max(count, 1)))
+        self._solutions = np.zeros((most, count))
+        self._energies = np.zeros((most, most))
+        self._oldest = 0
+
+    def nearest(self, wanted: Array) -> Array:
+        """(n,): of the span, what is nearest in energy to the solution for a right-hand side (n,)."""
+        mixture = np.linalg.lstsq(self._energies, self._solutions @ wanted, rcond=ROUNDING)[0]
+        return np.asarray(mixture @ self._solutions)
+
+    def add(self, solution: Array) -> None:
+        """Take in a solution (n,) of unit energy, in place of the oldest."""
+        pushed = self._matrix @ solution
+        if (energy := float(solution @ pushed)) <= 0.0:
+            return
+        size = np.sqrt(energy)
+        self._solutions[self._oldest] = solution / size
+        with_others = self._solutions @ pushed / size
+        self._energies[self._oldest], self._energies[:, self._oldest] = with_others, with_others
+        self._oldest = (self._oldest + 1) % len(self._solutions)
+
+
+#: Relative residual at which a solution is good enough: far below what diffusion itself gets wrong.
+TOLERANCE = 1e-4
+
+#: The same for factors that are near 1.
+ROUGH = 1e-3
+
+#: Steps after which conjugate gradients are given up.
+MOST_STEPS = 4000
+
+
+class CellSystem:
+    """Fluence in cells between which light flows, in which it is absorbed, and from which it leaves.
+
+    Parameters
+    ----------
+    grid : BodyGrid
+    d : (cells,) float64
+        Diffusion coefficient in m; between two cells it is that of their halves in series.
+    absorbed : (cells,) float64
+        Power for each fluence that a cell absorbs, in m^2: sigma_a times its volume.
+    lost : (s,) float64
+        Power for each fluence that leaves at the samples of the surface, in m^2.
+    """
+
+    def __init__(self, grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> None:
+        matrix = _balance(grid, d, absorbed, lost)
+        self._scale = 1.0 / np.sqrt(matrix.diagonal())
+        self._matrix = sparse.csr_array(sparse.diags_array(self._scale) @ matrix @ sparse.diags_array(self._scale))
+        self._known = KnownSolutions(self._matrix)
+
+    def solved(self, source: Array) -> tuple[Array, int]:
+        """Fluence (cells,) for powers (cells,), and iterations; none where sources of before are mixed anew.
+
+        Raises
+        ------
+        RenderError
+            If the solver does not get there.
+        """
+        wanted = source * self._scale
+        found, steps = self._found(wanted, self._known.nearest(wanted), TOLERANCE)
+        if steps:
+            self._known.add(found)
+        return np.asarray(found * self._scale), steps
+
+    def forget(self) -> None:
+        """Start the next solution from nothing."""
+        self._known = KnownSolutions(self._matrix)
+
+    def rough(self, source: Array) -> Array:
+        """Fluence (cells,) for powers (cells,) up to a residual of `ROUGH`; no other solution starts from it."""
+        return np.asarray(self._found(source * self._scale, None, ROUGH)[0] * self._scale)
+
+    def _found(self, wanted: Array, near: Array | None, tolerance: float) -> tuple[Array, int]:
+        steps = 0
+
+        def count(_: Array) -> None:
+            nonlocal steps
+            steps += 1
+
+        found, failed = cg(self._matrix, wanted, x0=near, rtol=tolerance, maxiter=MOST_STEPS, callback=count)
+        if failed:
+            raise RenderError(
+                "diffusion in a body",
+                f"the solver is not there after {MOST_STEPS} steps in {len(wanted)} cells",
+                "render with scattering=tl.ScatteringLayer()",
+            )
+        return np.asarray(found), steps
+
+
+def _balance(grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> sparse.csr_array:
+    """Symmetric matrix of what flows between cells, is absorbed in them, and leaves through the surface."""
+    first, second, ratio = grid.faces
+    flow = 2.0 / (1.0 / d[first] + 1.0 / d[second]) * ratio
+    # Crumbs that no sample reads would otherwise keep all of the light that is put into them.
+    diagonal = absorbed + np.where(grid.crumbs, d * grid.cells.step, 0.0)
+    diagonal += np.bincount(first, flow, grid.count) + np.bincount(second, flow, grid.count)
+    between = sparse.coo_array(
+        (np.concatenate([-flow, -flow]), (np.concatenate([first, second]), np.concatenate([second, first]))),
+        (grid.count, grid.count),
+    )
+    read, _ = grid.below
+    leaving = read.T @ sparse.diags_array(lost) @ read
+    return sparse.csr_array(between + sparse.diags_array(diagonal) + leaving)
+
 
 #: Largest number of times that light of the body falls on the body again, and the change at which it is enough.
 MOST_BOUNCES, ENOUGH = 24, 1e-3
@@ -43,7 +180,7 @@ _LEAST_ABSORBING = 0.02
 
 
 @dataclass(frozen=True)
-class SurfaceLight:
+class DiffuseSolution:
     """Light at the samples of a body's surface.
 
     Attributes
@@ -103,7 +240,7 @@ class BodySystem:
         self._grid, self._dense = grid, dense or even_densities(grid)
         ways = diffuse_ways(grid, self._dense, medium.ior)
         self._channels = {
-            channel: _Channel(
+            channel: _ChannelSystem(
                 grid,
                 medium.ior,
                 roughness,
@@ -121,7 +258,7 @@ class BodySystem:
     @np.errstate(under="ignore")
     def solved(
         self, entering: Array, from_itself: sparse.csr_array, inside: Array, beams: Sequence[Beam] = ()
-    ) -> SurfaceLight:
+    ) -> DiffuseSolution:
         """Light at the body's surface.
 
         Parameters
@@ -152,7 +289,7 @@ class BodySystem:
             fluence[:, channel], flux[:, channel], cells[:, channel], taken = found
             scattered[:, channel] = system.scattered
             steps += taken
-        return SurfaceLight(fluence, flux, cells, scattered, steps)
+        return DiffuseSolution(fluence, flux, cells, scattered, steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +302,7 @@ class _Beamed:
     power: Array
 
 
-class _Channel:
+class _ChannelSystem:
     """The linear system of one channel."""
 
     def __init__(
@@ -188,7 +325,7 @@ class _Channel:
         self._albedo = scattering / extinction
         d = float(diffusion_coefficient(absorption, scattering))
         self._read, depth = grid.below[0], dense.depth
-        layer = Layer(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
+        layer = LayerSolution(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
         self._relative = 1.0 / layer.u(depth)
         self._attenuated = optics.transmittance(layer.attenuation * depth) * self._relative
         # 4 V / S is the mean chord (Cauchy).
@@ -209,7 +346,7 @@ class _Channel:
         #: (s,): see `SurfaceLight`.
         self.scattered = scattered_shares(grid, dense, ior, extinction)[grid.nearest].mean(axis=1)
         if corrected:
-            lossless = _Channel(grid, ior, roughness, 0.0, extinction, dense, ways, corrected=False)
+            lossless = _ChannelSystem(grid, ior, roughness, 0.0, extinction, dense, ways, corrected=False)
             # What half-spaces absorb has not been in the body long enough to get to other parts of it.
             share = half_space_reflectance(round(self._albedo, 6), ior)
             found = lossless.by_uniform_light()

@@ -96,7 +96,7 @@ def build_hierarchy(low: Floats, high: Floats, leaf_size: int = LEAF_SIZE) -> Hi
 
 def _built(low: Floats, high: Floats, order: Integers, leaf_size: int) -> Hierarchy:
     """Hierarchy of some boxes, in their order along the curve."""
-    tree = _Tree(np.ascontiguousarray(low[order].T), np.ascontiguousarray(high[order].T))
+    tree = _BinaryTree(np.ascontiguousarray(low[order].T), np.ascontiguousarray(high[order].T))
     return _laid_out(tree, order, leaf_size)
 
 
@@ -160,7 +160,7 @@ def _spread(bits: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
     return bits
 
 
-class _Tree:
+class _BinaryTree:
     """Binary tree over boxes (3, m): nodes 0 to m - 1 are the boxes, the others follow in the order of merging.
 
     Attributes
@@ -222,7 +222,7 @@ def _partners(low: Floats, high: Floats) -> Integers:
     return partner
 
 
-def _laid_out(tree: _Tree, order: Integers, leaf_size: int) -> Hierarchy:
+def _laid_out(tree: _BinaryTree, order: Integers, leaf_size: int) -> Hierarchy:
     """Depth-first layout of the nodes of a tree that are worth a test."""
     leaves, total = len(order), len(tree.low[0])
     counts = np.ones(total, np.int32)
@@ -255,7 +255,7 @@ def _laid_out(tree: _Tree, order: Integers, leaf_size: int) -> Hierarchy:
     )
 
 
-def _shares(tree: _Tree, counts: npt.NDArray[np.int32], leaf_size: int) -> npt.NDArray[np.int8]:
+def _shares(tree: _BinaryTree, counts: npt.NDArray[np.int32], leaf_size: int) -> npt.NDArray[np.int8]:
     """(n,): 1 for the nodes of a tree that are kept, 0 for those within leaves; others are replaced by that many.
 
     Skip links let a node have any number of children. One whose bounds are hardly smaller than those of the node above
@@ -299,7 +299,9 @@ def _shares(tree: _Tree, counts: npt.NDArray[np.int32], leaf_size: int) -> npt.N
     return shares
 
 
-def _depth_first(tree: _Tree, nodes: npt.NDArray[np.int32], shown: npt.NDArray[np.bool_]) -> npt.NDArray[np.int32]:
+def _depth_first(
+    tree: _BinaryTree, nodes: npt.NDArray[np.int32], shown: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.int32]:
     """(8, n): place of each node in the order for each octant; `nodes` counts those that are shown in subtrees."""
     center = tree.low + tree.high
     orders = np.zeros((8, len(nodes)), np.int32)

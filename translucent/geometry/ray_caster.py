@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from functools import cache, cached_property
 from importlib.metadata import version
 from typing import TYPE_CHECKING, NamedTuple, Protocol
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -133,6 +134,14 @@ class RayCaster:
     def first_hits(self, origins: Array, directions: Array) -> tuple[Integers, Array]:
         """Nearest face ahead, (k,), -1 where there is none, and its distance (k,); rays as for `candidates`."""
         return first_hits(self.scene, origins, directions)
+
+
+_CASTERS: WeakKeyDictionary[Mesh, RayCaster] = WeakKeyDictionary()
+
+
+def ray_caster_of(mesh: Mesh) -> RayCaster:
+    """Ray caster of a mesh, kept as long as the mesh is."""
+    return _CASTERS.get(mesh) or _CASTERS.setdefault(mesh, RayCaster(mesh))
 
 
 class PlacedMesh(Protocol):

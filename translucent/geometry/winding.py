@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Integers, Mask
+from translucent.arrays import Array, Integers, Mask, expanded
 from translucent.errors import InputError
 from translucent.geometry.grouping import CHUNK, extent, sorted_sides, use_mask
 
@@ -345,7 +345,7 @@ def _pairs(triangles: Array, points: Array) -> Iterator[tuple[Integers, Integers
     for begin in range(0, len(triangles), CHUNK):
         low, high = triangles[begin : begin + CHUNK].min(axis=1), triangles[begin : begin + CHUNK].max(axis=1)
         first = np.searchsorted(walls, low[:, 0], side="right")
-        triangle, strip = _expanded(first, np.searchsorted(walls, high[:, 0], side="right") - first + 1)
+        triangle, strip = expanded(first, np.searchsorted(walls, high[:, 0], side="right") - first + 1)
         bottom, top = np.searchsorted(heights, low[:, 1]), np.searchsorted(heights, high[:, 1], side="right")
         first = np.searchsorted(key, strip * (count + 1) + bottom[triangle])
         runs = np.searchsorted(key, strip * (count + 1) + top[triangle]) - first
@@ -354,14 +354,8 @@ def _pairs(triangles: Array, points: Array) -> Iterator[tuple[Integers, Integers
             found = f"{count} of them that look inwards lie one in another"
             raise InputError("parts of a mesh", found, "remove what is there twice, or split the mesh")
         for part in np.split(np.arange(len(runs)), np.searchsorted(ends, np.arange(BLOCK, ends[-1], BLOCK))):
-            run, place = _expanded(first[part], runs[part])
+            run, place = expanded(first[part], runs[part])
             yield begin + triangle[part[run]], order[place]
-
-
-def _expanded(first: Integers, count: Integers) -> tuple[Integers, Integers]:
-    """Number of each run of whole numbers, and the numbers in it, from their first ones and lengths."""
-    run = np.repeat(np.arange(len(first)), count)
-    return run, np.arange(len(run)) + np.repeat(first - (np.cumsum(count) - count), count)
 
 
 def _balanced_parts(

@@ -17,7 +17,7 @@ from translucent.formulas.interface import (
     slab_reflectance,
 )
 from translucent.formulas.thin_film import film_slab_reflectance, film_slab_transmittance
-from translucent.reference.interfaces import Inside, Interfaces, Optics, interface_normals
+from translucent.reference.interfaces import FirstInterfaces, Inside, Optics, interface_normals
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
 from translucent.reference.rays import Rays
@@ -142,7 +142,7 @@ class Interactions:
         self,
         own: Optics,
         live: LiveRays,
-        interfaces: Interfaces,
+        interfaces: FirstInterfaces,
         light: SurfaceLight,
         rng: np.random.Generator | None,
         lights: StraightLight | None = None,

@@ -19,7 +19,7 @@ from translucent.reference.compositing import _layers, composite
 from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits
 from translucent.reference.interactions import Interactions, LiveRays, StraightLight, joined
-from translucent.reference.interfaces import Inside, Interfaces, Optics
+from translucent.reference.interfaces import FirstInterfaces, Inside, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge
 from translucent.reference.opaque import OpaqueHits, nearest_opaque
 from translucent.reference.phase import scattered_directions
@@ -60,7 +60,7 @@ class _Flight:
 
     hits: list[Hits]
     wall: OpaqueHits
-    interfaces: Interfaces
+    interfaces: FirstInterfaces
     end: Array
     leaves: Mask
 

@@ -54,7 +54,7 @@ class Inside:
 
 
 @dataclass(frozen=True, eq=False)
-class Interfaces:
+class FirstInterfaces:
     """First interface on each ray; all arrays (n,).
 
     Attributes
@@ -81,9 +81,9 @@ class Interfaces:
     here: Inside
     there: Inside
 
-    def where(self, chosen: Integers) -> Interfaces:
+    def where(self, chosen: Integers) -> FirstInterfaces:
         """Selection of rays by indices."""
-        return Interfaces(
+        return FirstInterfaces(
             self.distance[chosen],
             self.item[chosen],
             self.face[chosen],
@@ -184,11 +184,11 @@ class Optics:
 
     def crossed(self, hits: Sequence[Hits], inside: Inside) -> Inside:
         """State of rays that start `inside` bodies, behind surfaces."""
-        return _Walk(self, hits, inside).through()
+        return _InterfaceWalk(self, hits, inside).through()
 
-    def first_interfaces(self, hits: Sequence[Hits], inside: Inside) -> Interfaces:
+    def first_interfaces(self, hits: Sequence[Hits], inside: Inside) -> FirstInterfaces:
         """First interfaces among the surfaces ahead of rays that start `inside` bodies."""
-        return _Walk(self, hits, inside).to_interfaces()
+        return _InterfaceWalk(self, hits, inside).to_interfaces()
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +218,7 @@ class _Crossings:
         return _Crossings(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
-class _Walk:
+class _InterfaceWalk:
     """Walk of rays from surface to surface, all at once, until their medium changes."""
 
     def __init__(self, optics: Optics, hits: Sequence[Hits], inside: Inside) -> None:
@@ -236,7 +236,7 @@ class _Walk:
             self._cross(self.crossings.where(layer))
         return self.inside
 
-    def to_interfaces(self) -> Interfaces:
+    def to_interfaces(self) -> FirstInterfaces:
         """First interface of each ray."""
         count = len(self.time)
         self.here = Inside(self.inside.windings.copy(), self.inside.since.copy())
@@ -286,7 +286,7 @@ class _Walk:
     def _changed(self, ray: Integers) -> Mask:
         return self.optics.matters(self.before[ray], self.optics.effective_medium(self.inside.where(ray)))
 
-    def _interfaces(self) -> Interfaces:
+    def _interfaces(self) -> FirstInterfaces:
         rays = np.arange(len(self.time))
         after = self.optics.effective_medium(self.inside)
         is_sheet = self.sheet >= 0
@@ -294,7 +294,7 @@ class _Walk:
         # The interface is that of the body that is entered; where the ray only leaves one, of that.
         entered = (after != AIR) & (self.face[rays, after] >= 0)
         item = np.where(is_sheet, self.sheet, np.where(entered, after, self.before))
-        return Interfaces(
+        return FirstInterfaces(
             np.where(found, self.reached, np.inf),
             item,
             self.face[rays, item],
@@ -306,7 +306,7 @@ class _Walk:
         )
 
 
-def interface_normals(own: Optics, interfaces: Interfaces, directions: Array) -> tuple[Array, Array]:
+def interface_normals(own: Optics, interfaces: FirstInterfaces, directions: Array) -> tuple[Array, Array]:
     """Unit normals (n, 3) of interfaces, towards where rays (n, 3) come from: of smooth surfaces, and of their faces.
 
     Smooth normals may look away from a ray that their face looks at: it meets the interface edge-on.

@@ -20,7 +20,7 @@ from translucent.planning.render_plan import RenderPlan
 from translucent.reference import compositing as blending
 from translucent.reference.compositing import Layer, _layers
 from translucent.reference.light_paths import LightPaths
-from translucent.reference.quadrature import Steps, even_steps, gauss_steps, hashed
+from translucent.reference.quadrature import MarchSteps, even_steps, gauss_steps, hashed
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.render import CrossedMedia, crossed_media, scene_hits, seen_behind
 from translucent.reference.scattering import light_source, light_variable
@@ -242,7 +242,7 @@ class _March:
         layers = [Layer(color[:, i], depth[:, i]) for i in range(depth.shape[1])]
         return layers if self.scheme.associated else [blending.unassociated(layer) for layer in layers]
 
-    def _steps(self, spans: _Spans, terms: _Terms) -> Steps:
+    def _steps(self, spans: _Spans, terms: _Terms) -> MarchSteps:
         """Positions of the samples."""
         method = self.scheme.method
         if method.quadrature == "gauss":

@@ -178,7 +178,7 @@ Variable = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
+class MarchSteps:
     """Steps through intervals, in order; in metres along the rays.
 
     Attributes
@@ -197,7 +197,7 @@ class Steps:
     weight: Array
 
 
-def even_steps(variable: Variable, offset: Array) -> Steps:
+def even_steps(variable: Variable, offset: Array) -> MarchSteps:
     """Even steps in some variable, as in a Riemann sum.
 
     In the distance itself, offset 0 is the left rule, 0.5 the midpoint rule, and random ones are stratified sampling.
@@ -212,10 +212,10 @@ def even_steps(variable: Variable, offset: Array) -> Steps:
     edges, _ = variable(np.broadcast_to(np.arange(count + 1) / count, (len(offset), count + 1)))
     at, stretch = variable((np.arange(count) + offset) / count)
     begin, end = edges[:, :-1], edges[:, 1:]
-    return Steps(begin, end, at, stretch / count)
+    return MarchSteps(begin, end, at, stretch / count)
 
 
-def gauss_steps(start: Array, end: Array, count: int) -> Steps:
+def gauss_steps(start: Array, end: Array, count: int) -> MarchSteps:
     """Gauss-Legendre steps with `count` points from `start` (k,) to `end` (k,).
 
     Each point stands for a step of the length of its weight; by the separation theorem (Szego 1939, section 3.41) these
@@ -226,7 +226,7 @@ def gauss_steps(start: Array, end: Array, count: int) -> Steps:
     length = (end - start)[:, None]
     at = start[:, None] + length * (0.5 + 0.5 * points)
     edges = start[:, None] + length * edges
-    return Steps(edges[:, :-1], edges[:, 1:], at, length * (0.5 * weights))
+    return MarchSteps(edges[:, :-1], edges[:, 1:], at, length * (0.5 * weights))
 
 
 def hashed(column: Integers, row: Integers, number: Integers, seed: int) -> Array:

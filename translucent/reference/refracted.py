@@ -22,7 +22,7 @@ from translucent.reference.compositing import composite
 from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits
 from translucent.reference.interactions import Interactions, LiveRays, joined
-from translucent.reference.interfaces import Interfaces, Optics
+from translucent.reference.interfaces import FirstInterfaces, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge, sum_signs, unbalanced
 from translucent.reference.opaque import OpaqueHits, nearest_opaque, reflected_radiance
 from translucent.reference.rays import Rays
@@ -169,11 +169,11 @@ class RefractedRays:
             carried = np.eye(3)[channel] if len(self.channels) > 1 else np.ones(3)
             for begin in range(0, len(rays), BATCH):
                 owner = np.arange(begin, min(begin + BATCH, len(rays)))
-                _Tree(self, own, found).grow(rays.where(owner), owner, carried)
+                _BranchTree(self, own, found).grow(rays.where(owner), owner, carried)
         return found
 
 
-class _Tree:
+class _BranchTree:
     """Ray tree from interface to interface, for light with the same indices of refraction."""
 
     def __init__(self, refracted: RefractedRays, own: Optics, found: RefractedLight) -> None:
@@ -207,7 +207,7 @@ class _Tree:
         with np.errstate(under="ignore"):
             np.add.at(self.found.radiance, live.owner, live.throughput * radiance)
 
-    def _fly(self, live: LiveRays, start: float) -> tuple[LiveRays, Interfaces]:
+    def _fly(self, live: LiveRays, start: float) -> tuple[LiveRays, FirstInterfaces]:
         """Add radiance of media and ray ends; return rays that reach interfaces, moved there, with those interfaces."""
         rays = live.rays
         reach = np.full(len(live), start), np.full(len(live), np.inf)

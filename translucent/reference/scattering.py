@@ -93,7 +93,7 @@ def _rounding(paths: LightPaths, rays: Rays, segments: Segments) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Spans:
+class _LightSpans:
     """Parts of segments between shadow edges: flat arrays.
 
     Attributes
@@ -114,7 +114,7 @@ class _Spans:
 class _InScatter:
     """Integrand of each span, in the variable of its light, 0 to 1."""
 
-    def __init__(self, paths: LightPaths, rays: Rays, segments: Segments, filling: Array, spans: _Spans) -> None:
+    def __init__(self, paths: LightPaths, rays: Rays, segments: Segments, filling: Array, spans: _LightSpans) -> None:
         self.paths, self.rays, self.segments, self.filling, self.spans = paths, rays, segments, filling, spans
         self.before = depths_before(segments, len(rays))
         self.sound = np.ones(len(rays), dtype=bool)
@@ -201,7 +201,7 @@ def depths_before(segments: Segments, pixels: int) -> Array:
     return before
 
 
-def _spans(paths: LightPaths, number: int, rays: Rays, segments: Segments, chosen: Integers) -> _Spans:
+def _spans(paths: LightPaths, number: int, rays: Rays, segments: Segments, chosen: Integers) -> _LightSpans:
     """Spans of some segments, cut at the edges of shadows and cones."""
     seen = np.unique(segments.pixel[chosen])
     light = paths.lights[number]
@@ -220,11 +220,13 @@ def _spans(paths: LightPaths, number: int, rays: Rays, segments: Segments, chose
     owner, start = owner[inside], t[inside]
     end = np.where(np.append(owner[1:] == owner[:-1], False), np.append(start[1:], 0.0), segments.t_exit[owner])
     some = end > start
-    return _Spans(np.full(int(some.sum()), number), owner[some], start[some], end[some])
+    return _LightSpans(np.full(int(some.sum()), number), owner[some], start[some], end[some])
 
 
-def _joined(parts: list[_Spans]) -> _Spans:
-    return _Spans(*(np.concatenate([getattr(part, name) for part in parts]) for name in _Spans.__match_args__))
+def _joined(parts: list[_LightSpans]) -> _LightSpans:
+    return _LightSpans(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in _LightSpans.__match_args__)
+    )
 
 
 def _cut(work: _InScatter) -> tuple[Integers, Array, Array]:
