@@ -22,6 +22,7 @@ from translucent.files.paths import require_file
 from translucent.files.reading import open_file, require_memory, require_room, shown, size_text
 from translucent.geometry.mesh import PER_TRIANGLE, Mesh, Triangles, adopted, joined, mended
 from translucent.gltf.load import read_whole
+from translucent.signals import import_trimesh
 from translucent.units import metres_per_unit
 
 # Without a handler of its own, what trimesh logs of a damaged file is printed.
@@ -106,9 +107,7 @@ def _read(path: Path, allow_outside: bool) -> Triangles:
 
 def mesh_formats() -> set[str]:
     """Suffixes of the files that can be read, without their dots."""
-    from trimesh.exchange.load import mesh_formats
-
-    return set(mesh_formats()) - _ARCHIVES
+    return set(import_trimesh("trimesh.exchange.load").mesh_formats()) - _ARCHIVES
 
 
 def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Triangles:
@@ -143,13 +142,11 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
 
 def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
     """Triangles of each part of a file, by trimesh."""
-    import trimesh
-    from trimesh.exchange.load import mesh_loaders
-
+    trimesh, loaders = import_trimesh(), import_trimesh("trimesh.exchange.load").mesh_loaders
     known = {"skip_materials": True} if kind in ("obj", "ply") else {}
     if kind in _PLAIN:
         # Copying what they hold into a scene and out of it takes longer than reading.
-        content = mesh_loaders[kind](stream, file_type=kind, resolver=_NoLinks(), **known)
+        content = loaders[kind](stream, file_type=kind, resolver=_NoLinks(), **known)
         listed = list(content["geometry"].values()) if kind == "obj" and "geometry" in content else [content]
         if all(_is_plain(one) for one in listed):
             return [_triangles(one["vertices"], one["faces"], one.get("visual")) for one in listed]

@@ -221,6 +221,31 @@ def test_what_trimesh_logs_of_a_damaged_file_is_not_printed(tmp_path: Path) -> N
     assert (done.stdout, done.stderr) == ("1\n", "")
 
 
+INTERRUPTED_IMPORT = """
+import signal, sys, translucent as tl
+
+class Pressed:
+    def find_spec(self, name, *_):
+        if name == "networkx":
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Pressed())
+try:
+    tl.load_mesh(sys.argv[1])
+except KeyboardInterrupt:
+    from trimesh import graph
+    print(graph.nx.__name__)
+"""
+
+
+def test_an_interrupted_import_of_trimesh_is_whole_and_interrupts(tmp_path: Path) -> None:
+    """trimesh catches what is raised while it imports networkx, and would raise it wherever that is used."""
+    trimesh.creation.box().export(tmp_path / "a.stl")
+    command = [sys.executable, "-c", INTERRUPTED_IMPORT, tmp_path / "a.stl"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("networkx\n", "")
+
+
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
     with pytest.raises(tl.InputError, match="it is a folder; give a file in it"):
         load_mesh(tmp_path)

@@ -47,6 +47,7 @@ from translucent.media.medium import Medium
 from translucent.planning.plan import plan
 from translucent.scene.camera import Camera
 from translucent.scene.showcase import showcase
+from translucent.signals import import_trimesh
 from translucent.units import metres_per_unit
 
 if TYPE_CHECKING:
@@ -338,7 +339,7 @@ def _matrix(file: GltfFile, part: Record) -> Array:
 
 def mesh_corners(path: Path, metres: float) -> Corners:
     """Corners of a mesh in any other file, as stored."""
-    import trimesh
+    trimesh = import_trimesh()
 
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")

@@ -26,6 +26,7 @@ from translucent.renderer import Renderer
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene
+from translucent.signals import import_trimesh
 
 #: Largest number of points of a relief.
 MOST_POINTS = 4_000_000
@@ -78,7 +79,7 @@ class Lithophane:
         RenderError
             If the file cannot be written.
         """
-        import trimesh
+        trimesh = import_trimesh()
 
         path = check_lithophane_output(Path(path))
         solid = trimesh.Trimesh(1e3 * self.mesh.vertices, self.mesh.faces, process=False)

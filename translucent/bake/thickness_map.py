@@ -55,6 +55,7 @@ from translucent.geometry.mesh import Mesh
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.file import GltfFile, fill_gltf, write_gltf
 from translucent.media.medium import Medium
+from translucent.signals import import_trimesh
 
 MAP_SUFFIXES = (".exr", ".png", ".npy", ".npz", ".glb")
 VERTEX_SUFFIXES = (".ply", ".glb", ".npy")
@@ -382,7 +383,7 @@ def save_vertices(result: VertexThickness, path: str | Path, *, about: Record | 
         if suffix == ".npy":
             write_npy(temporary, values)
             return
-        import trimesh
+        trimesh = import_trimesh()
 
         mesh = trimesh.Trimesh(result.mesh.vertices, result.mesh.faces, process=False)
         mesh.vertex_attributes["thickness"] = values

@@ -15,6 +15,7 @@ from translucent.geometry.solids import Box, Ellipsoid, Sphere, Torus
 from translucent.media.medium import Medium
 from translucent.mesh_files import load_mesh
 from translucent.scene.scene import Object
+from translucent.signals import import_trimesh
 
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]
@@ -39,12 +40,12 @@ def toolkit(name: str) -> Mesh:
 
 def subdivided(name: str, triangles: int) -> Mesh:
     """A mesh of the toolkit with each face cut in four until it has at least this many."""
-    from trimesh.remesh import subdivide
+    remesh = import_trimesh("trimesh.remesh")
 
     mesh = toolkit(name)
     vertices, faces = mesh.vertices, mesh.faces
     while len(faces) < triangles:
-        vertices, faces = subdivide(vertices, faces)
+        vertices, faces = remesh.subdivide(vertices, faces)
     return Mesh(vertices, faces, name=name)
 
 

