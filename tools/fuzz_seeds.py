@@ -25,7 +25,7 @@ from translucent.bench.record import (
     ReportPicture,
     TimeStatistics,
 )
-from translucent.files.unpacking import PICTURES
+from translucent.files.images import PICTURES
 from translucent.frames.photographs import read_photographs, read_picture
 from translucent.geometry.solids import Box
 from translucent.gltf.materials import read_materials

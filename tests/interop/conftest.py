@@ -22,7 +22,7 @@ def pyrender(renderer: tl.Renderer) -> ModuleType:
         module = load_pyrender(context.backend)
     except tl.RenderError as error:
         pytest.skip(str(error))
-    from translucent.interop._pyrender_drawing import why_not_in
+    from translucent.interop._pyrender_bridge import why_not_in
 
     if why := why_not_in(context):
         pytest.skip(f"pyrender cannot draw here: {why}")

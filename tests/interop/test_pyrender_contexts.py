@@ -105,7 +105,7 @@ def test_a_failure_leaves_scene_and_contexts_as_they_were(
 ) -> None:
     from OpenGL.error import GLError
 
-    from translucent.interop import _pyrender_drawing as drawing
+    from translucent.interop import _pyrender_bridge as drawing
 
     def fail(self: Any, *_: Any) -> None:
         raise GLError(1282, description="refused on purpose")
@@ -204,8 +204,7 @@ def test_what_is_freed_is_freed_once(
     pyrender: ModuleType, renderer: tl.Renderer, studio: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A renderer of pyrender frees again when it is collected: by then a name may be that of somebody else."""
-    from translucent.interop._pyrender_drawing import OpaqueRenderer
-    from translucent.interop._pyrender_scenes import opaque_part
+    from translucent.interop._pyrender_bridge import OpaqueRenderer, opaque_part
 
     with renderer.gpu.context.current():
         drawing = OpaqueRenderer(SIZE)

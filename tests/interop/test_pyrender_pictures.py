@@ -311,7 +311,7 @@ def _bodies(scene: tl.Scene) -> tl.Scene:
 
 
 def test_at_edges_the_environment_is_seen_in_part(pyrender: ModuleType) -> None:
-    from translucent.interop._pyrender_scenes import PyrenderPicture
+    from translucent.interop._pyrender_bridge import PyrenderPicture
 
     # One pixel of three is covered by half, by a surface that is encoded as 0.8.
     colors = np.array([[[0, 0, 0, 0], [102, 102, 102, 128], [204, 204, 204, 255]]], dtype=np.uint8)

@@ -27,7 +27,7 @@ from translucent.preview.actions import (
     Zoom,
     apply,
 )
-from translucent.preview.document import RANGES, Document, Material, Model, Orbit
+from translucent.preview.document import Document, Material, Model, Orbit
 from translucent.preview.panels import material as numbers
 from translucent.preview.quality import FrameBudget, StepTimes
 from translucent.preview.scenes import Loaded, material_of, medium_of, request_of, scene_of
@@ -62,13 +62,6 @@ def test_a_change_makes_a_new_document_and_leaves_the_old_one() -> None:
 def test_a_bad_value_is_refused(field: str, value: object, message: str) -> None:
     with pytest.raises(tl.InputError, match=message):
         apply(Document(), SetField(field, value))
-
-
-def test_every_range_is_of_a_field() -> None:
-    document = dataclasses.replace(Document(), orbit=Orbit())
-    for name in RANGES:
-        section, key = name.split(".")
-        assert hasattr(getattr(document, section), key)
 
 
 def test_a_drag_is_one_step_of_undo() -> None:

@@ -36,9 +36,8 @@ from translucent.bake.settings import BakeSettings
 from translucent.bake.thickness_map import add_uv_file, check_map_output
 from translucent.diffusion.harmonics import LitAlone, Transfer
 from translucent.errors import InputError, TranslucentWarning
-from translucent.files.images import write_exr
+from translucent.files.images import read_exr, write_exr
 from translucent.files.paths import OutputFiles, require_file
-from translucent.files.unpacking import read_exr
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.spherical_harmonics import COUNT, scattered_radiance
 from translucent.geometry.mesh import Mesh

@@ -28,8 +28,8 @@ from translucent.bake.measure import Measure
 from translucent.bake.rays import Points, PreparedMesh, barycentric, blend
 from translucent.bake.settings import BakeSettings
 from translucent.errors import InputError
+from translucent.files.images import read_arrays
 from translucent.files.paths import write_atomically
-from translucent.files.unpacking import read_arrays
 from translucent.geometry.mesh import Mesh
 from translucent.version import VERSION
 

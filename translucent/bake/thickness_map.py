@@ -47,10 +47,18 @@ from translucent.bake.record import (
 from translucent.bake.settings import DEFINITIONS, BakeSettings
 from translucent.errors import InputError, RenderError, TranslucentError
 from translucent.extras import require_package
-from translucent.files.images import write_exr, write_npy, write_npz, write_png
+from translucent.files.images import (
+    open_picture,
+    read_array,
+    read_arrays,
+    read_exr,
+    write_exr,
+    write_npy,
+    write_npz,
+    write_png,
+)
 from translucent.files.paths import OutputFiles, require_file, require_output, write_atomically
 from translucent.files.reading import open_file, read_bytes
-from translucent.files.unpacking import open_picture, read_array, read_arrays, read_exr
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.file import GltfFile, fill_gltf, write_gltf

@@ -30,8 +30,8 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning, close_names, did_you_mean
+from translucent.files.images import open_picture
 from translucent.files.reading import shown
-from translucent.files.unpacking import open_picture
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.file import GltfFile, Json, JsonFields, LeftOut, label
 from translucent.gltf.materials import GltfMaterial

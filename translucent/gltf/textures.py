@@ -22,7 +22,7 @@ from PIL import Image
 
 from translucent.arrays import Array
 from translucent.errors import InputError, UnreadableError
-from translucent.files.unpacking import open_picture
+from translucent.files.images import open_picture
 from translucent.formulas.color import srgb_to_linear
 from translucent.gltf.file import GltfFile, Json, JsonFields, LeftOut, label
 from translucent.scene.texture import Texture, Wrap

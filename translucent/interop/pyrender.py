@@ -164,7 +164,7 @@ def scene_from_pyrender(
         If pyrender cannot be imported.
     """
     load_pyrender()
-    from translucent.interop._pyrender_scenes import converted
+    from translucent.interop._pyrender_bridge import converted
 
     return converted(scene, media, check_size(size), overlap)
 
@@ -191,7 +191,7 @@ def backdrop_from_pyrender(scene: Any, translucent: Collection[str], size: tuple
         If pyrender cannot be imported, or has no OpenGL.
     """
     load_pyrender()
-    from translucent.interop._pyrender_drawing import drawn_apart
+    from translucent.interop._pyrender_bridge import drawn_apart
 
     size = check_size(size)
     return drawn_apart(_opaque_part(scene, translucent, size, flags), size, flags).backdrop()
@@ -247,7 +247,7 @@ def render(
             return render(scene, media, size, method, samples, made, shared, flags, overlap)
     context = renderer.gpu.context
     pyrender = load_pyrender(context.backend)
-    from translucent.interop import _pyrender_drawing as drawing
+    from translucent.interop import _pyrender_bridge as drawing
 
     size = check_size(size)
     ours = scene_from_pyrender(scene, media, size, overlap)
@@ -300,7 +300,7 @@ def to_pyrender(scene: Scene) -> Any:
         If pyrender cannot be imported.
     """
     load_pyrender()
-    from translucent.interop._pyrender_scenes import written
+    from translucent.interop._pyrender_bridge import written
 
     _require_opaque(scene)
     return written(scene)
@@ -345,8 +345,7 @@ def render_scene(
     context = renderer.gpu.context
     _require_copying("its opaque objects always come so", owned=context.owned, shared=None)
     pyrender = load_pyrender(context.backend)
-    from translucent.interop._pyrender_drawing import drawn_apart
-    from translucent.interop._pyrender_scenes import written
+    from translucent.interop._pyrender_bridge import drawn_apart, written
 
     size = check_size(size)
     picture = drawn_apart(written(scene), size, 0)
@@ -369,8 +368,7 @@ def _require_opaque(scene: Scene) -> None:
 
 def _opaque_part(scene: Any, translucent: Collection[str], size: tuple[int, int], flags: int) -> Any:
     """Check the scene that pyrender is to draw."""
-    from translucent.interop._pyrender_drawing import PICTURE_FLAGS
-    from translucent.interop._pyrender_scenes import camera_of, opaque_part, translucent_nodes
+    from translucent.interop._pyrender_bridge import PICTURE_FLAGS, camera_of, opaque_part, translucent_nodes
 
     if flags & ~PICTURE_FLAGS:
         raise InputError(

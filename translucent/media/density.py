@@ -16,8 +16,8 @@ import numpy.typing as npt
 from translucent.arguments import checked, vectors
 from translucent.arrays import Array, Frozen, Integers
 from translucent.errors import InputError
+from translucent.files.images import read_array
 from translucent.files.reading import open_file
-from translucent.files.unpacking import read_array
 from translucent.formulas import optics
 
 #: Largest relative density: its products with extinctions and lengths of any scene stay within float32.

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
+from translucent.files.images import open_picture
 from translucent.files.reading import read_bytes
-from translucent.files.unpacking import open_picture
 from translucent.formulas.color import srgb_to_linear
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
@@ -47,12 +47,39 @@ SHOWN_UNITS = ("mm", "cm", "m", "in")
 MAX_PITCH = 89.9
 
 
+#: Methods of pictures that move: random paths are seen by `Display.converge`.
+METHOD_NAMES = (AUTO, *(name for name, method in METHODS.items() if not method.follows_paths))
+
+#: Largest length of a material in metres.
+_LONGEST = 1e12
+
+
+@dataclass(frozen=True)
+class FieldRange:
+    """Range of a field: numbers between bounds, or one of some words."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    above: bool = False
+    words: tuple[str, ...] = ()
+
+
+def ranged(default: Any, low: float, high: float, *, above: bool = False) -> Any:
+    """Field of numbers between two bounds; `above` leaves out the lower one."""
+    return field(default=default, metadata={"range": FieldRange(low, high, above)})
+
+
+def one_of(default: str, words: Iterable[str]) -> Any:
+    """Field of one of some words."""
+    return field(default=default, metadata={"range": FieldRange(words=tuple(words))})
+
+
 @dataclass(frozen=True)
 class Model:
     """Model: a file, or one of the toolkit's own meshes by name, with the unit of its coordinates."""
 
     path: str = "goblet"
-    unit: str = "m"
+    unit: str = one_of("m", METRES_PER_UNIT)
 
 
 @dataclass(frozen=True)
@@ -85,25 +112,25 @@ class Material:
         thicknessFactor in metres, written to files and taken by thin layers.
     """
 
-    source: Source = "file"
-    color: Triple = DEFAULT_COLOR
-    distance: float = 0.02
+    source: Source = one_of("file", get_args(Source))
+    color: Triple = ranged(DEFAULT_COLOR, 0.0, 1.0, above=True)
+    distance: float = ranged(0.02, 0.0, _LONGEST, above=True)
     preset: str = ""
-    absorption: Triple = (0.0, 0.0, 0.0)
-    scattering: Triple = (0.0, 0.0, 0.0)
-    emission: Triple = (0.0, 0.0, 0.0)
-    anisotropy: float = 0.0
+    absorption: Triple = ranged((0.0, 0.0, 0.0), 0.0, MAX_COEFFICIENT)
+    scattering: Triple = ranged((0.0, 0.0, 0.0), 0.0, MAX_COEFFICIENT)
+    emission: Triple = ranged((0.0, 0.0, 0.0), 0.0, MAX_EMISSION)
+    anisotropy: float = ranged(0.0, -0.999, 0.999)
     phase: str = ""
-    ior: float = 1.0
-    roughness: float = 0.0
-    transmission: float = 1.0
-    dispersion: float = 0.0
-    iridescence: float = 0.0
-    iridescence_ior: float = 1.3
-    iridescence_thickness: float = 400e-9
-    clearcoat: float = 0.0
-    clearcoat_roughness: float = 0.0
-    thickness: float = 0.001
+    ior: float = ranged(1.0, 1.0, MAX_IOR)
+    roughness: float = ranged(0.0, 0.0, 1.0)
+    transmission: float = ranged(1.0, 0.0, 1.0)
+    dispersion: float = ranged(0.0, 0.0, MAX_DISPERSION)
+    iridescence: float = ranged(0.0, 0.0, 1.0)
+    iridescence_ior: float = ranged(1.3, 1.0, MAX_IOR)
+    iridescence_thickness: float = ranged(400e-9, 0.0, MAX_FILM)
+    clearcoat: float = ranged(0.0, 0.0, 1.0)
+    clearcoat_roughness: float = ranged(0.0, 0.0, 1.0)
+    thickness: float = ranged(0.001, 0.0, _LONGEST, above=True)
 
     @property
     def surface_values(self) -> dict[str, float]:
@@ -158,16 +185,16 @@ class Look:
         A directional light besides, from `light_yaw` and `light_pitch` (degrees) with `light_irradiance` (W/m^2).
     """
 
-    stage: str = NO_STAGE
+    stage: str = one_of(NO_STAGE, STAGE_WORDS)
     environment: str = ""
     background: str = ""
-    rotation: float = 0.0
-    exposure: float = 0.0
-    tone: str = AUTO
+    rotation: float = ranged(0.0, -1e6, 1e6)
+    exposure: float = ranged(0.0, -MAX_EXPOSURE, MAX_EXPOSURE)
+    tone: str = one_of(AUTO, (AUTO, *TONES))
     light: bool = False
-    light_yaw: float = 45.0
-    light_pitch: float = 45.0
-    light_irradiance: float = 3.0
+    light_yaw: float = ranged(45.0, -1e6, 1e6)
+    light_pitch: float = ranged(45.0, -MAX_PITCH, MAX_PITCH)
+    light_irradiance: float = ranged(3.0, 0.0, MAX_RADIANCE)
 
 
 @dataclass(frozen=True)
@@ -197,17 +224,17 @@ class Display:
         In which lengths are shown.
     """
 
-    method: str = AUTO
-    method_b: str = "thin-layer"
-    scattering: str = AUTO
-    mode: Mode = "picture"
-    compare: Compare = "off"
-    split: float = 0.5
+    method: str = one_of(AUTO, METHOD_NAMES)
+    method_b: str = one_of("thin-layer", METHOD_NAMES)
+    scattering: str = one_of(AUTO, (AUTO, *SCATTERINGS))
+    mode: Mode = one_of("picture", get_args(Mode))
+    compare: Compare = one_of("off", get_args(Compare))
+    split: float = ranged(0.5, 0.0, 1.0)
     inset: bool = False
     antialias: bool = True
     converge: bool = False
     caustics: bool = False
-    unit: str = "mm"
+    unit: str = one_of("mm", SHOWN_UNITS)
 
     @property
     def converges(self) -> bool:
@@ -243,11 +270,11 @@ class Orbit:
         The same height at the target, without perspective.
     """
 
-    target: Triple = (0.0, 0.0, 0.0)
-    yaw: float = 24.0
-    pitch: float = 18.0
-    distance: float = 1.0
-    fov_y: float = 30.0
+    target: Triple = ranged((0.0, 0.0, 0.0), -MAX_COORDINATE, MAX_COORDINATE)
+    yaw: float = ranged(24.0, -1e6, 1e6)
+    pitch: float = ranged(18.0, -MAX_PITCH, MAX_PITCH)
+    distance: float = ranged(1.0, 0.0, MAX_COORDINATE, above=True)
+    fov_y: float = ranged(30.0, 1.0, 150.0)
     orthographic: bool = False
 
 
@@ -276,59 +303,12 @@ class Document:
         return next((one.material for one in self.assigned if one.object == number), None)
 
 
-@dataclass(frozen=True)
-class _Range:
-    """Range of a field: numbers between bounds, or one of some words."""
-
-    low: float = -math.inf
-    high: float = math.inf
-    above: bool = False
-    words: tuple[str, ...] = ()
-
-
-#: Methods of pictures that move: those of random paths are seen by `Display.converge`.
-METHOD_NAMES = (AUTO, *(name for name, method in METHODS.items() if not method.follows_paths))
-_POSITIVE = _Range(0.0, 1e12, above=True)
-
 #: Ranges of fields that cannot hold every value of their type, by section and name.
-RANGES: dict[str, _Range] = {
-    "model.unit": _Range(words=tuple(METRES_PER_UNIT)),
-    "material.source": _Range(words=get_args(Source)),
-    "material.color": _Range(0.0, 1.0, above=True),
-    "material.distance": _POSITIVE,
-    "material.absorption": _Range(0.0, MAX_COEFFICIENT),
-    "material.scattering": _Range(0.0, MAX_COEFFICIENT),
-    "material.emission": _Range(0.0, MAX_EMISSION),
-    "material.anisotropy": _Range(-0.999, 0.999),
-    "material.ior": _Range(1.0, MAX_IOR),
-    "material.roughness": _Range(0.0, 1.0),
-    "material.transmission": _Range(0.0, 1.0),
-    "material.dispersion": _Range(0.0, MAX_DISPERSION),
-    "material.iridescence": _Range(0.0, 1.0),
-    "material.iridescence_ior": _Range(1.0, MAX_IOR),
-    "material.iridescence_thickness": _Range(0.0, MAX_FILM),
-    "material.clearcoat": _Range(0.0, 1.0),
-    "material.clearcoat_roughness": _Range(0.0, 1.0),
-    "material.thickness": _POSITIVE,
-    "look.stage": _Range(words=STAGE_WORDS),
-    "look.rotation": _Range(-1e6, 1e6),
-    "look.exposure": _Range(-MAX_EXPOSURE, MAX_EXPOSURE),
-    "look.tone": _Range(words=(AUTO, *TONES)),
-    "look.light_yaw": _Range(-1e6, 1e6),
-    "look.light_pitch": _Range(-MAX_PITCH, MAX_PITCH),
-    "look.light_irradiance": _Range(0.0, MAX_RADIANCE),
-    "display.method": _Range(words=METHOD_NAMES),
-    "display.method_b": _Range(words=METHOD_NAMES),
-    "display.scattering": _Range(words=(AUTO, *SCATTERINGS)),
-    "display.mode": _Range(words=get_args(Mode)),
-    "display.compare": _Range(words=get_args(Compare)),
-    "display.split": _Range(0.0, 1.0),
-    "display.unit": _Range(words=SHOWN_UNITS),
-    "orbit.target": _Range(-MAX_COORDINATE, MAX_COORDINATE),
-    "orbit.yaw": _Range(-1e6, 1e6),
-    "orbit.pitch": _Range(-MAX_PITCH, MAX_PITCH),
-    "orbit.distance": _Range(0.0, MAX_COORDINATE, above=True),
-    "orbit.fov_y": _Range(1.0, 150.0),
+RANGES: dict[str, FieldRange] = {
+    f"{section.__name__.lower()}.{one.name}": one.metadata["range"]
+    for section in (Model, Material, Look, Display, Orbit)
+    for one in dataclasses.fields(section)
+    if one.metadata
 }
 
 
@@ -340,7 +320,7 @@ def checked(name: str, value: Any, like: Any) -> Any:
     InputError
         If it may not.
     """
-    range_ = RANGES.get(name, _Range())
+    range_ = RANGES.get(name, FieldRange())
     if isinstance(like, bool) or isinstance(value, bool):
         if not (isinstance(like, bool) and isinstance(value, bool)):
             raise InputError(f"{name} = {value!r}", "of the wrong type", f"give for example {like!r}")
@@ -356,7 +336,7 @@ def checked(name: str, value: Any, like: Any) -> Any:
     return _number(name, value, range_)
 
 
-def _number(name: str, value: Any, range_: _Range) -> float:
+def _number(name: str, value: Any, range_: FieldRange) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise InputError(f"{name} = {value!r}", "not a finite number", "give a number")
     if not range_.low <= value <= range_.high or (range_.above and value == range_.low):

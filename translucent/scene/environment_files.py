@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.files.images import open_picture, read_exr
 from translucent.files.paths import require_file
 from translucent.files.reading import read_bytes, shown
-from translucent.files.unpacking import open_picture, read_exr
 from translucent.formulas.color import srgb_to_linear
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.radiance_hdr import read_radiance
