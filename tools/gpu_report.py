@@ -26,7 +26,6 @@ import numpy as np
 import trimesh
 
 import translucent as tl
-from translucent.bench.drawing import is_software
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "docs" / "reports"
@@ -132,7 +131,7 @@ def main(output: Path, keep: bool, software: bool, only: str | None) -> None:
     output.mkdir(parents=True, exist_ok=True)
     with tl.Renderer() as renderer:
         device = renderer.provenance["renderer"]
-        small = is_software(renderer)
+        small = "software" in renderer.provenance["renderer"]
     if small and not software:
         raise SystemExit(f"gpu-report: the device is {device}; run it where there is a GPU, or try it with --software")
     if small and keep:

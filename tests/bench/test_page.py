@@ -131,7 +131,7 @@ def case(name: str = "knot", title: str = "A knot", **more: Any) -> CaseRecord:
 
 def report(**more: Any) -> Report:
     points = tuple(
-        ScalePoint(x, TimeStatistics(x / 100, x / 90, 0.1, 5), Ratio(1.25, 0.1, 0.01)) for x in (1000, 10000)
+        ScalePoint(x, wall=TimeStatistics(x / 100, x / 90, 0.1, 5), ratio=Ratio(1.25, 0.1, 0.01)) for x in (1000, 10000)
     )
     lost = ScalePoint(100000, failure="out of memory")
     made = Report(

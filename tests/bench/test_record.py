@@ -64,7 +64,7 @@ def full_report() -> Report:
         "SignedDepth",
         "SignedDepth",
         "512 x 512",
-        (ScalePoint(1000, TimeStatistics(1, 2, 0.5, 3)), ScalePoint(2)),
+        (ScalePoint(1000, wall=TimeStatistics(1, 2, 0.5, 3)), ScalePoint(2)),
     )
     hard = HardCase("H07", "far away", "exact", "1e-7", True, 1e-7, 6e-6, "of the diagonal")
     unversioned = dataclasses.replace(PROVENANCE, commit=None, dirty=None)

@@ -155,7 +155,9 @@ def errors(median: float, p999: float) -> ErrorStatistics:
 def case(texels: float = 1e-6, order: float = 1.4, cost: float = 1.2, half: float = 1e-3, **more: Any) -> ShadowCase:
     timing = TimeStatistics(9.0, 9.5, 0.1, 5)
     rows = (
-        ShadowRow("map of 1024", "method", 1024, "", errors(3e-6, 1e-3), 2e-4, timing, Ratio(cost, 0.01, 0.01)),
+        ShadowRow(
+            "map of 1024", "method", 1024, "", errors(3e-6, 1e-3), 2e-4, wall=timing, ratio=Ratio(cost, 0.01, 0.01)
+        ),
         ShadowRow(OPAQUE, "counter-example", 1024, "", errors(0.7, 0.9), 0.5),
         ShadowRow(HALF, "counter-example", 1024, "", errors(half, half), half),
     )
@@ -166,10 +168,10 @@ GOOD = Shadows(
     (case(),),
     (SkyRow("sky", 8, 0.1, 0.1), SkyRow("sky", 32, 0.04, 0.2)),
     None,
-    (CausticCase("ball", "Ball", "", 1000, 1.0, 1e-3, (CausticRow(250_000, 0.002, 0.1, 0.12, 1.0),)),),
+    (CausticCase("ball", "Ball", "", 1000, 1e-3, (CausticRow(250_000, 0.002, 0.1, 0.12, 1.0),)),),
     (
         CausticMediumCase(
-            *("wax", "Wax", "", 192, 1.0, 0.02),
+            *("wax", "Wax", "", 192, 0.02),
             (CausticRow(0, 0.08, 0.22, 0.29, 1.0), CausticRow(400_000, -0.015, 0.08, 0.19, 1.0)),
         ),
     ),

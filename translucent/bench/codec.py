@@ -139,7 +139,7 @@ class _Strict(Converter):
             self.register_structure_hook(kind, self._exact)
         self.register_structure_hook(float, self._number)
         for origin, hook in ((Literal, self._option), (tuple, self._list), (Mapping, self._mapping)):
-            self.register_structure_hook_factory(partial(_is_of, origin), hook)
+            self.register_structure_hook_factory(partial(lambda origin, kind: get_origin(kind) is origin, origin), hook)
         self.register_structure_hook_factory(dataclasses.is_dataclass, self._dataclass)
 
     def _require(self, held: bool, value: Any, expected: str) -> None:
@@ -204,11 +204,6 @@ class _Strict(Converter):
             return made
 
         return self._holding(structure, dict, "an object")
-
-
-def _is_of(origin: Any, kind: Any) -> bool:
-    """True if a type is a generic one with arguments, such as ``tuple[int, ...]`` of ``tuple``."""
-    return get_origin(kind) is origin
 
 
 def _said(error: BaseException, _: Any) -> str:

@@ -153,11 +153,6 @@ class Contender:
     shown: str = ""
     thickness: float = 0.0
 
-    @property
-    def samplable(self) -> bool:
-        """True if several samples of a pixel are another picture."""
-        return self.shortcut is None and not isinstance(self.method, PathTraced)
-
     def scene(self, scene: Scene) -> Scene:
         """Scene with the contender's index of refraction."""
         if self.ior is None:

@@ -137,7 +137,7 @@ class BenchContext:
         self.gl = renderer.gpu.context.gl
         self.resources = Resources(self.gl)
         self.timer = PassTimer(self.gl)
-        self.software = is_software(renderer)
+        self.software = "software" in renderer.provenance["renderer"]
         self.clock = time.process_time if self.software else time.perf_counter
         self.doing: Callable[[str], None] = lambda _: None
         self._own: dict[Callable[[Any], Any], Any] = {}
@@ -572,8 +572,3 @@ def floor_times(found: Mapping[str, Samples]) -> Samples:
     """Samples of the floor itself, over all draws of it beside the others."""
     floors = [one for samples in found.values() for one in samples.floors]
     return Samples(floors, floors)
-
-
-def is_software(renderer: Renderer) -> bool:
-    """True if OpenGL runs on a software rasterizer."""
-    return "software" in renderer.provenance["renderer"]

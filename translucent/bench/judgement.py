@@ -20,7 +20,7 @@ from translucent.bench.record import (
     MethodRow,
     Quantity,
     Report,
-    ShadowRow,
+    TimedRow,
 )
 
 #: Factor within which times are equal, as are times within `NOISES` standard errors: two runs differ by as much. A
@@ -364,7 +364,7 @@ def _error_change(where: str, what: str, before: float, after: float) -> Iterato
         yield Change(kind, where, f"{what} {before:.2g} -> {after:.2g}")
 
 
-def _time_change(where: str, old: MethodRow | ShadowRow, new: MethodRow | ShadowRow) -> Iterator[Change]:
+def _time_change(where: str, old: TimedRow, new: TimedRow) -> Iterator[Change]:
     if old.ratio is None or new.ratio is None:
         return
     difference = new.ratio.median - old.ratio.median

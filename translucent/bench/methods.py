@@ -153,7 +153,8 @@ class MethodComparison(Experiment[Case]):
             row = dataclasses.replace(row, parameters=contender.parameters(plan))
             drawn = drawn_once(bench, contender, scene, plan, on.truth.frame.size)
             row = _compared(row, contender, scene, plan, drawn, on)
-            if on.case.effect == "interfaces" and contender.samplable:
+            several = contender.shortcut is None and not contender.method.follows_paths  # samples are another picture
+            if on.case.effect == "interfaces" and several:
                 found = on.truth.errors(contender.sampled(bench, scene, drawn.frame.size, SAMPLES), "radiance")
                 row = dataclasses.replace(row, sampled=None if found is None else found[0])
         except InputError as error:  # the planner's answer
@@ -361,7 +362,7 @@ class CostScaling(Experiment[ScalingStep]):
 
 
 def _point(x: int, samples: Samples) -> ScalePoint:
-    return ScalePoint(x, samples.timing("wall"), samples.ratio("part"))
+    return ScalePoint(x, wall=samples.timing("wall"), ratio=samples.ratio("part"))
 
 
 def _axes(software: bool) -> dict[Axis, tuple[str, Mapping[int, Callable[[], tuple[Scene, Size]]]]]:

@@ -31,7 +31,7 @@ from translucent.bench.judgement import (
     summarize,
 )
 from translucent.bench.plots import AXES, UNITS, pareto_svg, plotted, scaling_groups, scaling_svg, shadow_plots
-from translucent.bench.record import CaseRecord, MethodRow, Report, ReportPicture, ShadowRow, Shadows, Slab
+from translucent.bench.record import CaseRecord, MethodRow, Report, ReportPicture, Shadows, Slab, TimedRow
 from translucent.errors import RenderError
 from translucent.files.paths import csv_text, made_folder, require_folder, write_text_atomically
 from translucent.files.reading import read_text
@@ -215,11 +215,11 @@ def _shadow_lines(shadows: Shadows) -> Iterator[str]:
             yield f"caustic in {medium.title.lower()}, {one.photons:,} photons: {found}"
 
 
-def _ratio(row: MethodRow | ShadowRow) -> str:
+def _ratio(row: TimedRow) -> str:
     return f"{row.ratio.median:>9.2f}{row.ratio.noise:>6.2f}" if row.ratio else f"{'':>15}"
 
 
-def _unmeasured(name: str, row: MethodRow | ShadowRow) -> str:
+def _unmeasured(name: str, row: TimedRow) -> str:
     return f"{name:<38}{'failed' if row.failure else 'refused'}: {row.failure or row.refusal}"
 
 

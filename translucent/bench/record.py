@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, Literal
 
 from translucent.bench.codec import Packed, decode, encode
@@ -139,8 +139,55 @@ class ReportPicture:
             raise ValueError(f"errors of shape {self.error.shape} and marks of shape {self.invalid.shape}")
 
 
+@dataclass(frozen=True, kw_only=True)
+class TimedRow:
+    """Common part of rows: time, its ratio to the floor, and if there are no numbers, why.
+
+    Attributes
+    ----------
+    wall : TimeStatistics, optional
+        By the clock.
+    ratio : Ratio, optional
+        `wall` to the time of drawing the same objects into a depth buffer alone.
+    refusal : str, optional
+        Why the planner does not run this, or this machine not at this size: an answer, no failure.
+    failure : str, optional
+        What went wrong where there should be numbers.
+    """
+
+    wall: TimeStatistics | None = None
+    ratio: Ratio | None = None
+    refusal: str | None = None
+    failure: str | None = None
+
+
 @dataclass(frozen=True)
-class MethodRow:
+class SceneRecord:
+    """Common part of the records of scenes.
+
+    Attributes
+    ----------
+    name, title, why : str
+        Identifier, heading, and what the scene is hard on.
+    reference_seconds : float
+        Time of the truth, of both of its halves if it has two; of a stored one, when it was made.
+    pictures : tuple of ReportPicture
+        The reference first, then some rows.
+    failure : str, optional
+        Why the scene has no numbers at all.
+    """
+
+    name: str
+    title: str
+    why: str
+    _: KW_ONLY
+    reference_seconds: float = 0.0
+    pictures: tuple[ReportPicture, ...] = ()
+    failure: str | None = None
+
+
+@dataclass(frozen=True)
+class MethodRow(TimedRow):
     """Row: one method on one case.
 
     Attributes
@@ -186,10 +233,6 @@ class MethodRow:
         Fraction of the covered pixels that only the method, or only the reference, covers.
     pareto : bool
         No row of the case beats it (see `translucent.bench.judgement`).
-    refusal : str, optional
-        Why the planner does not run this method on this scene, or this machine not at this size: an answer, no failure.
-    failure : str, optional
-        What went wrong where there should be numbers.
     """
 
     method: str
@@ -198,10 +241,8 @@ class MethodRow:
     kind: RowKind
     promise: str
     exact: bool
-    wall: TimeStatistics | None = None
     gpu: TimeStatistics | None = None
     frame: TimeStatistics | None = None
-    ratio: Ratio | None = None
     frame_ratio: Ratio | None = None
     passes: int | None = None
     layers: int | None = None
@@ -216,8 +257,6 @@ class MethodRow:
     invalid: float | None = None
     coverage_mismatch: float | None = None
     pareto: bool = False
-    refusal: str | None = None
-    failure: str | None = None
 
     def errors(self, quantity: Quantity) -> ErrorStatistics | None:
         """Errors in one quantity."""
@@ -225,13 +264,11 @@ class MethodRow:
 
 
 @dataclass(frozen=True)
-class CaseRecord:
+class CaseRecord(SceneRecord):
     """Record of a case: one scene with all methods.
 
     Attributes
     ----------
-    name, title, why : str
-        Identifier, heading, and what the scene is hard on.
     quantity : {"thickness", "transmittance", "radiance"}
         By which its methods are ranked.
     convex, closed, absorption_only : bool
@@ -244,8 +281,6 @@ class CaseRecord:
         Of the scene's bounds, in metres.
     compared_pixels : int
         Within the mask of the errors.
-    reference_seconds : float
-        Time of the reference; of a stored truth, when it was made.
     truth_noise : float, optional
         Root mean square of the standard error of a path traced truth, as a fraction of its mean.
     truth_rays : int
@@ -254,15 +289,8 @@ class CaseRecord:
         Root mean square of the standard error of that mean, as a fraction of that of the radiance.
     rows : tuple of MethodRow
         The floor first.
-    pictures : tuple of ReportPicture
-        The reference first.
-    failure : str, optional
-        Why the case has no numbers at all.
     """
 
-    name: str
-    title: str
-    why: str
     quantity: Quantity
     convex: bool = False
     closed: bool = False
@@ -274,24 +302,17 @@ class CaseRecord:
     compared_size: tuple[int, int] = (0, 0)
     diagonal: float = 0.0
     compared_pixels: int = 0
-    reference_seconds: float = 0.0
     truth_noise: float | None = None
     truth_rays: int = 1
     truth_spread: float = 0.0
     rows: tuple[MethodRow, ...] = ()
-    pictures: tuple[ReportPicture, ...] = ()
-    failure: str | None = None
 
 
 @dataclass(frozen=True)
-class ScalePoint:
+class ScalePoint(TimedRow):
     """Point of a series: the axis value x, and times as in a row; a refusal or a failure says why there are none."""
 
     x: int
-    wall: TimeStatistics | None = None
-    ratio: Ratio | None = None
-    refusal: str | None = None
-    failure: str | None = None
 
 
 @dataclass(frozen=True)
@@ -348,7 +369,7 @@ class Slab:
 
 
 @dataclass(frozen=True)
-class ShadowRow:
+class ShadowRow(TimedRow):
     """Row: one technique for a shadow, in one scene.
 
     Attributes
@@ -367,8 +388,6 @@ class ShadowRow:
         Of making the map.
     ratio : Ratio, optional
         That to drawing the same objects into a depth buffer of the same size.
-    refusal, failure : str, optional
-        Why there are no numbers: an answer, or something that went wrong.
     """
 
     method: str
@@ -377,19 +396,14 @@ class ShadowRow:
     promise: str
     errors: ErrorStatistics | None = None
     edges: float | None = None
-    wall: TimeStatistics | None = None
-    ratio: Ratio | None = None
-    refusal: str | None = None
-    failure: str | None = None
 
 
 @dataclass(frozen=True)
-class ShadowCase:
+class ShadowCase(SceneRecord):
     """Record of one scene: shadows on a ground, in one light.
 
     Attributes
     ----------
-    name, title, why : str
     triangles, bodies : int
         Of the occluders.
     opaque : bool
@@ -398,7 +412,6 @@ class ShadowCase:
         All bodies have one medium.
     compared_points : int
         Of the ground, in the shadow and away from its outlines.
-    reference_seconds : float
     texels : ErrorStatistics, optional
         Of transmittance in the rays of a map's texels, away from outlines; none where an occluder is opaque.
     texel_size : int
@@ -406,27 +419,17 @@ class ShadowCase:
     order : float, optional
         Order with which `ShadowRow.edges` fall with the size of maps.
     rows : tuple of ShadowRow
-    pictures : tuple of ReportPicture
-        The reference first, then some rows.
-    failure : str, optional
-        Why the case has no numbers at all.
     """
 
-    name: str
-    title: str
-    why: str
     triangles: int = 0
     bodies: int = 0
     opaque: bool = False
     alike: bool = True
     compared_points: int = 0
-    reference_seconds: float = 0.0
     texels: ErrorStatistics | None = None
     texel_size: int = 0
     order: float | None = None
     rows: tuple[ShadowRow, ...] = ()
-    pictures: tuple[ReportPicture, ...] = ()
-    failure: str | None = None
 
 
 @dataclass(frozen=True)
@@ -467,64 +470,44 @@ class CausticRow:
 
 
 @dataclass(frozen=True)
-class CausticCase:
+class CausticCase(SceneRecord):
     """Record of the caustic of one scene, on the ground.
 
     Attributes
     ----------
-    name, title, why : str
     truth_photons : int
         Of the float64 reference, in each of two halves.
-    reference_seconds : float
-        Of both.
     power_noise : float
         Half of the difference between the powers of the halves, as a fraction of it.
     rows : tuple of CausticRow
     pictures : tuple of ReportPicture
         That of the most photons; then irradiance, of the truth and of these photons.
-    failure : str, optional
     """
 
-    name: str
-    title: str
-    why: str
     truth_photons: int = 0
-    reference_seconds: float = 0.0
     power_noise: float = 0.0
     rows: tuple[CausticRow, ...] = ()
-    pictures: tuple[ReportPicture, ...] = ()
-    failure: str | None = None
 
 
 @dataclass(frozen=True)
-class CausticMediumCase:
+class CausticMediumCase(SceneRecord):
     """Record of a caustic in a medium that scatters.
 
     Attributes
     ----------
-    name, title, why : str
     truth_paths : int
         Random paths of each pixel, in each of two halves.
-    reference_seconds : float
-        Of both.
     noise : float
         Standard error of the mean of the truth, as a fraction of it.
     rows : tuple of CausticRow
         The first one is without photons.
     pictures : tuple of ReportPicture
         The reference, then the rows.
-    failure : str, optional
     """
 
-    name: str
-    title: str
-    why: str
     truth_paths: int = 0
-    reference_seconds: float = 0.0
     noise: float = 0.0
     rows: tuple[CausticRow, ...] = ()
-    pictures: tuple[ReportPicture, ...] = ()
-    failure: str | None = None
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
-from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, get_args
@@ -200,7 +199,7 @@ def measured(
     steps = _steps(bench, every, parts)
     for done, (name, experiment, scene) in enumerate(steps):
         progress(name, done, len(steps))
-        bench.doing = partial(_tell_doing, progress, name, done, len(steps))
+        bench.doing = lambda doing, name=name, done=done: progress(f"{name}, {doing}", done, len(steps))  # type: ignore[misc]
         report = experiment.added(report, experiment.measure(bench, scene))
         claims = tuple(judge(report) for one in every for judge in one.claims)
         report = dataclasses.replace(report, claims=claims)
@@ -214,10 +213,6 @@ def _steps(
     """Name, experiment and scene of each step of these parts."""
     wanted = [(one, scene) for one in every if one.part in parts for scene in one.scenes(bench)]
     return [(f"{one.label}{scene.name}", one, scene) for one, scene in wanted]
-
-
-def _tell_doing(progress: Progress, name: str, done: int, total: int, doing: str) -> None:
-    progress(f"{name}, {doing}", done, total)
 
 
 @contextmanager

@@ -106,25 +106,25 @@ def plates(layers: int) -> Mesh:
     return joined([(plate.vertices - (0, 0, i * pitch), plate.faces) for i in range(count)], "plates")
 
 
-def bow_tie(segments: int = 1) -> Mesh:
+def bow_tie() -> Mesh:
     """A box whose width is multiplied by -z: closed and consistently wound, and the lobe in front is inside out."""
-    box = Box((-1.0, -0.5, -1.0), (1.0, 0.5, 1.0)).tessellate(segments)
+    box = Box((-1.0, -0.5, -1.0), (1.0, 0.5, 1.0)).tessellate()
     return Mesh(box.vertices * np.where([1, 0, 0], -box.vertices[:, 2:], 1.0), box.faces, name="bow tie")
 
 
-def backward_window(thickness: float = 0.006, cells: int = 8) -> Mesh:
+def backward_window() -> Mesh:
     """A plate, 1 by 1, with a window of its own tessellation on both sides, wound the wrong way.
 
     Its vertices are not those of the frame around it, so that all edges between the two are open.
     """
-    steps = np.linspace(-0.2, 0.2, cells + 1)
+    top, steps = 0.003, np.linspace(-0.2, 0.2, 9)
     frame = [(-0.5, -0.5, 0.5, -0.2), (-0.5, 0.2, 0.5, 0.5), (-0.5, -0.2, -0.2, 0.2), (0.2, -0.2, 0.5, 0.2)]
     window = [(x, y, u, v) for x, u in itertools.pairwise(steps) for y, v in itertools.pairwise(steps)]
-    rim = Box((-0.5, -0.5, -thickness / 2), (0.5, 0.5, thickness / 2)).tessellate()
+    rim = Box((-0.5, -0.5, -top), (0.5, 0.5, top)).tessellate()
     parts = [(rim.vertices, rim.faces[rim.face_normals[:, 2] == 0])]
     for rectangles, turned in ((frame, False), (window, True)):
         for x, y, u, v in rectangles:
-            for z, upwards in ((thickness / 2, not turned), (-thickness / 2, turned)):
+            for z, upwards in ((top, not turned), (-top, turned)):
                 corners = np.array([(x, y, z), (u, y, z), (u, v, z), (x, v, z)])
                 faces = np.array([(0, 1, 2), (0, 2, 3)], dtype=np.int32)
                 parts.append((corners, faces if upwards else faces[:, ::-1]))

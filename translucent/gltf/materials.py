@@ -64,7 +64,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
@@ -179,12 +179,6 @@ def draft_extension(medium: Medium, draft: Draft) -> Json:
     color = hulst_color(albedo, medium.anisotropy if draft == "scatter" else 0.0)
     stated: Json = {"multiscatterColorFactor": color.tolist(), "scatterAnisotropy": medium.anisotropy}
     return {DRAFTS[draft]: ({"scatterStrengthFactor": 1} if draft == "scatter" else {}) | stated}
-
-
-def check_draft(draft: Draft | None) -> None:
-    """Raise `InputError` unless this is the name of a draft, or None."""
-    if draft is not None and draft not in get_args(Draft):
-        raise InputError(f"draft_extensions {draft!r}", "not known", f"use {' or '.join(map(repr, DRAFTS))}, or None")
 
 
 def _spelling(fields: JsonFields, names: Sequence[str]) -> str:

@@ -29,7 +29,6 @@ from translucent.gltf.materials import (
     TRANSMISSION,
     VOLUME,
     Draft,
-    check_draft,
     draft_extension,
     materials_of,
     volume_extensions_of,
@@ -135,7 +134,9 @@ def write_media(
 ) -> list[int]:
     """Give media to objects of a glTF file one after the other, and write the file atomically, as `write_medium`."""
     check_gltf_output(Path(path_out))
-    check_draft(draft_extensions)
+    if draft_extensions is not None and draft_extensions not in DRAFTS:
+        known = f"use {' or '.join(map(repr, DRAFTS))}, or None"
+        raise InputError(f"draft_extensions {draft_extensions!r}", "not known", known)
     file = read_gltf(path_in, allow_outside)
     entered = {material.index for material in materials_of(file) if material.transmission > 0}
     tree = copy.deepcopy(file.tree)

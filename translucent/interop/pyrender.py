@@ -81,7 +81,12 @@ def load_pyrender(backend: str | None = None) -> ModuleType:
             "pip install pyrender==0.1.45; apt-get install libegl1 libgl1 libgl1-mesa-dri; without a window, set "
             "PYOPENGL_PLATFORM=egl before anything imports pyrender",
         ) from error
-    missing = [f"{kind}.{name}" for kind, names in _PRIVATE.items() for name in names if _lacks(pyrender, kind, name)]
+    missing = [
+        f"{kind}.{name}"
+        for kind, names in _PRIVATE.items()
+        for name in names
+        if not hasattr(getattr(pyrender, kind), name)
+    ]
     if missing:
         raise RenderError(
             f"drawing with pyrender {pyrender.__version__}",
@@ -90,12 +95,10 @@ def load_pyrender(backend: str | None = None) -> ModuleType:
         )
     _let_pyopengl_know_references()
     if os.environ.get("PYOPENGL_PLATFORM") == "egl":
-        _keep_the_display()
+        from pyrender.platforms.egl import EGLPlatform
+
+        EGLPlatform.delete_context = _delete_context
     return pyrender  # type: ignore[no-any-return]
-
-
-def _lacks(pyrender: Any, kind: str, name: str) -> bool:
-    return not hasattr(getattr(pyrender, kind), name)
 
 
 def _let_pyopengl_know_references() -> None:
@@ -105,12 +108,6 @@ def _let_pyopengl_know_references() -> None:
         handler = "OpenGL.arrays.ctypesparameters.CtypesParameterHandler"
         if not any(plugin.name == "ctypesreference" for plugin in FormatHandler.all()):
             FormatHandler("ctypesreference", handler, ["_ctypes.CArgObject"])
-
-
-def _keep_the_display() -> None:
-    from pyrender.platforms.egl import EGLPlatform
-
-    EGLPlatform.delete_context = _delete_context
 
 
 def _delete_context(platform: Any) -> None:

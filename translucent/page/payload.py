@@ -71,7 +71,8 @@ def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, e
     into = Container()
     frames, aliases = _recorded(recorder, planned)
     gl = recorder.gl
-    kept = _kept_contents(gl)
+    # Pages build hierarchies themselves.
+    kept = frozenset(told["content"] for told in gl.textures if told["dtype"] == "u4" and told["content"] is not None)
     spectral_maps = recorder.resources.shadows.spectral
     header = {
         "version": VERSION,
@@ -157,11 +158,6 @@ def _light(frames: Mapping[str, tuple[Scene, RecordedFrame]]) -> set[int]:
     return {step["textures"][name] for step in steps for name in _LIGHT if name in step.get("textures", {})}
 
 
-def _kept_contents(gl: RecordingContext) -> frozenset[int]:
-    """Contents of hierarchies, which pages build themselves."""
-    return frozenset(told["content"] for told in gl.textures if told["dtype"] == "u4" and told["content"] is not None)
-
-
 def _number_blocks(header: dict[str, Any], sections: _Sections) -> None:
     """Put sections in place of contents in the steps."""
     for told in header["variants"].values():
@@ -238,18 +234,12 @@ def _presets_told() -> list[dict[str, Any]]:
 
 
 def _layout(item: UniformBlock | PackedTable) -> dict[str, Any]:
-    fields = {}
+    fields, held = {}, item.dtype.fields
+    assert held is not None
     for name, base, shape in item.fields:
-        offset = _offset(item, name)
-        fields[name] = [offset, base, int(np.prod(shape, dtype=int))]
+        fields[name] = [int(held[name][1]), base, int(np.prod(shape, dtype=int))]
     binding = item.binding if isinstance(item, UniformBlock) else None
     return {"binding": binding, "size": item.dtype.itemsize, "fields": fields}
-
-
-def _offset(item: UniformBlock | PackedTable, name: str) -> int:
-    fields = item.dtype.fields
-    assert fields is not None
-    return int(fields[name][1])
 
 
 def _present_told() -> dict[str, str]:

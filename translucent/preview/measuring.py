@@ -13,8 +13,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
-from translucent.formulas.color import to_hex
-from translucent.frames.appearance import average_color, thickness_samples
+from translucent.frames.appearance import thickness_samples
 from translucent.frames.frame import Frame
 from translucent.frames.metrics import Errors, compare
 from translucent.media.medium import Medium
@@ -82,10 +81,6 @@ class ThicknessStatistics:
         counts, edges = np.histogram(thickness, bins=48, range=(0.0, most))
         pixels, invalid = int(np.count_nonzero(frame.coverage)), int(np.count_nonzero(~frame.valid))
         return cls(thickness, counts / max(int(counts.max()), 1), edges, pixels, invalid)
-
-    def average_hex(self, medium: Medium) -> str:
-        """The model's average color before white light."""
-        return to_hex(average_color(self.thickness, medium)) if self.thickness.size else "#ffffff"
 
 
 @dataclass(frozen=True, eq=False)

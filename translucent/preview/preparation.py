@@ -123,10 +123,6 @@ class Compiled:
     problem: str = ""
 
 
-#: Takes the result, in the thread of the window.
-Take = Callable[[Compiled], None]
-
-
 class Compiler:
     """Compiler of shaders, and maker of normals, in a worker process.
 

@@ -11,6 +11,7 @@ from imgui_bundle import ImVec2, imgui, implot
 
 from translucent.errors import InputError
 from translucent.formulas.color import linear_to_srgb, srgb_to_linear, to_hex
+from translucent.frames.appearance import average_color
 from translucent.materials import TARGETS, text_block
 from translucent.media.colors import parse_color
 from translucent.media.conversion import summary
@@ -211,7 +212,7 @@ def _curves(state: WindowState, material: Material) -> None:
 @lru_cache(maxsize=1)
 def _average_hex(seen: ThicknessStatistics, material: Material) -> str:
     """Average color of the model."""
-    return seen.average_hex(medium_of(material))
+    return to_hex(average_color(seen.thickness, medium_of(material)))
 
 
 def _copies(state: WindowState, material: Material) -> None:
