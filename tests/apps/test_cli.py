@@ -143,8 +143,7 @@ def test_a_hex_color_is_srgb(run: Run) -> None:
     assert told["extinction"] == pytest.approx([-math.log(linear)] * 3, rel=1e-14)
 
 
-def test_a_file_whose_name_begins_with_a_dash(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_file_whose_name_begins_with_a_dash(run: Run, tmp_path: Path, in_tmp_path: Path) -> None:
     Path("-lid.obj").touch()
     assert "'-lid.obj'; it is a file" in (line := one_error_line(run("explain", "-lid.obj")))
     assert "write ./-lid.obj" in line

@@ -15,9 +15,12 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_demo_renders_two_pictures_and_says_how_wrong_they_are(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], renderer: object
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    in_tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    renderer: object,
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     demo = runpy.run_path(str(ROOT / "tools" / "demo.py"))
     main = demo["main"]
     main.__globals__["SIZE"] = (80, 60)

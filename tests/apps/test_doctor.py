@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,8 +12,8 @@ from tests.command_line import Run, one_error_line, strict_json
 
 
 @pytest.fixture
-def no_embree(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "embreex.mesh_construction", None)
+def no_embree(uninstalled: Callable[[str], None]) -> None:
+    uninstalled("embreex.mesh_construction")
 
 
 @pytest.mark.usefixtures("renderer")

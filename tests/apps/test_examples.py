@@ -24,9 +24,8 @@ NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 
 
 @pytest.fixture(autouse=True)
-def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer) -> None:
+def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_tmp_path: Path, renderer: tl.Renderer) -> None:
     """Little pictures, with few shadows, by the one renderer that all tests share."""
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("EXAMPLE_WIDTH", "48")
     with_few_shadows(monkeypatch)
     monkeypatch.setattr(tl, "Renderer", lambda: nullcontext(renderer))

@@ -32,8 +32,7 @@ def run(run: Run) -> Run:
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
+def here(tmp_path: Path, in_tmp_path: Path) -> Path:
     return tmp_path
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -37,13 +38,19 @@ PROJECT = Path(__file__).parents[2] / "pyproject.toml"
     ],
 )
 def test_a_missing_package_is_told_with_its_extra(
-    module: str, extra: str, arguments: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    module: str,
+    extra: str,
+    arguments: str,
+    run: Run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    uninstalled: Callable[[str], None],
 ) -> None:
     folder = tmp_path / "results"
     folder.mkdir()
     (tmp_path / "sky.exr").write_bytes(b"")
     monkeypatch.setenv("DISPLAY", ":99")
-    monkeypatch.setitem(sys.modules, module, None)
+    uninstalled(module)
     words = arguments.format(folder, here=tmp_path / "sky.exr").split()
     line = one_error_line(run(*words), 1)
     assert f"the package {module} is not installed; pip install 'translucent-shading[{extra}]'" in line
@@ -61,8 +68,8 @@ def test_a_report_without_what_its_packages_need_is_told(tmp_path: Path) -> None
     assert not (tmp_path / "out").exists()
 
 
-def test_a_session_needs_its_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "tomli_w", None)
+def test_a_session_needs_its_package(tmp_path: Path, uninstalled: Callable[[str], None]) -> None:
+    uninstalled("tomli_w")
     with pytest.raises(tl.RenderError, match=r"tomli_w is not installed; pip install 'translucent-shading\[ui\]'"):
         save_session(tmp_path / "s.toml", Document())
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import re
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -228,8 +227,8 @@ def test_a_medium_that_the_viewer_keeps_is_told(script: Path, data: bytes, monke
     view.close()
 
 
-def test_what_is_missing_is_named(scene: tl.Scene, script: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "anywidget", None)
+def test_what_is_missing_is_named(scene: tl.Scene, script: Path, uninstalled: Callable[[str], None]) -> None:
+    uninstalled("anywidget")
     with pytest.raises(
         tl.InputError, match=r"anywidget is not installed; pip install 'translucent-shading\[notebook\]'"
     ):

@@ -18,8 +18,8 @@ QUICK = ("--size", "16", "--rays", "2", "--padding", "1")
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """A model, as .glb and .gltf with links, a mesh, a picture of all directions and a table."""
+def folder(tmp_path: Path, in_tmp_path: Path) -> Path:
+    """The working folder: a model, as .glb and .gltf with links, a mesh, a picture of a sky and a table."""
     file = boxes(tmp_path / "model.glb", [{"name": "glass", "extensions": GLASS}], (1, 1, 1), (2, 0, 0))
     write_gltf(file, tmp_path / "model.glb")
     linked = boxes(tmp_path / "other.glb", [{"name": "glass", "extensions": GLASS}], (1, 1, 1), (2, 0, 0))
@@ -55,8 +55,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_what_is_read_is_not_replaced(name: str, folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
+def test_what_is_read_is_not_replaced(name: str, folder: Path, run: Run) -> None:
     before = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
     result = run(*CASES[name])
     assert (result.code, result.out) == (2, "")
@@ -66,8 +65,7 @@ def test_what_is_read_is_not_replaced(name: str, folder: Path, run: Run, monkeyp
     assert {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()} == before
 
 
-def test_a_table_is_not_replaced(folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
+def test_a_table_is_not_replaced(folder: Path, run: Run) -> None:
     before = (folder / "table.csv").read_bytes()
     result = run("extinction", "--batch", "table.csv", "-o", "table.csv")
     assert result.code == 2
@@ -78,13 +76,11 @@ def test_a_table_is_not_replaced(folder: Path, run: Run, monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("name", ["a material", "a map into its model", "a picture of a sky"])
-def test_it_is_replaced_where_that_is_meant(name: str, folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
+def test_it_is_replaced_where_that_is_meant(name: str, folder: Path, run: Run) -> None:
     result = run(*CASES[name], "--overwrite")
     assert result.code == 0, result.err
 
 
-def test_other_files_are_replaced_without_a_word(folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
+def test_other_files_are_replaced_without_a_word(folder: Path, run: Run) -> None:
     for _ in range(2):
         assert run("material", "apply", "model.glb", "-o", "out.glb", *APPLY).code == 0

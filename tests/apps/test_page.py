@@ -8,7 +8,7 @@ import gzip
 import io
 import json
 import re
-import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -119,9 +119,8 @@ def test_light_is_rounded_by_less_than_told() -> None:
     ids=lambda v: " ".join(v),
 )
 def test_bad_input_is_told_and_leaves_nothing(
-    run: Run, cube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: list[str], words: list[str]
+    run: Run, cube: Path, tmp_path: Path, in_tmp_path: Path, more: list[str], words: list[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
     output = [] if "-o" in more else ["-o", "cube.html"]
     line = one_error_line(run(str(cube), *output, "--poster", "none", *more))
@@ -220,8 +219,8 @@ def test_a_coarser_copy_has_the_same_volume() -> None:
     assert mesh.volume == pytest.approx(scene.objects[0].mesh.volume, rel=0.05)
 
 
-def test_without_the_package_a_coarser_copy_is_told_how(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "fast_simplification", None)
+def test_without_the_package_a_coarser_copy_is_told_how(uninstalled: Callable[[str], None]) -> None:
+    uninstalled("fast_simplification")
     with pytest.raises(tl.InputError, match="pip install fast-simplification"):
         simplified(scene_of(ball()), 200)
 

@@ -75,8 +75,7 @@ def small(monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer) -> None:
 
 @pytest.mark.usefixtures("small")
 @pytest.mark.parametrize("page", SNIPPETS)
-def test_python_snippets_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_python_snippets_run(page: str, tmp_path: Path, in_tmp_path: Path) -> None:
     make_models()
     names = {"__name__": "__main__"}
     for snippet in SNIPPETS[page]:
@@ -143,10 +142,9 @@ def is_built(script: str) -> bool:
 
 @pytest.mark.usefixtures("one_scene", "small")
 @pytest.mark.parametrize("command", [command for command in COMMANDS if runs_here(command)])
-def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_commands_run(command: str, tmp_path: Path, in_tmp_path: Path) -> None:
     import trimesh
 
-    monkeypatch.chdir(tmp_path)
     make_models()
     trimesh.creation.icosphere(subdivisions=2).export("model.obj")
     (tmp_path / "models").mkdir()
@@ -182,10 +180,9 @@ def test_links_lead_somewhere(page: str) -> None:
 
 
 @pytest.mark.usefixtures("one_scene", "small")
-def test_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_in_the_help_run(tmp_path: Path, in_tmp_path: Path) -> None:
     import trimesh
 
-    monkeypatch.chdir(tmp_path)
     trimesh.creation.icosphere(subdivisions=1).export("model.glb")
     trimesh.creation.icosphere(subdivisions=1).export("model.stl")
     for name, command in cli.commands.items():

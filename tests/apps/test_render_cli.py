@@ -199,9 +199,8 @@ def test_a_bad_output_is_refused_before_any_work(
     [("a.png", ("--aov", "taken/below")), ("taken", ("--turntable", "4")), ("taken/below", ("--turntable", "4"))],
 )
 def test_a_file_where_a_folder_has_to_be_is_found_before_any_work(
-    run: Run, cube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_opengl: None, output: str, option: Any
+    run: Run, cube: Path, tmp_path: Path, in_tmp_path: Path, no_opengl: None, output: str, option: Any
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     Path("taken").write_text("kept")
     result = run("render", cube, "-o", output, *option)
     assert one_error_line(result).endswith("'taken' is no folder; choose another one")

@@ -67,9 +67,8 @@ def test_environments_have_names_colors_and_files(panorama: Path) -> None:
     ],
 )
 def test_wrong_options_are_one_line(
-    run: Run, options: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, options: list[str], message: str, tmp_path: Path, in_tmp_path: Path
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     assert message in one_error_line(run("render", "bear", "-o", "a.png", *options))
     assert not list(tmp_path.iterdir())
 

@@ -226,9 +226,10 @@ def test_a_translator_that_is_absent_is_told(
         translate("lib/ray.glsl", {}, language)
 
 
-def test_a_package_that_node_does_not_find_is_told(naga: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_package_that_node_does_not_find_is_told(
+    naga: None, monkeypatch: pytest.MonkeyPatch, in_tmp_path: Path, tmp_path: Path
+) -> None:
     monkeypatch.delenv("NODE_PATH")
-    monkeypatch.chdir(tmp_path)
     with pytest.raises(tl.InputError, match="naga is not installed"):
         translate("lib/ray.glsl", {}, "wgsl")
 

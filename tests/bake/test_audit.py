@@ -13,7 +13,7 @@ import trimesh
 
 import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
-from tests.values.gltf_writer import Writer, glass
+from tests.gltf.gltf_writer import Writer, glass
 from translucent.bake.audit.rules import scale_errors
 from translucent.gltf.file import read_gltf
 from translucent.gltf.materials import read_materials

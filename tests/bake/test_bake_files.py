@@ -173,9 +173,9 @@ def test_an_output_that_cannot_be_is_refused(
 
 
 def test_without_openexr_the_error_says_how_to_get_it(
-    make_map: MapMaker, ramp: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make_map: MapMaker, ramp: np.ndarray, tmp_path: Path, uninstalled: Callable[[str], None]
 ) -> None:
-    monkeypatch.setitem(sys.modules, "OpenEXR", None)
+    uninstalled("OpenEXR")
     with pytest.raises(tl.RenderError, match=r"package OpenEXR is not installed; pip install .*\[exr\]"):
         save_map(make_map(ramp), tmp_path / "t.exr")
 

@@ -14,7 +14,7 @@ import trimesh
 
 import translucent as tl
 from tests.command_line import Run, one_error_line
-from tests.values.gltf_writer import Writer, glass
+from tests.gltf.gltf_writer import Writer, glass
 from translucent.bake.batch import asset_line, run_job
 from translucent.bake.check import check_output, look_up
 from translucent.bake.jobs import bake_file

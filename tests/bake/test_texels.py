@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -149,8 +149,8 @@ def test_texture_coordinates_without_area_or_not_finite_are_refused() -> None:
         tl.bake_thickness(box_with_uv(np.full((12, 3, 2), np.nan)), 16)
 
 
-def test_no_texture_coordinates_and_no_xatlas(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "xatlas", None)
+def test_no_texture_coordinates_and_no_xatlas(uninstalled: Callable[[str], None]) -> None:
+    uninstalled("xatlas")
     wanted = r"new texture coordinates for '.*'; the package xatlas is not installed; .*\[bake\]', or unwrap it"
     with pytest.raises(tl.RenderError, match=wanted):
         tl.bake_thickness(Box().tessellate(), 16)

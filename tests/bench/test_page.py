@@ -423,9 +423,9 @@ def test_no_opengl_is_needed() -> None:
 
 @pytest.mark.parametrize("package", ["matplotlib", "jinja2"])
 def test_a_missing_package_is_named_with_its_extra(
-    package: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+    package: str, uninstalled: Callable[[str], None], tmp_path: Any
 ) -> None:
-    monkeypatch.setitem(sys.modules, package, None)
+    uninstalled(package)
     missing = rf"the package {package} is not installed; pip install .*\[report\]"
     with pytest.raises(RenderError, match=missing), checked_folder(tmp_path / "out"):
         raise AssertionError("it is needed")

@@ -163,10 +163,7 @@ def test_a_folder_that_cannot_be_is_an_error_before_any_work(run: Run, new: Path
         *("no model", "no distance", "preset", "no such file", "no time", "from and a limit"),
     ],
 )
-def test_bad_usage(
-    run: Run, arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_bad_usage(run: Run, arguments: list[str], message: str, tmp_path: Path, in_tmp_path: Path) -> None:
     result = run(*arguments)
     assert result.code == 2
     assert message in result.err

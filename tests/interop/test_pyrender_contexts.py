@@ -226,8 +226,8 @@ def test_a_renderer_without_opengl_is_refused(pyrender: ModuleType, studio: Any)
         render(studio.scene(), MEDIA, SIZE, renderer=renderer)
 
 
-def test_pyrender_that_cannot_be_imported_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pyrender", None)
+def test_pyrender_that_cannot_be_imported_is_told(uninstalled: Callable[[str], None]) -> None:
+    uninstalled("pyrender")
     scene = tl.Scene([tl.Object(tl.Mesh(np.eye(3), [(0, 1, 2)]))], tl.Camera.look_at((2, 2, 2), (0, 0, 0)))
     for use in (
         lambda: render(None, MEDIA, SIZE),

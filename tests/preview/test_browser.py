@@ -127,8 +127,7 @@ def test_environments_of_a_folder(tmp_path: Path, state: Any) -> None:
     assert state.get("look.environment") == ""
 
 
-def test_folders_are_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+def test_folders_are_remembered(tmp_path: Path, own_config: Path) -> None:
     assert Preferences.read() == Preferences()
     found = with_recent(["/usr"], tmp_path / "a.glb")
     assert found == [os.path.realpath(tmp_path), "/usr"]

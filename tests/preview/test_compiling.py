@@ -24,7 +24,7 @@ from translucent.gpu.hierarchies import has_packed
 from translucent.gpu.shaders import CompileBudget, PostponedError, ProgramName
 from translucent.gpu.viewport import Viewport
 from translucent.planning.passes import PassName
-from translucent.preview import preparation, viewport_renderer
+from translucent.preview import preparation
 from translucent.preview.actions import ChoosePreset, SetField
 from translucent.preview.preparation import Compiled, Compiler, stand_in
 from translucent.preview.quality import StepTimes
@@ -279,7 +279,7 @@ def test_a_frame_that_takes_too_long_goes_on_in_the_next_one(
     near.set()
     finish(view, work)
     wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
-    monkeypatch.setattr(viewport_renderer, "BUDGET", 0.0)
+    view.budget = 0.0
     monkeypatch.setattr(StepTimes, "stride", lambda *_: 1)  # not 256 steps for a picture: what is made is the same
     made: list[bool] = []
     draw = view._draw

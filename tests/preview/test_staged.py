@@ -184,7 +184,7 @@ saved: set[tuple[str, float, str]] = set()
 
 
 @pytest.fixture
-def told_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def told_only(monkeypatch: pytest.MonkeyPatch, in_tmp_path: Path, tmp_path: Path) -> None:
     """Pictures are not drawn, but taken down."""
     drawn.clear()
     saved.clear()
@@ -198,7 +198,6 @@ def told_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     ) -> Drawn:
         return render(renderer, scene, size, samples=request.samples)
 
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(tl.Renderer, "render", render)
     monkeypatch.setattr(tl.Renderer, "render_requested", render_requested)
 
@@ -257,8 +256,7 @@ def test_what_no_option_says_is_told_and_python_says_it(staged: Workspace) -> No
     assert_alike(drawn[0][0], told.scene)
 
 
-def test_the_last_stage_is_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+def test_the_last_stage_is_remembered(tmp_path: Path, own_config: Path) -> None:
     assert Preferences.read().stage == AUTO
     Preferences(stage="night").write()
     assert Preferences.read().stage == "night"

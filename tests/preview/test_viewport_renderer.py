@@ -36,11 +36,9 @@ def view() -> Iterator[ViewportRenderer]:
 
 
 @pytest.mark.parametrize("budget", [1e9, 0.0])
-def test_the_picture_is_the_one_that_render_makes(
-    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch, budget: float
-) -> None:
+def test_the_picture_is_the_one_that_render_makes(view: ViewportRenderer, work: Workspace, budget: float) -> None:
     """At once, and from the smallest steps: these differ by float32 rounding at silhouettes only."""
-    monkeypatch.setattr(viewport_renderer, "BUDGET", budget)
+    view.budget = budget
     finish(view, work)
     work.do(OrbitBy(20.0, 10.0))  # by now the stage knows what a step takes
     finish(view, work)
@@ -70,7 +68,7 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     assert view.plans[0] is not None
     usual = view.plans[0].interfaces
     assert usual == tl.TracedInterfaces(depth=12)
-    monkeypatch.setattr(viewport_renderer, "BUDGET", 0.0 if slow else 1e9)
+    view.budget = 0.0 if slow else 1e9
     monkeypatch.setattr(StepTimes, "stride", lambda *_: 4 if slow else 1)  # not 256 steps for a picture
     drawn: list[RenderPlan] = []
     draw = view.renderer.draw_requested
@@ -94,11 +92,9 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     assert np.abs(pixels(view) - frame.to_srgb8().astype(int)).mean() < 1.0
 
 
-def test_samples_wait_for_an_environment_that_is_being_read(
-    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_samples_wait_for_an_environment_that_is_being_read(view: ViewportRenderer, work: Workspace) -> None:
     """All pixels of the last picture are drawn, once, and smoothed when it is known to stay."""
-    monkeypatch.setattr(viewport_renderer, "BUDGET", 1e9)
+    view.budget = 1e9
     work.do(SetField("display.antialias", True))
     finish(view, work)
     assert view.viewport.steps(0) > 1
@@ -113,11 +109,9 @@ def test_samples_wait_for_an_environment_that_is_being_read(
     assert view.viewport.steps(0) > 1
 
 
-def test_light_diffuses_as_soon_as_it_is_solved_for(
-    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_light_diffuses_as_soon_as_it_is_solved_for(view: ViewportRenderer, work: Workspace) -> None:
     """Until then, and in every picture for which it is not known, bodies are layers; a camera may move."""
-    monkeypatch.setattr(viewport_renderer, "PREPARING", 1e9)  # what is solved for in a frame is drawn in it
+    view.preparing = 1e9  # what is solved for in a frame is drawn in it
     work.do(ChoosePreset("whole_milk"))
     assert view.draw(work, SIZE)
     assert "until its diffusion is solved for" in view.quality.notes[1]
@@ -153,7 +147,7 @@ def test_light_that_takes_long_to_solve_for_is_drawn_in_the_next_frame(
     work.do(ChoosePreset("whole_milk"))
     work.do(SetField("look.light", True))
     finish(view, work)
-    monkeypatch.setattr(viewport_renderer, "PREPARING", 0.0)
+    view.preparing = 0.0
     monkeypatch.setattr(quality, "LONGEST", 1e9)
     drawn: list[tl.Scene] = []
     draw = view.renderer.draw_requested
@@ -174,7 +168,7 @@ def test_light_that_takes_long_to_solve_for_is_drawn_in_the_next_frame(
 def test_a_picture_that_takes_long_to_be_shown_has_frames_for_that(
     view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewport_renderer, "BUDGET", 0.0)
+    view.budget = 0.0
     monkeypatch.setattr(
         StepTimes, "stride", lambda *_: 4
     )  # steps of 4 x 4: in fewer frames than the 16 x 16 of that budget
@@ -228,10 +222,8 @@ def test_smooth_edges_are_those_of_many_samples(view: ViewportRenderer, work: Wo
     assert np.abs(shown - smooth).mean() < 0.5 * np.abs(sharp - smooth).mean()
 
 
-def test_a_split_shows_another_method_and_then_the_reference(
-    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(viewport_renderer, "BUDGET", 1e9)  # both sides take steps of one size
+def test_a_split_shows_another_method_and_then_the_reference(view: ViewportRenderer, work: Workspace) -> None:
+    view.budget = 1e9  # both sides take steps of one size
     work.do(SetField("display.mode", "thickness"))
     work.do(SetField("display.compare", "method"))
     finish(view, work)

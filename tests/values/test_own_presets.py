@@ -17,8 +17,7 @@ BAD = f'{GOOD}\n[tea]\nkind = "estimated"\nsource = "by eye"\ncolour = [0.8, 0.4
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+def folder(tmp_path: Path, own_config: Path) -> Path:
     found = tmp_path / "translucent" / "presets"
     found.mkdir(parents=True)
     return found

@@ -192,6 +192,8 @@ def test_two_media_of_one_priority_must_not_claim_one_place(method: Any) -> None
 )
 def test_other_bodies_of_one_priority_are_clear(objects: list[tl.Object]) -> None:
     require_clear_priorities(tl.Scene(objects, CAMERA, overlap="priority"))
+    with pytest.raises(tl.InputError, match="both have priority 0"):
+        require_clear_priorities(tl.Scene([*objects, body(WINE)], CAMERA, overlap="priority"))
 
 
 def test_emission_alone_makes_a_contradiction() -> None:

@@ -82,6 +82,8 @@ class ViewportRenderer:
         Seconds that the last call of `draw` took.
     idle : bool
         That call had nothing to draw before other work is done.
+    budget, preparing : float
+        Largest time of a step in seconds, and the fraction of it that may go to what a picture needs first.
     """
 
     def __init__(self, context: Any = None, compiler: Compiler | None = None) -> None:
@@ -106,7 +108,8 @@ class ViewportRenderer:
         self._postponed: tuple[object, ...] = ()
         self._requested: Task | None = None
         self.presenter, self._times = Presenter(), StepTimes()
-        self._frame_budget, self._budget = FrameBudget(), BUDGET
+        self._frame_budget, self._left = FrameBudget(), 0.0
+        self.budget, self.preparing = BUDGET, PREPARING
         self._strides = Strides(self._times)
         self.quality = InteractiveQuality(traced_at_once=compiler is None)
         self.paths, self.photons = PathRefinement(), PhotonRefinement()
@@ -133,9 +136,9 @@ class ViewportRenderer:
         If that fails, `problem` says why, and the last picture stays.
         """
         started = time.perf_counter()
-        self._budget = self._frame_budget.begin(BUDGET)
+        self._left = self._frame_budget.begin(self.budget)
         if self._compiler is not None:
-            self._compiler.budget.begin_frame(PREPARING * self._budget)
+            self._compiler.budget.begin_frame(self.preparing * self._left)
         with self.current():
             try:
                 more = self._draw(workspace, size)
@@ -171,10 +174,10 @@ class ViewportRenderer:
             begun = time.perf_counter()
             self.quality.choose(workspace, scene, requested, self.renderer)
             spent = time.perf_counter() - begun
-            if self.quality.solved and spent > PREPARING * self._budget:
+            if self.quality.solved and spent > self.preparing * self._left:
                 self._held = scene  # the next frame draws this one, or what moves all the time would not be drawn
                 return True
-            self._budget -= min(spent, PREPARING * self._budget)
+            self._left -= min(spent, self.preparing * self._left)
         request = self.quality.request
         wanted = (scene, request, second, self.viewport.size, self.renderer)
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
@@ -192,7 +195,7 @@ class ViewportRenderer:
             self._shown = wanted
             self.viewport.restart()
             self.presenter.truth = None
-            self._strides.begin(self.plans, self._budget)
+            self._strides.begin(self.plans, self._left)
             self._moving, self.simpler = None, ""
             if self._compiler is not None and self._compiler.budget.postpones and unsmoothed(self._drawn_plans):
                 self._postpone(workspace, wanted)
@@ -210,7 +213,7 @@ class ViewportRenderer:
         more = drawn or alone or workspace.relights
         self.idle = more and not (drawn or alone or lit)
         if display.converges and still and not more:
-            more, drawn = self.paths.step(scene, self.renderer, self.viewport, self._budget)
+            more, drawn = self.paths.step(scene, self.renderer, self.viewport, self._left)
         if lit:
             more, drawn = self._light_by_photons(scene, workspace)
             if self.photons.light is None and not more:  # there are no photons to follow
@@ -225,12 +228,12 @@ class ViewportRenderer:
         request = replace(self.quality.request, shadows=shadows)
         if shadows is not None:
             self._moving = self.renderer.plan_requested(scene, request)
-        slowest = self._budget * COARSEST_TRACED**2
+        slowest = self._left * COARSEST_TRACED**2
         plans = usual, self._moving or usual
         if any(plan.has(PassName.TRACED) and self._times.known(plan) > slowest for plan in plans):
             request = replace(request, interfaces=SCREEN)
             self._moving = self.renderer.plan_requested(scene, request)
-        begun, factor = time.perf_counter(), self._times.factor(self._moving or usual, FACTORS, self._budget)
+        begun, factor = time.perf_counter(), self._times.factor(self._moving or usual, FACTORS, self._left)
         try:
             with self.viewport.at_once(factor) as framebuffer:
                 plan = self.renderer.draw_requested(scene, framebuffer, request, look.exposure, tone_of(look, scene))
@@ -258,7 +261,7 @@ class ViewportRenderer:
         self.simpler, begun = "", time.perf_counter()
         self.viewport.step(side, plan, stride, max(samples, 1))
         self._finish(side, plan, stride, begun)
-        if self._strides.corrected(side, plan, drawn + 1, self._budget):
+        if self._strides.corrected(side, plan, drawn + 1, self._left):
             self.viewport.restart(side)
         return True
 
@@ -267,14 +270,14 @@ class ViewportRenderer:
         photons, strides = self.photons, self._strides.of
         expected = 0.0 if self.plans[0] is None else self._times.known(self.plans[0])
         request = replace(self.quality.request, interfaces=None)
-        if not photons.ready(workspace, scene, self.renderer, self.viewport, request, self._budget, expected):
+        if not photons.ready(workspace, scene, self.renderer, self.viewport, request, self._left, expected):
             if (shown := photons.show_media(self.viewport)) is not None:
-                self.plans[0], strides[0] = shown, self._times.stride(shown, self._budget)
+                self.plans[0], strides[0] = shown, self._times.stride(shown, self._left)
             return False, False
         if not photons.drawing or photons.plan is None or photons.light is None:
             return True, False
         if photons.side == 1 and not self.viewport.steps(1):
-            strides[1] = self._times.stride(photons.plan, self._budget)
+            strides[1] = self._times.stride(photons.plan, self._left)
         stride, begun = strides[photons.side], time.perf_counter()
         samples = samples_of(stride, workspace.document.display.antialias)
         self.viewport.step(photons.side, photons.plan, stride, max(samples, 1), photons=photons.light.texture)

@@ -10,7 +10,7 @@ import pytest
 
 import translucent as tl
 from tests.command_line import Run
-from tests.values.gltf_writer import COLOR, Writer, glass, material_scene
+from tests.gltf.gltf_writer import COLOR, Writer, glass, material_scene
 from translucent.gltf.file import read_gltf
 from translucent.gltf.materials import read_materials
 from translucent.media.albedo import hulst_albedo

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from tests.values.gltf_writer import COLOR, WINE, Json, Writer, glass, load, material_scene
+from tests.gltf.gltf_writer import COLOR, WINE, Json, Writer, glass, load, material_scene
 from translucent.gltf.objects import BLENDED, WALL_SHARE
 
 HALF = {"baseColorFactor": [1.0, 1.0, 1.0, 0.5]}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from tests.values.gltf_writer import TURN, box_file, lit_scene, load
+from tests.gltf.gltf_writer import TURN, box_file, lit_scene, load
 from translucent.scene.showcase import LIGHT_TABLE
 
 # Cameras

@@ -14,7 +14,7 @@ import trimesh
 from PIL import Image
 
 import translucent as tl
-from tests.values.gltf_json import JADE, Json, gltf
+from tests.gltf.gltf_json import JADE, Json, gltf
 from translucent.gltf.file import GltfFile, read_gltf, write_gltf
 from translucent.gltf.materials import read_materials
 from translucent.gltf.write import write_medium

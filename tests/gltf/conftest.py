@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tests.values.gltf_json import gltf
+from tests.gltf.gltf_json import gltf
 
 
 @pytest.fixture

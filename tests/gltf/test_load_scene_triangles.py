@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 import translucent as tl
-from tests.values.gltf_writer import BOX, TYPES, Writer, box_file, load
+from tests.gltf.gltf_writer import BOX, TYPES, Writer, box_file, load
 
 
 def triangles(mesh: tl.Mesh) -> set[tuple[tuple[float, ...], ...]]:

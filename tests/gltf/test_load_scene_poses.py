@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 import translucent as tl
-from tests.values.gltf_writer import WINE, Json, Writer, glass, load
+from tests.gltf.gltf_writer import WINE, Json, Writer, glass, load
 from translucent.gltf.nodes import sampled_channel
 
 HALF = math.sqrt(0.5)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from tests.values.gltf_json import JADE, uses
+from tests.gltf.gltf_json import JADE, uses
 from translucent.gltf.file import GltfFile, read_gltf, write_gltf
 from translucent.gltf.materials import materials_of, read_materials
 from translucent.gltf.write import write_medium

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from tests.values.gltf_json import gltf, uses
+from tests.gltf.gltf_json import gltf, uses
 from translucent.formulas import optics
 from translucent.gltf.file import GltfFile, read_gltf
 from translucent.gltf.materials import GltfMaterial, materials_of, read_materials

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from tests.values.gltf_writer import Writer, glass
+from tests.gltf.gltf_writer import Writer, glass
 from tests.values.plan_scenes import BOX, CAMERA, DIAMOND, GLASS, OPEN, WINE, body
 from tests.work import calls
 from translucent.geometry import mesh as meshes

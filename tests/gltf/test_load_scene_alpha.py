@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from tests.values.gltf_writer import BOX, Json, Writer, glass, load, material_scene
-from tests.values.test_load_scene_surfaces import base_color, plate, png
+from tests.gltf.gltf_writer import BOX, Json, Writer, glass, load, material_scene
+from tests.gltf.test_load_scene_surfaces import base_color, plate, png
 from translucent.gltf.objects import BLENDED, WALL_SHARE
 
 pytestmark = pytest.mark.filterwarnings("ignore::translucent.TranslucentWarning")

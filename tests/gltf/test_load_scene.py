@@ -11,7 +11,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 import translucent as tl
-from tests.values.gltf_writer import COLOR, TURN, WINE, Writer, box_file, glass, load
+from tests.gltf.gltf_writer import COLOR, TURN, WINE, Writer, box_file, glass, load
 from translucent.scene.scene import OPAQUE_COLOR
 from translucent.scene.showcase import filled
 

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 import translucent as tl
-from tests.values.gltf_writer import BOX, Json, Writer, box_file, lit_scene, load, material_scene
+from tests.gltf.gltf_writer import BOX, Json, Writer, box_file, lit_scene, load, material_scene
 
 
 @pytest.mark.parametrize(
