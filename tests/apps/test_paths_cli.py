@@ -11,7 +11,7 @@ import pytest
 
 from tests.command_line import Run
 from translucent.commands import console
-from translucent.commands.console import Progress, time_text
+from translucent.commands.console import ProgressLine, time_text
 
 JADE = ("bear", "--preset", "jade", "--method", "path-traced", "--size", "16x12")
 
@@ -61,7 +61,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
 
 def test_progress_tells_how_long_the_rest_takes(clock: list[float], capsys: pytest.CaptureFixture[str]) -> None:
     """Counted from what was done when the first share was known; in a file, a line now and then."""
-    tell = Progress("path tracing on a machine")
+    tell = ProgressLine("path tracing on a machine")
     shares = {100.0: 0.1, 100.5: 0.15, 110.0: 0.2, 115.0: 0.4, 141.0: 1.0, 150.0: 0.5, 160.0: 0.9}
     for now, share in shares.items():
         clock[0] = now
@@ -74,7 +74,7 @@ def test_progress_tells_how_long_the_rest_takes(clock: list[float], capsys: pyte
 
 
 def test_quick_work_tells_nothing(clock: list[float], capsys: pytest.CaptureFixture[str]) -> None:
-    tell = Progress("path tracing")
+    tell = ProgressLine("path tracing")
     for share in (0.0, 0.5, 0.9, 1.0):
         tell(share)
         clock[0] += 0.3
