@@ -241,7 +241,7 @@ class Atlas:
         return left, np.where(touched, right, left)
 
     def _nearest(self, face: Integers, row: Integers, column: Integers, begin: int, end: int) -> Texels:
-        """Best face for each texel, of all pairs of a face and a texel of the strip that it touches."""
+        """Choose a face for each texel of a strip, among all pairs of a face and a texel that it touches."""
         center = np.stack([column, row], axis=1).astype(np.float64) + 0.5
         area, inside = _areas(np.take(self._place, face, axis=2), center)
         texel = (row % self.height - begin) * self.width + column % self.width
@@ -288,7 +288,7 @@ class Atlas:
 
 
 def _cells(low: Array, high: Array) -> tuple[Integers, Integers]:
-    """First cell, and last + 1, of closed ranges; a range that ends on a boundary does not touch the cell behind it."""
+    """First cell, and last + 1, that closed ranges touch; one that ends on a boundary does not touch the next cell."""
     first = np.floor(low).astype(np.int64)
     return first, np.maximum(np.ceil(high).astype(np.int64), first + 1)
 

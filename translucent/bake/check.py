@@ -319,14 +319,14 @@ def own_corners(file: GltfFile, part: Record, metres: float, material: GltfMater
 
 
 def placed_corners(file: GltfFile, part: Record, metres: float) -> Corners:
-    """Corners of a primitive as the first node places it."""
+    """Corners of a primitive, placed by the first node that shows it."""
     matrix = _matrix(file, part)
     positions, uv = own_corners(file, part, metres)
     return positions @ matrix[:3, :3].T + metres * matrix[:3, 3], uv
 
 
 def placed_around(file: GltfFile, part: Record, metres: float) -> Mesh | None:
-    """Corners of the body that a primitive bounds with others, as the first node places it."""
+    """Body that a primitive bounds together with others, placed by the first node that shows it."""
     around = Bodies(file, metres).around((part["place"][0], part["place"][1]))
     return None if around is None else transformed(around, _matrix(file, part), metres)
 

@@ -104,7 +104,7 @@ class InscribedSpheres:
         np.minimum.at(radius, pair.take(counts), (0.5 * (1.0 + LOOSE)) * square.take(counts) / along.take(counts))
 
     def _touch(self, points: Points, pair: Integers, face: Integers, radius: Array) -> None:
-        """Make spheres as small as faces allow, in pairs."""
+        """Shrink the sphere of each pair of a point and a face until it touches the face, if it reaches it."""
         other = face != points.face.take(pair)
         pair, face = pair[other], face[other]
         point, inward = points.start.take(pair, axis=0), -points.normal.take(pair, axis=0)

@@ -302,7 +302,7 @@ def check_scatter(one: Baked, values: Floats, size: tuple[int, int] = (320, 320)
 
 
 def _looked_up(mesh: Mesh, values: Floats, corners: Integers, weights: Array, *, texels: bool) -> Array:
-    """(k, 9, 3): values at points of the faces with these corners (k, 3), between texels or vertices linearly."""
+    """(k, 9, 3): values at points of faces with corners (k, 3), interpolated linearly between texels or vertices."""
     if not texels:
         return np.asarray(np.einsum("kv,kvic->kic", weights, values[corners].astype(np.float64)))
     assert mesh.uv is not None

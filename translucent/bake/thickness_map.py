@@ -321,7 +321,7 @@ def save_map(
 def add_map(
     files: OutputFiles, result: ThicknessMap, path: Path, *, normalize: bool, invert: bool, about: Record
 ) -> Record:
-    """Write a map as an image, and its record, together with other files, as `save_map`; returns the record."""
+    """Write a map as an image, with its record beside it, as a part of `files`; returns the record."""
     suffix = check_map_output(path, normalize=normalize, invert=invert)
     levels = PNG_LEVELS if suffix == ".png" else 0
     encoding = Encoding.of(result.values, levels, normalize=normalize, invert=invert, unit=result.settings.unit)

@@ -96,13 +96,13 @@ class SkyShadows(Experiment[Whole]):
     shown: Sequence[Whole] = (Whole(),)
 
     def added(self, report: Report, record: tuple[SkyRow, ...] | str) -> Report:
-        """The report with the rows, or with the reason why there are none."""
+        """Report with these rows added, or with the reason why there are none."""
         if not isinstance(record, str):
             return report.plus(self.into, record)
         return dataclasses.replace(report, shadows=dataclasses.replace(report.shadows, sky_failure=record))
 
     def measure(self, bench: BenchContext, scene: Whole) -> tuple[SkyRow, ...] | str:
-        """Rows of all environments with all numbers of directions."""
+        """Measure shadows of each environment by each number of directions."""
         try:
             return self.rows(bench.renderer)
         except Exception as error:  # noqa: BLE001 - the rest of the report goes on
@@ -238,7 +238,7 @@ class CausticTruth:
 
     @property
     def mean(self) -> Array:
-        """Mean of both."""
+        """Mean of both estimates."""
         return 0.5 * (self.halves[0] + self.halves[1])
 
     def errors(self, found: Array, worth: float = 1.0) -> tuple[float, float]:

@@ -65,7 +65,7 @@ class Packed:
         return cls((height, width), "float16", scale, _deflate(rounded.tobytes()))
 
     def array(self) -> npt.NDArray[Any]:
-        """(h, w) float64 or bool; raises `ValueError` if the text holds no such array."""
+        """Unpacked array (h, w), float64 or bool; raises `ValueError` if the text holds no such array."""
         height, width = self.shape
         size = -(-height * width // 8) if self.dtype == "bool" else 2 * height * width
         if not (height >= 0 and width >= 0 and size <= _LARGEST):
@@ -207,7 +207,7 @@ class _Strict(Converter):
 
 
 def _said(error: BaseException, _: Any) -> str:
-    """Words for an error, after the path of its field."""
+    """Text of a validation error, to follow the name of its field."""
     if isinstance(error, ForbiddenExtraKeysError):
         return f"has unknown fields {', '.join(sorted(error.extra_fields))}"
     return "is missing" if isinstance(error, KeyError) else str(error)

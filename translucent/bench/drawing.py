@@ -517,7 +517,7 @@ class _Repeated:
         self._draw, self.times = draw, 0
 
     def sample(self) -> Sample:
-        """Draw, and return the means of the times; the first sample decides how many they are."""
+        """Draw several times, and return the means of the times; the first sample decides how often."""
         samples = [self._draw()]
         if not self.times:
             self.times = math.ceil(min(SHORTEST / max(samples[0].frame, SHORTEST / MOST_REPEATED), MOST_REPEATED))

@@ -167,7 +167,7 @@ def _towards(light: Light, points: Array) -> tuple[Array, Array]:
 
 
 def cosine_directions(normals: Array) -> Array:
-    """(k, RAYS, 3): directions about normals (k, 3), by the cosine; turned for each point."""
+    """(k, RAYS, 3): cosine-weighted directions around normals (k, 3), rotated by another angle for each."""
     number = np.arange(RAYS)
     height = np.sqrt((number + 0.5) / RAYS)
     across = _unit(np.cross(normals, np.where(np.abs(normals[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))))
@@ -202,7 +202,7 @@ class PaintLayer(Engine):
     promise: ClassVar[str] = "none: what its interfaces mirror back inside is left out; computed here in NumPy"
 
     def light(self, seen: VisiblePoints) -> Array:
-        """Light of the layer, as it leaves where the interface lets light in."""
+        """Radiance of the layer: light enters and leaves by the diffuse transmittance of the interface."""
 
         def falling(normals: Array) -> Array:  # unshadowed, as layers have it
             lights = sum(light.irradiance_on(seen.points, normals) for light in seen.scene.lights)

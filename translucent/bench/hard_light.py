@@ -177,7 +177,7 @@ def _sent(albedo: float, depth: float) -> float:
     unit="optical depth",
 )
 def _many(checks: Checks) -> None:
-    """Bodies of 60 media in rows before a wall of opaque boxes."""
+    """Balls of 60 media in rows, before a wall of opaque boxes."""
     ball, box = Sphere(radius=0.4).tessellate(8), Box((-0.3, -0.3, -0.1), (0.3, 0.3, 0.1)).tessellate()
     random = np.random.default_rng(7)
     media = [Medium(absorption=random.uniform(0.1, 2.0, 3)) for _ in range(MEDIA)]

@@ -335,7 +335,7 @@ class CostScaling(Experiment[ScalingStep]):
         return dataclasses.replace(report, scaling=tuple(series.values()))
 
     def measure(self, bench: BenchContext, step: ScalingStep) -> list[Series]:
-        """Series of one point each, the floor first."""
+        """Times of each method at one step of an axis, as series of one point; the depth-only floor first."""
         found: dict[str, Samples] = {}
         try:
             scene, size = step.make()

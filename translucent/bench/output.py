@@ -337,7 +337,7 @@ def _identifier(name: str) -> str:
 
 
 def _case(case: CaseRecord, name: str) -> dict[str, Any]:
-    """A case as the template shows it."""
+    """Values of a case for the template of the page."""
     from markupsafe import Markup
 
     rows = plotted(case)

@@ -107,7 +107,7 @@ def plates(layers: int) -> Mesh:
 
 
 def bow_tie() -> Mesh:
-    """A box whose width is multiplied by -z: closed and consistently wound, and the lobe in front is inside out."""
+    """Box twisted into a bow tie: closed and consistently wound, with the lobe in front inside out."""
     box = Box((-1.0, -0.5, -1.0), (1.0, 0.5, 1.0)).tessellate()
     return Mesh(box.vertices * np.where([1, 0, 0], -box.vertices[:, 2:], 1.0), box.faces, name="bow tie")
 

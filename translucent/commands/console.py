@@ -71,7 +71,7 @@ def overwrite(text: str) -> None:
 
 
 class ProgressLine:
-    """Teller of the share of work that is done.
+    """Line of progress: the finished fraction of some work, and the time left.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ class NamedMedium:
 
 @dataclass(frozen=True)
 class SceneRequest:
-    """Scene that is requested of a model.
+    """Request for a scene of a model: media, camera, size, lights and stage.
 
     Attributes
     ----------
@@ -302,7 +302,7 @@ class ObjectCommand(click.Command):
 
 
 def read_objects(names: Sequence[str]) -> list[NamedMedium]:
-    """Media of the objects that are named, of the verb that runs.
+    """Media that the ``--object`` options of the running command give to single objects.
 
     Raises
     ------

@@ -76,7 +76,7 @@ def option(default: Any = None, *, names: tuple[str, ...] = (), help: str | Call
 
 
 def group(kind: type, without: Collection[str] = ()) -> Any:
-    """Field of a group that is a group itself, but for the options `without` which the verb does."""
+    """Field of a group of options that is another group, without the options of these names."""
     return dataclasses.field(default_factory=kind, metadata={"group": kind, "without": without})
 
 

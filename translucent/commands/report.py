@@ -123,7 +123,7 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
 def _measured(
     models: tuple[str, ...], medium: Medium | None, given: ReportOptions, parts: tuple[Part, ...], base: Report | None
 ) -> Report:
-    """Measure, and tell from the beginning how far it is; each finished scene is in ``report.json`` at once."""
+    """Measure a report with progress on stderr; each finished scene is in ``report.json`` at once."""
     from translucent.bench.cases import model_cases
     from translucent.bench.output import write_report
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all

@@ -218,7 +218,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
 
 
 def _read_poster(poster: str) -> bytes | None:
-    """Picture of a file."""
+    """Bytes of a poster, read from a file and checked."""
     if poster in (RENDERED, NO_POSTER):
         return None
     from translucent.files.paths import require_file

@@ -350,7 +350,7 @@ def write_gltf(file: GltfFile, path: str | Path) -> None:
 
 
 def fill_gltf(path: Path, file: GltfFile, place: Path) -> None:
-    """Write a file, as `write_gltf`, to a path from which it will be moved to its place."""
+    """Write a glTF file to a temporary path, with links as its final place needs them."""
     tree = _relocated(file, place)
     if place.suffix.lower() == ".gltf":
         content = (json.dumps(_unpacked(file, tree), indent=2, ensure_ascii=False) + "\n").encode()

@@ -366,7 +366,7 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
 
 
 def _thickness_texture(volume: JsonFields, count: int) -> tuple[int | None, TextureTransform]:
-    """Index of the thickness texture among so many, and its transform; None if there is none."""
+    """Index of the thickness texture, below `count`, and its transform; None if there is none."""
     key = "thicknessTexture"
     info = volume.section(key)
     if key not in volume.values or info.values is not volume.values[key]:

@@ -176,7 +176,7 @@ class Textures:
         return _WRAPS[code]
 
     def _picture(self, index: int, name: str) -> Bytes | None:
-        """(h, w, 4): a picture as it is encoded, made smaller if it is large; each is read once. None if unreadable."""
+        """Picture of an image (h, w, 4), as encoded, large ones made smaller; each is read once. None if unreadable."""
         entry = self._file.item("images", index)
         if index not in self._pictures:
             try:

@@ -94,7 +94,7 @@ class PyrenderPicture:
     ambient: tuple[float, float, float]
 
     def backdrop(self) -> Backdrop:
-        """The picture with its background."""
+        """Picture of the opaque objects over its background."""
         return Backdrop((self.colors[..., :3] / 255.0) ** GAMMA, self.depth, ambient=self.ambient)
 
     def before(self, environment: Environment, camera: Camera) -> Backdrop:

@@ -138,7 +138,7 @@ def blender_snippet(medium: Medium, roughness: float = 0.0, name: str = "translu
 
 
 def read_blender(text: str, _: str = "m") -> Medium:
-    """Read the medium of such a snippet, which is not run; raises `InputError` if it is none."""
+    """Read the medium of Python for Blender, which is not run; raises `InputError` if it has none."""
 
     def socket(node: str, name: str, count: int = 1, default: float | None = None) -> Array:
         return stated("Blender material", text, f'{node}.inputs["{name}"].default_value', count, default)

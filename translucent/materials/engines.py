@@ -85,7 +85,7 @@ def threejs_text(medium: Medium, distance: float, roughness: float) -> str:
 
 
 def read_threejs(text: str, _: str = "m") -> Medium:
-    """Read the medium of such a text; raises `InputError` if it is none."""
+    """Read the medium of a material for three.js; raises `InputError` if it has none."""
     what = "three.js material"
     ior = float(stated(what, text, "  ior:")[0])
     if "attenuationDistance:" not in text:
@@ -125,7 +125,7 @@ void fragment() {{
 
 
 def read_godot(text: str, _: str = "m") -> Medium:
-    """Read the medium of such a shader; raises `InputError` if it is none."""
+    """Read the medium of a Godot shader; raises `InputError` if it has none."""
     what = "Godot shader"
     ior = float(stated(what, text, "uniform float ior")[0])
     return Medium(absorption=stated(what, text, "extinction = vec3(", 3), ior=ior)
@@ -153,7 +153,7 @@ def unity_text(medium: Medium, distance: float, roughness: float) -> str:
 
 
 def read_unity(text: str, _: str = "m") -> Medium:
-    """Read the medium of such a text, as far as nine digits go; raises `InputError` if it is none."""
+    """Read the medium of C# for Unity, to nine digits; raises `InputError` if it has none."""
     what = "Unity material"
     distance, ior = stated_length(what, text, '"_ATDistance"'), float(stated(what, text, '"_Ior"')[0])
     return from_unity(stated_color(what, text, '"_TransmittanceColor", new Color('), distance, ior)
@@ -200,7 +200,7 @@ def unreal_text(medium: Medium, distance: float, roughness: float) -> str:
 
 
 def read_unreal(text: str, _: str = "m") -> Medium:
-    """Read the medium of such a text, as far as nine digits go; raises `InputError` if it is none."""
+    """Read the medium of values for Unreal, to nine digits; raises `InputError` if there is none."""
     path = stated("Unreal material", text, "SSS MFP (cm)", 3)
     found = from_mean_free_path_cm(np.where(path >= LONGEST_CM, math.inf, path))
     ior = float(stated("Unreal material", text, "index (IOR)", default=1.0)[0])

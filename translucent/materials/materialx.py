@@ -207,7 +207,7 @@ def medium_of(shader: SurfaceShader, stated: Mapping[str, float | Array], metres
 
 
 def parse_value(what: str, key: str, parts: list[str], default: float | Array, space: str) -> float | Array:
-    """A number, or three in a color space made linear, from the texts of its parts."""
+    """Parse a number, or a color, which is converted from its color space to linear, from texts."""
     scalar = isinstance(default, float)
     try:
         numbers = np.array([float(part) for part in parts])

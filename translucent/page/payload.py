@@ -159,7 +159,7 @@ def _light(frames: Mapping[str, tuple[Scene, RecordedFrame]]) -> set[int]:
 
 
 def _number_blocks(header: dict[str, Any], sections: _Sections) -> None:
-    """Put sections in place of contents in the steps."""
+    """Replace the contents of uniform blocks in all steps by the numbers of their sections."""
     for told in header["variants"].values():
         for part in _PARTS:
             for step in told[part]:

@@ -95,7 +95,7 @@ class SetOrbit:
 
 @dataclass(frozen=True)
 class OrbitBy:
-    """Orbit by degrees: to the right, and upwards."""
+    """Orbit the camera around its target by degrees: to the right, and upwards."""
 
     right: float
     up: float

@@ -248,7 +248,7 @@ def _environment_of(name: str, written: int) -> Environment:
 
 
 def _own_environment(environment: str, background: str, rotation: float = 0.0) -> Environment | None:
-    """Environment in place of the stage's; None if neither is named."""
+    """Environment by the names of light and background, in place of the stage's; None if both are empty."""
     return _environment(environment, background, rotation, LIGHT_TABLE) if environment or background else None
 
 

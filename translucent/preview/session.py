@@ -39,7 +39,7 @@ def to_table(document: Document) -> dict[str, Any]:
 
 
 def from_table(table: dict[str, Any], where: str) -> Document:
-    """Document of a table; absent fields have their defaults, and fields of older versions are ignored.
+    """Document of a session's TOML table; absent fields have their defaults, and fields of older versions are ignored.
 
     Raises
     ------

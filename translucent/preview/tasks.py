@@ -13,7 +13,7 @@ from translucent.errors import TranslucentError
 
 
 class CancelledError(Exception):
-    """Signal within a task that it is canceled."""
+    """Exception that ends the work of a canceled task."""
 
 
 def _nothing(_: Any) -> None:

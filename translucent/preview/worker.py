@@ -349,7 +349,7 @@ class _Kept:
 
     @property
     def tokens(self) -> set[int]:
-        """Tokens of all values that are still alive."""
+        """Tokens of all sent values that this process still references."""
         with self._lock:
             return {token for token, _ in self._packed.values()}
 

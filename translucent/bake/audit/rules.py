@@ -81,7 +81,7 @@ PLAUSIBLE = (0.05, 0.95)
 #: Units that files are written in by mistake, by their length in metres.
 UNITS = (("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254))
 
-#: Thickness in metres, along views, outside of which translucent bodies are rare.
+#: Thickness in metres, along views, between which translucent bodies usually are.
 USUAL = (1e-5, 0.5)
 
 #: Names of viewers.
@@ -197,7 +197,7 @@ def _transport(material: GltfMaterial, entry: Json, extensions: Json) -> Iterato
 
 
 def _optics(material: GltfMaterial) -> Iterator[_Told]:
-    """Attenuation and index of refraction."""
+    """Rules about attenuation and the index of refraction."""
     black = [c for c, value in zip(("red", "green", "blue"), material.attenuation_color, strict=True) if value == 0]
     if black and np.isfinite(material.attenuation_distance):
         text = (

@@ -326,7 +326,7 @@ def swatches(material: Material) -> list[tuple[float, str]]:
 
 
 def scene_panel(state: WindowState) -> None:
-    """Draw the scene panel."""
+    """Draw the panel that lists the objects of the model, to show, hide and select them."""
     count = len(state.objects)
     shown = len(state.work.document.shown_among(count))
     ui.wrapped(f"{shown} of {count} objects are on show. Drop a preset of the Library on one.", ui.FAINT)

@@ -219,7 +219,7 @@ def _scale(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
 
 
 def _inset(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
-    """Draw the reference of the measurement in the corner."""
+    """Draw the float64 reference as a small picture in the corner, if it is of this scene."""
     measured = state.work.measured
     if not state.get("display.inset") or measured is None or measured.scene is not state.work.scene():
         return
