@@ -61,28 +61,23 @@ def test_white_furnace(density: Density | None, g: float) -> None:
 
 @pytest.mark.parametrize("density", [None, LinearDensity(0, 0.0, 2.0), GRID], ids=["plain", "linear", "grid"])
 def test_a_furnace_as_hot_as_its_walls(density: Density | None) -> None:
-    """Kirchhoff: what absorbs and emits q = sigma_a L in light L is as invisible; here paths do end by chance."""
+    """Kirchhoff: what absorbs and emits q = sigma_a L in light L is as invisible; only faint paths end by chance."""
     absorption = np.array([0.5, 2.0, 4.0])
     hot = Medium(absorption, scattering=(3.0, 2.0, 1.0), emission=absorption * (1, 0.5, 0.2), anisotropy=0.4)
     scene = Scene([Object(BOX, hot, density=density)], CAMERA, environment=Environment.constant((1, 0.5, 0.2)))
     frame, error = path_trace(scene, (12, 9), paths=300)
-    # Where hardly any path meets anything, the error bars are as rare.
-    seen = frame.transmittance.max(axis=-1) < 0.7
-    assert seen.sum() > 30
-    assert error[seen].min() > 1e-4
+    assert (frame.transmittance.max(axis=-1) < 0.7).sum() > 30
     truth = np.broadcast_to((1, 0.5, 0.2), frame.radiance.shape)
-    assert_normal(scores(frame.radiance[seen], error[seen], truth[seen]), 3 * int(seen.sum()))
+    np.testing.assert_allclose(frame.radiance, truth, rtol=5e-3)
+    assert (np.abs(frame.radiance - truth) <= 6.0 * error + 1e-9).all()
 
 
 @pytest.mark.parametrize("density", [None, GRID], ids=["plain", "grid"])
 def test_what_emits_without_absorbing(density: Density | None) -> None:
-    """Nothing is met on the way, yet light is found; its mean is the integral of the emission."""
+    """Nothing is met on the way, yet light is found: the integral of the emission, without noise."""
     scene = Scene([Object(BOX, Medium(emission=(1.0, 2.0, 3.0)), density=density)], CAMERA, environment=DARK)
-    frame, error = path_trace(scene, (8, 6), paths=400)
-    truth, seen = render(scene, (8, 6)).radiance, frame.coverage
-    z = scores(frame.radiance[seen], error[seen], truth[seen])
-    # The channels share their paths.
-    assert_normal(z[::3], int(seen.sum()))
+    frame, _ = path_trace(scene, (8, 6), paths=4)
+    np.testing.assert_allclose(frame.radiance, render(scene, (8, 6)).radiance, rtol=1e-9)
 
 
 @pytest.mark.parametrize("light", [SUN, LAMP], ids=["sun", "lamp"])
@@ -115,10 +110,8 @@ def test_without_events_it_is_what_is_seen_through() -> None:
     """A backdrop of squares is where it is, and opaque objects send back what they do elsewhere."""
     rock = Object(Box((-0.2, -0.3, -2.0), (0.4, 0.3, -1.5)).tessellate(), color=(0.2, 0.6, 0.9))
     scene = Scene([Object(BOX, Medium((0.5, 1, 2))), rock], CAMERA, [SUN], Environment.checkerboard("red", "white"))
-    frame, error = path_trace(scene, (8, 6), paths=400)
-    truth = render(scene, (8, 6)).radiance
-    some = error > 0
-    assert_normal(scores(frame.radiance, error, truth), int(some.sum()))
+    frame, _ = path_trace(scene, (8, 6), paths=4)
+    np.testing.assert_allclose(frame.radiance, render(scene, (8, 6)).radiance, rtol=1e-9)
 
 
 def test_a_backdrop_lights_like_its_mean() -> None:
