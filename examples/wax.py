@@ -1,5 +1,5 @@
 """
-Wax: light scattered once, from a lamp behind
+Wax: light scattered once, from a light behind
 =============================================
 
 Coefficients may be given as they are measured, in 1/m for red, green and blue. Blue is absorbed most, so the light that
@@ -18,13 +18,13 @@ wax = tl.Medium(absorption=(80, 160, 350), scattering=(870, 800, 550), anisotrop
 # Light that is scattered once leaves a body at no more than 1 / 4 pi of what comes in, so lamps are bright and
 # surroundings dark.
 
-lamp = tl.PointLight(bear.center + (0.03, 0.02, -0.02), intensity=(0.022, 0.021, 0.018))
+light = tl.PointLight(bear.center + (0.03, 0.02, -0.02), intensity=(0.022, 0.021, 0.018))
 sky = tl.DirectionalLight((0.3, -0.6, -1), irradiance=(0.9, 1.0, 1.2))
 dusk = tl.Environment.gradient((0.02, 0.02, 0.025), (0.05, 0.05, 0.06))
 
 width = int(os.environ.get("EXAMPLE_WIDTH", "640"))
 size = (width, 3 * width // 4)
-scene = tl.showcase(bear, wax, size=size, environment=dusk, lights=[lamp, sky])
+scene = tl.showcase(bear, wax, size=size, environment=dusk, lights=[light, sky])
 with tl.Renderer() as renderer:
     frame = renderer.render(scene, size, samples=4)
 frame.save("wax.png")

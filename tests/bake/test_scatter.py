@@ -17,11 +17,11 @@ import trimesh
 import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
 from translucent.assets import mesh_path
+from translucent.bake.gltf_targets import positions_of
 from translucent.bake.record import sidecar_of
 from translucent.bake.scatter import (
     ATTRIBUTES,
     EXTRAS,
-    positions_of,
     read_scatter_exr,
     read_scatter_glb,
 )
@@ -248,7 +248,7 @@ def test_a_map_from_the_command_line(run: Run, tmp_path: Path) -> None:
     assert result.code == 0, result.err
     lines = result.out.splitlines()
     assert lines[0].endswith("b.exr: 64x64, scatter, nine coefficients for each channel")
-    assert re.match(r"ball\.ply: \d+ cells; gives back 0\.\d+, 0\.\d+, 0\.\d+ of uniform light on average", lines[1])
+    assert re.match(r"ball\.ply: \d+ cells; 0\.\d+, 0\.\d+, 0\.\d+ of uniform light leave it on average", lines[1])
     assert read_scatter_exr(tmp_path / "b.exr")[0].shape == (64, 64, 9, 3)
     assert (tmp_path / "b.exr.uv.glb").is_file()
 

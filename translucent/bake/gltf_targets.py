@@ -75,6 +75,21 @@ def triangle_primitives(file: GltfFile) -> dict[PrimitiveKey, Json]:
     }
 
 
+def positions_of(file: GltfFile, key: PrimitiveKey) -> Array:
+    """(n, 3): positions of the vertices of a primitive, in units of the file."""
+    attributes = file.item("meshes", key[0])["primitives"][key[1]]["attributes"]
+    return Accessors(file).vectors(attributes.get("POSITION"), "VEC3")
+
+
+def nearest(vertices: Array, positions: Array) -> npt.NDArray[np.intp]:
+    """(k,): indices of the vertices (n, 3) that are nearest to positions (k, 3)."""
+    from scipy.spatial import cKDTree
+
+    with np.errstate(under="ignore"):
+        found: npt.NDArray[np.intp] = cKDTree(vertices).query(positions)[1]
+    return found
+
+
 class Bodies:
     """The bodies that the primitives of a file bound.
 

@@ -29,7 +29,7 @@ from translucent.arguments import checked, vectors
 from translucent.arrays import Array, Floats, Mask
 from translucent.bake.atlas import Atlas, pad, unwrap
 from translucent.bake.gltf_builder import GlbBuilder, mesh_file
-from translucent.bake.gltf_targets import PrimitiveKey
+from translucent.bake.gltf_targets import PrimitiveKey, nearest, positions_of
 from translucent.bake.rays import blend
 from translucent.bake.record import Record, add_record, fingerprint, mesh_record, plain, write_record
 from translucent.bake.settings import BakeSettings
@@ -129,11 +129,6 @@ def write_scatter_glb(
         known: dict[str, Any] = extras if isinstance(extras, dict) else {}
         primitive["extras"] = {**known, EXTRAS: plain(meanings[key])}
     write_gltf(builder.file(), path)
-
-
-def positions_of(file: GltfFile, key: PrimitiveKey) -> Array:
-    """(n, 3): positions of the vertices of a primitive, in units of the file."""
-    return Accessors(file).vectors(_attributes(file, key).get("POSITION"), "VEC3")
 
 
 def read_scatter_glb(file: GltfFile, key: PrimitiveKey) -> Floats:
@@ -300,11 +295,7 @@ class VertexScatter(BakedScatter):
     @checked
     def at(self, positions: Array) -> Floats:
         """Values (k, 9, 3) of the vertices that are nearest to positions (k, 3) in metres."""
-        from scipy.spatial import cKDTree
-
-        with np.errstate(under="ignore"):
-            _, nearest = cKDTree(self.mesh.vertices).query(vectors("positions", positions))
-        return np.ascontiguousarray(self.values[nearest])
+        return np.ascontiguousarray(self.values[nearest(self.mesh.vertices, vectors("positions", positions))])
 
 
 def save_scatter_map(result: ScatterMap, path: str | Path, about: Record | None, model: GltfFile | None) -> Record:

@@ -22,7 +22,16 @@ import numpy as np
 from translucent.arrays import Array, Floats, Integers, Mask
 from translucent.bake.check import MOST_ROWS, NO_BODY, first_hits, labeled, look, look_up, stacked
 from translucent.bake.gltf_builder import GlbBuilder
-from translucent.bake.gltf_targets import PrimitiveKey, Target, find_targets, first_transforms, left_out, transformed
+from translucent.bake.gltf_targets import (
+    PrimitiveKey,
+    Target,
+    find_targets,
+    first_transforms,
+    left_out,
+    nearest,
+    positions_of,
+    transformed,
+)
 from translucent.bake.rays import blend
 from translucent.bake.record import Record, write_record
 from translucent.bake.scatter import (
@@ -32,7 +41,6 @@ from translucent.bake.scatter import (
     VertexScatter,
     bake_scatter,
     bake_vertex_scatter,
-    positions_of,
     read_scatter_exr,
     read_scatter_glb,
     save_scatter_map,
@@ -313,12 +321,9 @@ def _looked_up(mesh: Mesh, values: Floats, corners: Integers, weights: Array, *,
 
 def _at_vertices(path: Path, key: PrimitiveKey, one: Baked) -> Floats:
     """Values of a .glb in the order of the mesh that was baked."""
-    from scipy.spatial import cKDTree
-
     file = read_gltf(path)
-    with np.errstate(under="ignore"):
-        _, nearest = cKDTree(positions_of(file, key) @ one.scale.T).query(one.result.mesh.vertices)
-    return np.ascontiguousarray(read_scatter_glb(file, key)[nearest])
+    found = nearest(positions_of(file, key) @ one.scale.T, one.result.mesh.vertices)
+    return np.ascontiguousarray(read_scatter_glb(file, key)[found])
 
 
 def _picture(hit: Mask, values: Array, size: tuple[int, int]) -> Array:

@@ -33,7 +33,7 @@ import numpy as np
 from translucent.arguments import checked
 from translucent.arrays import Array, Floats, Mask
 from translucent.bake.gltf_builder import GlbBuilder, mesh_file
-from translucent.bake.gltf_targets import PrimitiveKey, Target
+from translucent.bake.gltf_targets import PrimitiveKey, Target, nearest, positions_of
 from translucent.bake.record import (
     Encoding,
     Record,
@@ -60,7 +60,6 @@ from translucent.files.images import (
 from translucent.files.paths import OutputFiles, require_file, require_output, write_atomically
 from translucent.files.reading import open_file, read_bytes
 from translucent.geometry.mesh import Mesh
-from translucent.gltf.accessors import Accessors
 from translucent.gltf.file import GltfFile, fill_gltf, write_gltf
 from translucent.media.medium import Medium
 from translucent.signals import import_trimesh
@@ -493,17 +492,14 @@ def write_vertices(
     RenderError
         If a file cannot be written.
     """
-    from scipy.spatial import cKDTree
-
     told: list[Record] = []
     for key, result in results.items():
         unit = result.settings.unit
         per_unit = metres if unit == "m" else 1.0
         attributes = builder.primitive(*key)["attributes"]
-        positions = Accessors(builder.file()).vectors(attributes.get("POSITION"), "VEC3")
+        values = result.values[nearest(result.mesh.vertices, positions_of(builder.file(), key) * metres)]
         with np.errstate(under="ignore"):
-            _, nearest = cKDTree(result.mesh.vertices).query(positions * metres)
-            attributes[ATTRIBUTE] = builder.add_accessor((result.values[nearest] / per_unit).astype(np.float32))
+            attributes[ATTRIBUTE] = builder.add_accessor((values / per_unit).astype(np.float32))
         told.append({"place": list(key), "attribute": ATTRIBUTE, **result.record(Encoding(per_unit, unit=unit))})
     write_gltf(builder.file(), path)
     return write_record(path, {**(about or {}), **shared(told), "primitives": told})

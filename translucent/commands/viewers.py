@@ -160,8 +160,9 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
     One file, which fetches nothing: to turn around, with the material on a panel, the thickness in false colors, and a
     probe. It runs the passes of the renderer; what it leaves out is printed here and stands on the page.
     """
+    from translucent.files.paths import write_text_atomically
     from translucent.page.plans import plan_page, simplified, triangles
-    from translucent.page.write import check_output, check_page_size, poster_of, save_page
+    from translucent.page.write import check_output, check_page_size, page_html, poster_of
     from translucent.scene.stages import STAGED_TONE
 
     output, look = given.output, given.look
@@ -194,7 +195,9 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
         except RenderError as error:
             echo(f"warning: no poster: {error}", err=True)
     title = given.title or Path(model).stem
-    written = save_page(planned, output, title, pixels, given.samples, look.exposure, tone, picture)
+    text = page_html(planned, title, pixels, given.samples, look.exposure, tone, picture)
+    write_text_atomically(output, text)
+    written = len(text.encode())
     media = medium_lines(scene, planned.panel_distance)  # as the panel shows them
     if as_json:
         told = {

@@ -93,11 +93,7 @@ DEFAULT_IOR = 1.5
 _VOLUME_KEYS = {
     "thicknessFactor", "thicknessTexture", "attenuationDistance", "attenuationColor", "extensions", "extras",
 }  # fmt: skip
-_SUMMARIZED = (
-    "index", "name", "transmission", "ior", "thickness", "thickness_texture", "thickness_transform",
-    "attenuation_color", "attenuation_distance", "dispersion", "emissive", "iridescence", "iridescence_ior",
-    "iridescence_thickness", "clearcoat", "clearcoat_roughness",
-)  # fmt: skip
+_UNSUMMARIZED = ("scatter", "has_volume", "transmits", "warnings")
 
 SCATTER = "KHR_materials_scatter"
 VOLUME_SCATTER = "KHR_materials_volume_scatter"
@@ -265,7 +261,7 @@ class GltfMaterial:
         """Fields and medium as values that JSON can hold; None is an infinite distance."""
         medium, textured = self.medium(), self.has_thickness_texture
         return {
-            **{name: getattr(self, name) for name in _SUMMARIZED},
+            **{name: getattr(self, name) for name in self.__dataclass_fields__ if name not in _UNSUMMARIZED},
             "thickness_transform": vars(self.thickness_transform) if textured else None,
             "attenuation_color": list(self.attenuation_color),
             "attenuation_distance": self.attenuation_distance if math.isfinite(self.attenuation_distance) else None,

@@ -113,7 +113,8 @@ def write_page(
     size = check_page_size(size)
     planned = plan_page(scene, RenderRequest(method, interfaces=interfaces, scattering=scattering, shadows=shadows))
     picture = None if poster is None else check_poster(poster, "poster")
-    save_page(planned, file, name or title_of(scene), size, samples, exposure, tone, picture)
+    text = page_html(planned, name or title_of(scene), size, samples, exposure, tone, picture)
+    write_text_atomically(file, text)
     return planned
 
 
@@ -134,22 +135,6 @@ def check_page_size(size: tuple[int, int]) -> tuple[int, int]:
             asked, f"more than {MOST_SIDE} along a side", "give for example 1280x800: pages fit any window"
         )
     return width, height
-
-
-def save_page(
-    planned: PagePlan,
-    path: Path,
-    name: str,
-    size: tuple[int, int],
-    samples: int,
-    exposure: float,
-    tone: str,
-    poster: bytes | None,
-) -> int:
-    """Write a page; see `write_page`. Returns how many bytes it has."""
-    text = page_html(planned, name, size, samples, exposure, tone, poster)
-    write_text_atomically(path, text)
-    return len(text.encode("utf-8"))
 
 
 def page_html(
