@@ -18,12 +18,7 @@ from translucent.gpu.shaders import set_uniform
 from translucent.gpu.uniforms import object_rows, packed_objects
 from translucent.scene.scene import Scene
 
-_UNITS = {
-    name: unit
-    for unit, name in enumerate(
-        ("ray_origins", "ray_directions", "object_table", "hierarchy_nodes", "hierarchy_triangles")
-    )
-}
+_SAMPLERS = ("ray_origins", "ray_directions", "object_table", "hierarchy_nodes", "hierarchy_triangles")
 
 #: Rays in a row of the texture that holds them.
 _WIDTH = 1024
@@ -61,7 +56,7 @@ class RayProbe:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
-        self._variants = Variants(gl, "geometry/fullscreen.vert", "transport/rays.frag", **_UNITS)
+        self._variants = Variants(gl, "geometry/fullscreen.vert", "transport/rays.frag", *_SAMPLERS)
 
     def nearest(
         self,
@@ -101,8 +96,7 @@ class RayProbe:
         if "object_nodes" in program:
             set_uniform(program, "object_nodes", hierarchies.object_nodes)
             set_uniform(program, "objects_frame", frame)
-        for texture, unit in zip((*made, hierarchies.nodes, hierarchies.triangles), _UNITS.values(), strict=True):
-            texture.use(unit)
+        self._variants.bind(**dict(zip(_SAMPLERS, (*made, hierarchies.nodes, hierarchies.triangles), strict=True)))
         framebuffer.use()
         self._gl.enable_only(moderngl.NOTHING)
         self._variants.draw_fullscreen(program)

@@ -5,7 +5,7 @@
 #include <constants>
 #include "lib/optics.glsl"
 
-// The harmonics in a unit direction. Of a far lamp, times its irradiance, they are the coefficients of its light.
+// The harmonics in a unit direction. For a far light, times its irradiance, they are the coefficients of its light.
 float[9] real_harmonics(vec3 direction) {
     float x = direction.x, y = direction.y, z = direction.z;
     return float[9](HARMONIC_0, HARMONIC_1 * y, HARMONIC_1 * z, HARMONIC_1 * x, HARMONIC_2 * x * y, HARMONIC_2 * y * z,

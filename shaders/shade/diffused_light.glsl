@@ -32,10 +32,10 @@ vec3 subsurface_exitance(int object, vec3 point, float cosine, vec3 optical_dept
 // behind, blurred, and as much as is mirrored on its way out from the other side.
 vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
-    vec3 hazy = transmittance((1.0 - row.ahead) * optical_depth) - transmittance(optical_depth);
-    if (max(hazy.r, max(hazy.g, hazy.b)) <= 0.0) { return vec3(0.0); }
-    vec3 far = row.haze_far * environment_light(direction, HAZE_ROUGHNESS);
-    return hazy * (far + row.haze_near * environment_light(-direction, HAZE_ROUGHNESS));
+    vec3 in_scattered = transmittance((1.0 - row.ahead) * optical_depth) - transmittance(optical_depth);
+    if (max(in_scattered.r, max(in_scattered.g, in_scattered.b)) <= 0.0) { return vec3(0.0); }
+    vec3 far = row.in_scattered_far * environment_light(direction, IN_SCATTERED_ROUGHNESS);
+    return in_scattered * (far + row.in_scattered_near * environment_light(-direction, IN_SCATTERED_ROUGHNESS));
 }
 #else
 vec3 subsurface_exitance(int object, vec3 point, float cosine, vec3 optical_depth) { return vec3(0.0); }

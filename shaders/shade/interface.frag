@@ -47,10 +47,10 @@ void main() {
     float roughness = surface_roughness * texture(roughness_texture, texture_coordinate(ROUGHNESS_TEXTURE, surface_uv)).g;
     float transmission = surface_color.w * texture(transmission_texture, texture_coordinate(TRANSMISSION_TEXTURE, surface_uv)).r;
 #if !BACK
-    vec4 painted = vertex_color * texture(color_texture, texture_coordinate(COLOR_TEXTURE, surface_uv));
-    vec4 tint = vec4(surface_color.rgb * painted.rgb, unoccluded(surface_uv));
+    vec4 textured = vertex_color * texture(color_texture, texture_coordinate(COLOR_TEXTURE, surface_uv));
+    vec4 tint = vec4(surface_color.rgb * textured.rgb, unoccluded(surface_uv));
 #if HOLES
-    if (painted.a < hole_below) { discard; }
+    if (textured.a < hole_below) { discard; }
 #endif
 #endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture

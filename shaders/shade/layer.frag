@@ -1,5 +1,5 @@
 // A layer that covers a share of what is behind it, and shows what an opaque object would (Porter & Duff 1984, `over`);
-// or GLOW: light that the interface of a body adds where a ray first enters it. Painted object by object, far ones first.
+// or EMITS: light that the interface of a body adds where a ray first enters it. Painted object by object, far ones first.
 // What is behind the first body on a ray is kept apart; BODIES: there are some.
 
 #include <constants>
@@ -11,12 +11,12 @@
 #if OPAQUE
 #include "intervals/last_axial.glsl"
 #endif
-#if GLOW
+#if EMITS
 uniform sampler2D entered;  // w: axial depth of the interface where a ray first enters a body
 #elif BODIES
 uniform sampler2D fronts;   // axial depth where a ray first meets one
 #endif
-#if !GLOW
+#if !EMITS
 uniform float layer_opacity;
 #endif
 
@@ -46,7 +46,7 @@ void main() {
     // A scene that is flat has no length to count axial depths by.
     float touching = TOUCHING + sheet_tolerance * axial_depth_scale;
     in_front = behind = vec4(0.0);
-#if GLOW
+#if EMITS
     if (abs(axial_depth - texelFetch(entered, ivec2(gl_FragCoord.xy), 0).w) > touching) { discard; }
     in_front.rgb = min(surface.emitted, vec3(NOTHING));
 #else

@@ -21,11 +21,11 @@ const vec2 opaque_clearcoat = vec2(0.0);
 
 // Of a fragment; takes derivatives. vertex: color and opacity of the mesh there.
 OpaqueSurface opaque_surface_at(vec3 base, vec3 normal, vec3 position, vec2 uv, vec4 vertex) {
-    vec4 painted = vertex * texture(color_texture, texture_coordinate(COLOR_TEXTURE, uv));
+    vec4 textured = vertex * texture(color_texture, texture_coordinate(COLOR_TEXTURE, uv));
     vec4 rough = texture(roughness_texture, texture_coordinate(ROUGHNESS_TEXTURE, uv));
     vec3 emitted = opaque_emissive * texture(emissive_texture, texture_coordinate(EMISSIVE_TEXTURE, uv)).rgb;
     vec3 mapped = mapped_normal(normal, position, uv);
-    return OpaqueSurface(base * painted.rgb, opaque_parameters.x * rough.b, clamp(opaque_parameters.y * rough.g, 0.0, 1.0),
-        opaque_parameters.z, opaque_passed.rgb, opaque_passed_share, emitted, mapped, normal_variance(mapped), painted.a,
-        unoccluded(uv), painted.a < opaque_parameters.w, opaque_film, opaque_clearcoat);
+    return OpaqueSurface(base * textured.rgb, opaque_parameters.x * rough.b, clamp(opaque_parameters.y * rough.g, 0.0, 1.0),
+        opaque_parameters.z, opaque_passed.rgb, opaque_passed_share, emitted, mapped, normal_variance(mapped), textured.a,
+        unoccluded(uv), textured.a < opaque_parameters.w, opaque_film, opaque_clearcoat);
 }

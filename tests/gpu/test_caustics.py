@@ -181,7 +181,7 @@ def photons_in(renderer: tl.Renderer, one: tl.Scene, size: tuple[int, int], caus
     with gpu.context.current():
         job = gpu.prepare(plan, size)
         gpu.run(job)
-        data = job.targets.photons().read(components=4, dtype="f4")
+        data = job.targets["photons"].read(components=4, dtype="f4")
         job.release()
     return np.frombuffer(data, np.float32).reshape(*size[::-1], 4)[::-1, :, :3].astype(np.float64)
 
@@ -337,7 +337,7 @@ def test_a_frame_that_is_run_again_shows_the_same(renderer: tl.Renderer) -> None
         job = gpu.prepare(plan, (16, 12))
         for _ in range(2):
             gpu.run(job)
-            pictures.append(job.targets.opaque().read(components=4, attachment=1, dtype="f4"))
+            pictures.append(job.targets["opaque"].read(components=4, attachment=1, dtype="f4"))
         job.release()
     assert np.frombuffer(pictures[0], np.float32).max() > 0.0
     np.testing.assert_allclose(*(np.frombuffer(picture, np.float32) for picture in pictures), rtol=1e-4, atol=1e-6)

@@ -148,7 +148,7 @@ def test_the_processors_paint_the_same_layers() -> None:
     with tl.Renderer(backend="cpu") as renderer:
         frame = renderer.render(scene, SIZE)
     assert frame.radiance[MIDDLE] == pytest.approx(0.25 * RED + 0.75 * LEFT * (0.5 * BLUE + 0.5), abs=1e-6)
-    assert "what layers mirror: 'mesh', 'mesh' show diffuse light alone" in frame.plan.unmodelled
+    assert "what layers mirror: 'mesh' show diffuse light alone" in frame.plan.unmodelled
 
 
 # Vertex colors, holes, glow, occlusion

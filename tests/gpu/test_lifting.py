@@ -22,7 +22,7 @@ BALL, BOX = Sphere().tessellate(12), Box((-0.4, -0.3, -0.6), (0.5, 0.7, 0.2)).te
 CAMERA = tl.Camera.look_at((1.5, 1.2, 2.0), (0.0, 0.1, 0.0))
 WINE, RUBY = tl.Medium(absorption=(1.0, 2.0, 3.0)), tl.Medium(absorption=(0.1, 3.0, 2.0))
 GLASS = tl.Medium(absorption=(0.5, 0.1, 2.0), ior=1.5)
-MIST, GLOW = tl.Medium(scattering=(1.0, 1.0, 2.0)), tl.Medium(absorption=1.0, emission=(3.0, 2.0, 0.0))
+MIST, EMITS = tl.Medium(scattering=(1.0, 1.0, 2.0)), tl.Medium(absorption=1.0, emission=(3.0, 2.0, 0.0))
 LAMP = tl.PointLight((2.0, 3.0, 1.0), (5.0, 5.0, 5.0))
 
 
@@ -41,7 +41,7 @@ def values(name: str) -> dict[str, int]:
 SCENES: Mapping[str, tuple[tl.Scene, tl.SignedDepth | tl.DepthPeeling | None]] = {
     "sum": (tl.Scene([tl.Object(BALL, WINE), tl.Object(BOX, RUBY, moved(0.7))], CAMERA), tl.SignedDepth()),
     "lists": (tl.Scene([tl.Object(BALL, MIST), tl.Object(BOX, WINE)], CAMERA, [LAMP], overlap="union"), None),
-    "peeling": (tl.Scene([tl.Object(BALL, GLOW), tl.Object(BOX, WINE, moved(0.5))], CAMERA), tl.DepthPeeling()),
+    "peeling": (tl.Scene([tl.Object(BALL, EMITS), tl.Object(BOX, WINE, moved(0.5))], CAMERA), tl.DepthPeeling()),
     "interfaces": (tl.Scene([tl.Object(BALL, GLASS), tl.Object(BOX, color=(0.9, 0.5, 0.1))], CAMERA, [LAMP]), None),
 }
 

@@ -31,7 +31,7 @@ DEEP = tl.TracedInterfaces(depth=24, forks=4)
 
 GLASS = tl.Medium(absorption=(0.5, 0.1, 0.9), ior=1.5)
 RED = tl.Medium(absorption=(0.1, 0.8, 1.2), ior=1.33)
-GLOW = tl.Medium(absorption=(0.5, 0.1, 0.9), emission=(0.1, 0.2, 0.3), ior=1.5)
+EMITS = tl.Medium(absorption=(0.5, 0.1, 0.9), emission=(0.1, 0.2, 0.3), ior=1.5)
 TINT = tl.Medium(absorption=(0.5, 0.9, 0.2))
 FILM = tl.Medium(absorption=(300.0, 50.0, 100.0))
 GLOWING_FILM = dataclasses.replace(FILM, emission=(20.0, 10.0, 5.0))
@@ -196,17 +196,17 @@ def test_several_bodies_are_those_of_the_reference(thorough: tl.Renderer, name: 
 
 
 FROM_THE_EYE: dict[str, Callable[[], tl.Scene]] = {
-    "inside one": lambda: seen(body(BALL, GLOW), camera=INSIDE),
-    "inside two": lambda: seen(body(BALL, GLOW), body(CORE, RED), camera=INSIDE),
-    "inside two, the inner one first": lambda: seen(body(CORE, RED), body(BALL, GLOW), camera=INSIDE),
-    "inside two, the outer one highest": lambda: seen(body(CORE, RED), body(BALL, GLOW, priority=1), camera=INSIDE),
-    "inside two that overlap": lambda: seen(body(BALL, GLOW), body(BALL, RED, 0.6, 0.2, 0.3), camera=INSIDE),
+    "inside one": lambda: seen(body(BALL, EMITS), camera=INSIDE),
+    "inside two": lambda: seen(body(BALL, EMITS), body(CORE, RED), camera=INSIDE),
+    "inside two, the inner one first": lambda: seen(body(CORE, RED), body(BALL, EMITS), camera=INSIDE),
+    "inside two, the outer one highest": lambda: seen(body(CORE, RED), body(BALL, EMITS, priority=1), camera=INSIDE),
+    "inside two that overlap": lambda: seen(body(BALL, EMITS), body(BALL, RED, 0.6, 0.2, 0.3), camera=INSIDE),
     "inside, before another": lambda: seen(
-        body(BALL, GLOW), body(BALL, RED, 0, 0, -3, surface=tl.Surface(color=(0.9, 0.2, 0.2))), camera=INSIDE
+        body(BALL, EMITS), body(BALL, RED, 0, 0, -3, surface=tl.Surface(color=(0.9, 0.2, 0.2))), camera=INSIDE
     ),
-    "tinted air around": lambda: seen(body(CORE, GLOW), body(BALL, TINT)),
-    "tinted air before": lambda: seen(body(BALL, GLOW), body(CORE, TINT, 0.7, 0.7, 2.0)),
-    "tinted air inside": lambda: seen(body(BALL, GLOW), body(CORE, TINT)),
+    "tinted air around": lambda: seen(body(CORE, EMITS), body(BALL, TINT)),
+    "tinted air before": lambda: seen(body(BALL, EMITS), body(CORE, TINT, 0.7, 0.7, 2.0)),
+    "tinted air inside": lambda: seen(body(BALL, EMITS), body(CORE, TINT)),
     "a film before": lambda: seen(body(BALL), body(PANE, FILM, 0, 0, 1.5, by=0.3, sheet_thickness=1e-3)),
     "a film inside": lambda: seen(body(BALL), body(PANE, GLOWING_FILM, 0, 0, 0.1, by=0.3, sheet_thickness=1e-3)),
     "a film behind": lambda: seen(body(BALL), body(PANE, FILM, 0, 0, -1.5, by=0.2, sheet_thickness=1e-3)),

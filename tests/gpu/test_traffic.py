@@ -106,11 +106,11 @@ def test_formats_are_those_of_the_textures() -> None:
         targets = Targets(renderer.gpu.context.gl, SIZE)
         for name in ("opaque", "entered", "result", "paths", "fronts"):
             before = targets.bytes_per_pixel()
-            found = getattr(targets, name)()
+            found = targets[name]
             assert targets.bytes_per_pixel() - before == FORMATS[name].bytes_of()
             assert (found.depth_attachment is not None) == FORMATS[name].with_depth
         peeled = targets.peel_state(0)
-        assert len(peeled.color_attachments) == len(FORMATS["peel_state"].attachment_bytes)
+        assert len(peeled.color_attachments) == len(FORMATS["peel_state"].components) + FORMATS["peel_state"].windings
         targets.release()
 
 

@@ -53,7 +53,7 @@ def opaque_picture(renderer: tl.Renderer, scene: tl.Scene, method: Any = None) -
     with renderer.gpu.context.current():
         job = renderer.gpu.prepare(renderer.plan(scene, method), SIZE)
         renderer.gpu.run(job)
-        target = job.targets.opaque()
+        target = job.targets["opaque"]
         axial_depth, radiance = (
             np.frombuffer(target.read(components=count, attachment=i, dtype="f4"), np.float32)
             .reshape(*SIZE[::-1], count)[::-1]
@@ -141,7 +141,7 @@ def test_depth_of_textures_becomes_metres(renderer: tl.Renderer, far: float, ort
         backdrop = TextureBackdrop(color, z, near, far, orthographic, gamma)
         job = renderer.gpu.prepare(renderer.plan(scene, over_backdrop=True), SIZE, backdrop)
         renderer.gpu.run(job)
-        target = job.targets.opaque()
+        target = job.targets["opaque"]
         axial_depth = np.frombuffer(target.read(components=1, attachment=0, dtype="f4"), np.float32).reshape(SIZE[::-1])
         radiance = np.frombuffer(target.read(components=4, attachment=1, dtype="f4"), np.float32)
         job.release()

@@ -125,7 +125,7 @@ def _ahead(renderer: tl.Renderer, scene: tl.Scene) -> Array:
     with renderer.gpu.context.current():
         job = renderer.gpu.prepare(renderer.plan(scene), SIZE)
         renderer.gpu.run(job)
-        texels = job.targets.opaque().read(components=1, attachment=0, dtype="f4")
+        texels = job.targets["opaque"].read(components=1, attachment=0, dtype="f4")
         axial_depth = np.frombuffer(texels, np.float32).reshape(SIZE[::-1])[::-1].astype(np.float64)
         job.release()
     nothing = axial_depth >= float(CONSTANTS["NOTHING"])

@@ -329,7 +329,7 @@ class GroundCaustics(Experiment[LightScene]):
             try:
                 for leave_out in ((PassName.CAUSTICS,), ()):
                     gpu.run(job, leave_out=leave_out)
-                    data = np.frombuffer(job.targets.opaque().read(components=4, attachment=1, dtype="f4"), np.float32)
+                    data = np.frombuffer(job.targets["opaque"].read(components=4, attachment=1, dtype="f4"), np.float32)
                     radiance.append(data.reshape(height, width, 4)[::-1, :, :3].astype(np.float64))
                 frame = gpu.read(job)
             finally:

@@ -87,10 +87,10 @@ def _measured(albedo: float, depths: Array, anisotropy: float, ior: float) -> li
     found = []
     for i, depth in enumerate(depths.tolist()):
         passing = slabs.unscattered_shares(depth, ior)
-        hazy = _ahead(albedo, depth, anisotropy, ior)
+        in_scattered = _ahead(albedo, depth, anisotropy, ior)
         by_diffusion, by_layer = (
             (float(model[0, i]) + passing[0] + more[0], float(model[1, i]) + passing[1] + more[1])
-            for model, more in ((diffused, hazy), (layer, (0.0, 0.0)))
+            for model, more in ((diffused, in_scattered), (layer, (0.0, 0.0)))
         )
         body = Object(_mesh(), Medium((1.0 - albedo) * depth, albedo * depth, anisotropy=anisotropy, ior=ior))
         scene = Scene([body], Camera.look_at((0.0, 5.0, 5.0), (0.0, 0.0, 0.0)))

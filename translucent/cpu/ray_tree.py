@@ -33,7 +33,7 @@ from translucent.cpu.threads import end_if_stopped
 from translucent.diffusion.field import DiffusionField
 from translucent.diffusion.interfaces import InterfaceTable
 from translucent.formulas import optics
-from translucent.formulas.diffusion import HAZE_ROUGHNESS
+from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS
 from translucent.formulas.interface import reflected_direction
 from translucent.geometry.ray_caster import dot, unit
 from translucent.reference.compositing import composite
@@ -372,16 +372,22 @@ class _Growth:
         ahead, far, near = np.moveaxis(self.tree.diffused.haze(self.media.effective(branches.interior)), 1, 0)
         with np.errstate(under="ignore"):
             self._add(branches, branches.diffused * (1.0 - passed ** (1.0 - ahead)))
-        hazy = np.flatnonzero(ahead.any(axis=1))
-        if hazy.size:
-            own, ahead, far, near = branches.where(hazy), ahead[hazy], far[hazy], near[hazy]
+        in_scattered = np.flatnonzero(ahead.any(axis=1))
+        if in_scattered.size:
+            own, ahead, far, near = (
+                branches.where(in_scattered),
+                ahead[in_scattered],
+                far[in_scattered],
+                near[in_scattered],
+            )
             # Of the optical depth, which varies as the density does, the part by such events does not count.
             with np.errstate(under="ignore"):
-                through = passed[hazy] ** (1.0 - ahead)
+                through = passed[in_scattered] ** (1.0 - ahead)
             behind, before = (
-                self.tree.surroundings.blurred(own, sign * own.directions, HAZE_ROUGHNESS) for sign in (1.0, -1.0)
+                self.tree.surroundings.blurred(own, sign * own.directions, IN_SCATTERED_ROUGHNESS)
+                for sign in (1.0, -1.0)
             )
-            self._add(own, (through - passed[hazy]) * (far * behind + near * before))
+            self._add(own, (through - passed[in_scattered]) * (far * behind + near * before))
 
     def _at_surfaces(self, branches: Branches) -> Branches:
         """Cross the surfaces that branches, with their origins there, have come to; what continues from there."""

@@ -164,8 +164,8 @@ class Surroundings:
     def blurred(self, branches: Branches, directions: Array, roughness: float | Array) -> Array:
         """(n, 3): light of the environment in directions (n, 3), as mirrors of a roughness (n,) would blur it."""
         blur = np.broadcast_to(roughness, len(branches)) ** 4
-        hazy = replace(branches, directions=directions, blur=blur, footprint=branches.footprint[:, :0])
-        return self._light(self.environment, hazy)
+        in_scattered = replace(branches, directions=directions, blur=blur, footprint=branches.footprint[:, :0])
+        return self._light(self.environment, in_scattered)
 
     def _light(self, environment: Environment, branches: Branches) -> Array:
         blur = branches.blur

@@ -16,7 +16,7 @@ from translucent.arrays import Array
 
 #: Roughness of the mirror that blurs the environment as media blur what they scatter ahead: half of the directions are
 #: within 40 degrees, as after one to three events with g = .8.
-HAZE_ROUGHNESS = 0.8
+IN_SCATTERED_ROUGHNESS = 0.8
 
 #: Share of the mirror of diffuse light at which interfaces mirror it, as it is between rays and diffuse light: for an
 #: index of 1.5 and g = 0.9 it is 0.28 where media are thin and 0.6 where hardly any light gets through.

@@ -14,7 +14,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, interior_at_eye
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
-from translucent.gpu.targets import read_floats
+from translucent.gpu.targets import add_up, read_floats
 from translucent.planning.passes import PassName
 
 Floats = npt.NDArray[np.float32]
@@ -44,20 +44,19 @@ class AdaptiveSampling:
 
     def __init__(self, gl: moderngl.Context) -> None:
         vertex = "geometry/fullscreen.vert"
-        units = {"bent_light": 0, "bent_spread": 1, "average_light": 2}
         self._gl = gl
-        self._unsettled = Variants(gl, vertex, "transport/unsettled.frag", **units)
-        self._part = Variants(gl, vertex, "shade/part_of_mean.frag", sampled=0)
+        self._unsettled = Variants(gl, vertex, "transport/unsettled.frag", "bent_light", "bent_spread", "average_light")
+        self._part = Variants(gl, vertex, "shade/part_of_mean.frag", "sampled")
         self._left = gl.query(samples=True)
 
     def run(self, job: FrameJob, samples: int, run_passes: Run) -> None:
         """Sum up the samples of a job; `run_passes` runs its passes, but for some."""
         clock = _Clock(job, samples)
-        job.targets.average().clear()
-        job.targets.bent().clear()
+        job.targets["average"].clear()
+        job.targets["bent"].clear()
         job.bent_apart = True
         if job.features.has_opaque:
-            job.targets.opaque_mean().clear()
+            job.targets["opaque_mean"].clear()
         for number, shift in enumerate(sample_shifts(samples).tolist()):
             job.sample, job.samples = number, samples
             job.place(tuple(shift))
@@ -82,22 +81,22 @@ class AdaptiveSampling:
         job.bending = False
 
     def _add_opaque(self, job: FrameJob) -> None:
-        job.targets.opaque().color_attachments[1].use(0)
+        self._part.bind(sampled=job.targets["opaque"].color_attachments[1])
         program = self._part.program()
         set_uniform(program, "part", 1.0 / job.samples)
-        job.targets.opaque_mean().use()
-        self._add_up()
+        job.targets["opaque_mean"].use()
+        add_up(self._gl)
         self._part.draw_fullscreen(program)
 
     def _find_unsettled(self, job: FrameJob, samples: int, taken: int) -> int:
         """Mark the pixels that need more samples than these; returns how many there are."""
-        mask = job.targets.unsettled()
+        mask = job.targets["unsettled"]
         mask.clear()
         if not job.covered:
             return 0
-        textures = *job.targets.bent().color_attachments, job.targets.average().color_attachments[0]
-        for unit, texture in enumerate(textures):
-            texture.use(unit)
+        light, spread = job.targets["bent"].color_attachments
+        average = job.targets["average"].color_attachments[0]
+        self._unsettled.bind(bent_light=light, bent_spread=spread, average_light=average)
         program = self._unsettled.program()
         finer = min(16.0 / samples, 1.0) ** 0.5
         values = {"samples": samples, "contrast": CONTRAST * finer, "error": ERROR * finer, "first": taken == 1}
@@ -108,11 +107,6 @@ class AdaptiveSampling:
         with self._left:
             self._unsettled.draw_fullscreen(program)
         return int(self._left.samples)
-
-    def _add_up(self) -> None:
-        self._gl.enable_only(moderngl.BLEND)
-        self._gl.blend_equation = moderngl.FUNC_ADD
-        self._gl.blend_func = moderngl.ONE, moderngl.ONE
 
 
 def is_adaptive(job: FrameJob, samples: int) -> bool:
@@ -128,11 +122,11 @@ def is_adaptive(job: FrameJob, samples: int) -> bool:
 
 def read_averages(job: FrameJob, samples: int) -> tuple[Floats, Floats, Floats]:
     """Mean radiance (h, w, 3) and transmittance (h, w, 3) over samples, and the share (h, w) that can be trusted."""
-    averages = job.targets.average()
+    averages = job.targets["average"]
     light, spread = (read_floats(averages, i, 4) for i in range(2))
     with np.errstate(under="ignore"):
         if job.bent_apart:
-            bent, trusted = read_floats(job.targets.bent(), 0, 4), read_floats(job.targets.bent(), 1, 4)[..., 3]
+            bent, trusted = read_floats(job.targets["bent"], 0, 4), read_floats(job.targets["bent"], 1, 4)[..., 3]
             standing_for = (np.float32(samples) - light[..., 3]) / np.maximum(bent[..., 3], np.float32(1.0))
             light[..., :3] += standing_for[..., None] * bent[..., :3]
             spread[..., 3] += standing_for * trusted
@@ -142,7 +136,7 @@ def read_averages(job: FrameJob, samples: int) -> tuple[Floats, Floats, Floats]:
 
 def traced_samples(job: FrameJob) -> float:
     """Mean number of samples for which rays were traced, over the pixels in which they were."""
-    taken = read_floats(job.targets.bent(), 0, 4)[..., 3]
+    taken = read_floats(job.targets["bent"], 0, 4)[..., 3]
     return float(taken[taken > 0].mean(dtype=np.float64)) if taken.any() else 0.0
 
 
@@ -163,7 +157,7 @@ def _left_out(job: FrameJob) -> tuple[PassName, ...]:
 
 
 class _Clock:
-    """Clock that tells the share of the work that is done, by how long the first samples have taken."""
+    """Clock that reports the fraction of the work that is done, from how long the first samples took."""
 
     def __init__(self, job: FrameJob, samples: int) -> None:
         self._job, self._samples = job, samples
@@ -172,13 +166,13 @@ class _Clock:
         self._most = self.left = 0
 
     def outside(self) -> None:
-        """Tell of a sample whose rays are not traced yet: as if tracing took as long."""
+        """Report a sample whose rays are not traced yet, as if tracing took as long."""
         self._job.gl.finish()
         self._job.report(0.5 * (self._job.sample + 1) / self._samples)
         self._outside = time.perf_counter() - self._begun
 
     def bent(self, number: int) -> None:
-        """Tell of a sample whose rays have been traced."""
+        """Report a sample whose rays have been traced."""
         self._job.gl.finish()
         spent = time.perf_counter() - self._begun
         if not number:

@@ -6,7 +6,7 @@ from typing import get_args
 
 from translucent.formulas.brdf_table import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
-from translucent.formulas.diffusion import HAZE_ROUGHNESS
+from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS
 from translucent.formulas.footprint import ALPHA_OF_DEVIATION, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
 from translucent.formulas.interface import CLEARCOAT_IOR
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
@@ -86,7 +86,7 @@ CONSTANTS: dict[str, str] = {
     "STEEPEST_SHADOW": "64.0",  # texels along a light's rays that a surface may rise from one texel to the next
     **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
     "LEAST_SEEN": repr(LEAST_SEEN),
-    "HAZE_ROUGHNESS": repr(HAZE_ROUGHNESS),
+    "IN_SCATTERED_ROUGHNESS": repr(IN_SCATTERED_ROUGHNESS),
     "DENSITY_GRID": "1.0",
     "DENSITY_LINEAR": "2.0",
     "DENSITY_EXPONENTIAL": "3.0",

@@ -1,5 +1,8 @@
 """OpenGL contexts: the one place that opens them, and records what it tried.
 
+Without a window system that is Mesa's off-screen library, through ctypes: the system's libOSMesa, or the one in the
+Python package that the extra ``osmesa`` installs.
+
 ``python -m translucent.gpu.context --probe`` prints as JSON which backend works here.
 """
 
@@ -140,13 +143,13 @@ _QUICK = "GALLIVM_PERF", "nopt"
 
 
 @contextmanager
-def quick_compiles(wanted: bool) -> Iterator[None]:
+def quick_compiles(quick: bool) -> Iterator[None]:
     """Have an OpenGL that is opened meanwhile compile in half the time: the same picture, drawn a fifth slower.
 
     Mesa's software rasterizer does, where it is the first of its process, and the variable is not set otherwise.
     """
     name, value = _QUICK
-    if not wanted or name in os.environ:
+    if not quick or name in os.environ:
         yield
         return
     os.environ[name] = value
@@ -221,7 +224,7 @@ MODERNGL = version("moderngl")
 REQUIRED = 330
 
 #: Bytes that Mesa's software rasterizer takes with small frames, as measured: LLVM alone is half of it. Where it gets
-#: no more it ends the process, or waits forever for threads that did not start.
+#: no more it ends the process, or blocks forever on threads that did not start.
 _TAKEN = 1200 << 20
 
 
@@ -315,7 +318,7 @@ class GpuContext:
         return _Current(self)
 
     def forget(self) -> None:
-        """Have this thread make the context current again when it is asked to, whatever was interrupted."""
+        """Have this thread make the context current again when it is needed, whatever was interrupted."""
         _entered.stack[:] = [context for context in _entered.stack if context is not self]
 
     def drain(self) -> None:

@@ -78,8 +78,8 @@ class DiffusedLight:
                 "exit_share": field.exit_share,
                 "mean_cosine": field.mean_cosine,
                 "ahead": field.ahead,
-                "haze_far": field.haze[0].astype(np.float32),
-                "haze_near": field.haze[1].astype(np.float32),
+                "in_scattered_far": field.haze[0].astype(np.float32),
+                "in_scattered_near": field.haze[1].astype(np.float32),
             }
             for number, field in self.fields.surfaces.items()
         }
@@ -107,7 +107,7 @@ class DiffusionCache:
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         self.warm_starts = False
-        #: One for each size of grids: what is solved on a small one waits for no large one.
+        #: One for each size of grids: a small one is solved without waiting for a large one.
         self._solvers: OrderedDict[Diffusion, FieldCache] = OrderedDict()
         self._lock = Lock()
         self._last: DiffusedLight | None = None

@@ -94,7 +94,7 @@ class FrameFeatures:
 
     @property
     def stopping_slots(self) -> int:
-        """A bit for each slot that stops the straight light of lamps into media, where photons carry it on."""
+        """A bit for each slot that stops the straight light of the lights into media, where photons carry it on."""
         stops = self.plan.opaque_to_shadows if self.scatters_again else frozenset()
         return sum(1 << i for i, slot in enumerate(self.slots) if stops.intersection(slot.objects))
 
@@ -137,7 +137,7 @@ class FrameFeatures:
 
     @property
     def dims_interfaces(self) -> bool:
-        """True if rays find what bodies keep of the lights on interfaces, their highlights and paint."""
+        """True if rays find what bodies keep of the lights on interfaces, in highlights and diffuse reflection."""
         return (self.traced or self.path_traced) and dims_interfaces(self.scene)
 
     @property

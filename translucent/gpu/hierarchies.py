@@ -1,6 +1,8 @@
 """Hierarchies on the GPU: those of the meshes of a scene, and one of its objects, as textures that rays walk through.
 
-Meshes come as `gpu.packed_meshes` has them.
+One 16-byte texel is a node: six bounds of 16 bits, and a link. Triangles lie in the order of the leaves, three texels
+each, with the corners' smooth normals as 2 x 16 bits on an octahedron (Cigolle et al. 2014). Packing needs no OpenGL:
+any process can do it.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ Words = npt.NDArray[np.uint32]
 #: Steps of the grid on which bounds lie, between the ends of a hierarchy.
 STEPS = 65535
 
-#: Bits of a leaf's link that hold its first triangle; three others hold how many follow it, the highest tells a leaf.
+#: Bits of a leaf's link that hold its first triangle; three others hold how many follow it, the highest marks a leaf.
 FIRST_BITS = 28
 
 #: Triangles that are packed at a time.
@@ -223,9 +225,9 @@ class SceneHierarchies:
         frame : (4,) floats
             Center and scale of the coordinates of the hierarchy of objects; positions count from `center`.
         """
-        asked = weakref.ref(scene), center.tobytes()
-        if self._placed is None or self._placed[0] != asked:  # else as for the last sample of the frame
-            self._placed = asked, *self._place(scene, center)
+        key = weakref.ref(scene), center.tobytes()
+        if self._placed is None or self._placed[0] != key:  # else as for the last sample of the frame
+            self._placed = key, *self._place(scene, center)
         return self._placed[1:]
 
     def _place(self, scene: Scene, center: Array) -> tuple[tuple[Fields, ...], tuple[float, float, float, float]]:

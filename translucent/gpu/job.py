@@ -38,7 +38,7 @@ from translucent.gpu.placement import (
     part_of,
 )
 from translucent.gpu.resources import Resources
-from translucent.gpu.targets import Targets
+from translucent.gpu.targets import Targets, add_up
 from translucent.gpu.uniforms import (
     BodyRoles,
     Fields,
@@ -353,8 +353,8 @@ class FrameJob(CameraView):
         """Framebuffer whose first attachment is the frame's radiance."""
         apart = self.features.has_surfaces or self.features.path_traced
         if apart:
-            return self.targets.surfaced()
-        return self.compact_result if self.compact else self.targets.result()
+            return self.targets["surfaced"]
+        return self.compact_result if self.compact else self.targets["result"]
 
     @property
     def compact_result(self) -> moderngl.Framebuffer:
@@ -399,19 +399,17 @@ class FrameJob(CameraView):
     def _add_to(self, framebuffer: moderngl.Framebuffer) -> None:
         # No depth test and no culling: all faces count, and order cannot matter to a sum.
         framebuffer.use()
-        self.gl.enable_only(moderngl.BLEND)
-        self.gl.blend_equation = moderngl.FUNC_ADD
-        self.gl.blend_func = moderngl.ONE, moderngl.ONE
+        add_up(self.gl)
 
     def clear_layers(self) -> None:
         """Set the counts of layers to 0, as they stay beyond `covered`, where nothing else of `ordered` is read."""
-        self.targets.ordered()
+        self.targets["ordered"]
         self.targets.view("ordered", 2).clear()
 
     def bind_opaque(self, unit: int) -> None:
         """Bind the axial depths where rays end for the shader that reads texture `unit`, if there are any."""
         if self.features.has_opaque:
-            self.targets.opaque().color_attachments[0].use(unit)
+            self.targets["opaque"].color_attachments[0].use(unit)
 
     def bind_grids(self, unit: int, light_unit: int) -> None:
         """Bind density grids, and grids of light scattered before, for the shader that reads these textures, if any."""

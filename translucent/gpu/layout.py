@@ -237,7 +237,7 @@ MEDIA = UniformBlock(
         ("slot_scattering", "f4", (MAX_SLOTS, 4)),  # w: axial depth from which on its surface may be open
         ("slot_phase", "f4", (MAX_SLOTS, 4)),  # parameters of the phase function
         ("media_length", "f4", ()),  # metres along the forward axis from axial depth 0 to 1
-        ("slot_bits", "i4", ()),  # bits that tell slots apart
+        ("slot_bits", "i4", ()),  # bits that a slot's number takes
     ),
 )
 
@@ -411,8 +411,8 @@ OBJECT_ROW = PackedTable(
         ("exit_share", "f4", ()),
         ("mean_cosine", "f4", ()),
         ("ahead", "f4", (3,)),  # share of its extinction by light that is scattered ahead
-        ("haze_far", "f4", (3,)),  # share of that light which leaves where a ray does,
-        ("haze_near", "f4", (3,)),  # and on the other side
+        ("in_scattered_far", "f4", (3,)),  # share of that light which leaves where a ray does,
+        ("in_scattered_near", "f4", (3,)),  # and on the other side
     ),
 )
 

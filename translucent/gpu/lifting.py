@@ -1,8 +1,13 @@
 """A shader as one text for another engine: switches decided, constants and includes written out, nothing unused.
 
-The parts of a text are its top-level declarations, told apart by braces and semicolons. What is reached from ``main``,
+The parts of a text are its top-level declarations, found by braces and semicolons. What is reached from ``main``,
 or in a library from the functions of the file itself, stays, and with it whatever shares a name with it: a name that is
 used for two things keeps both, so nothing that is needed can get lost.
+
+For Vulkan, and the translators that read its GLSL, loose uniforms are in a block, textures apart from samplers, and
+everything has its place in one descriptor set: uniform blocks at their binding points, then loose uniforms, textures
+and samplers, which each stage has for itself. Matrices are stored column by column, as engines do. Inputs and outputs
+of stages have locations by their names, so that stages that were written out apart fit together.
 """
 
 from __future__ import annotations
@@ -75,11 +80,13 @@ def head_of(name: str, code: str, dialect: Dialect) -> Head:
     """
     stores = _STORAGE.search(code) is not None
     precise = re.search(r"\bprecise\b", code) is not None
-    told = f"// translucent: shaders/{name}"
+    origin = f"// translucent: shaders/{name}"
     if dialect == "glsl":
         version = WITH_STORAGE if stores else PLAIN
-        asked = ["#extension GL_ARB_gpu_shader5 : enable // for precise; leave both out elsewhere"] if precise else []
-        return Head(version, (f"#version {version} core", told, *asked))
+        extensions = (
+            ["#extension GL_ARB_gpu_shader5 : enable // for precise; leave both out elsewhere"] if precise else []
+        )
+        return Head(version, (f"#version {version} core", origin, *extensions))
     if stores:
         raise InputError(
             f"shader {name!r} for {'WebGL2' if dialect == 'webgl2' else 'other languages'}",
@@ -87,13 +94,13 @@ def head_of(name: str, code: str, dialect: Dialect) -> Head:
             "use the shaders of a method that does not: signed_depth for sums, peel and peel_fold for ordered segments",
         )
     if dialect == "vulkan":
-        asked = ["#extension GL_EXT_samplerless_texture_functions : require"] if "texelFetch" in code else []
-        return Head(VULKAN, (f"#version {VULKAN} core", told, *asked))
+        extensions = ["#extension GL_EXT_samplerless_texture_functions : require"] if "texelFetch" in code else []
+        return Head(VULKAN, (f"#version {VULKAN} core", origin, *extensions))
     # Fragment shaders have no precision by default, and most samplers a low one in both stages.
     samplers = sorted(set(_SAMPLER.findall(code)))
     highp = [f"precision highp {kind};" for kind in ("float", "int", *samplers)]
-    asked = ["#define precise // not in GLSL ES: a driver may fuse products and sums"] if precise else []
-    return Head(ES, (f"#version {ES} es", told, *highp, *asked))
+    extensions = ["#define precise // not in GLSL ES: a driver may fuse products and sums"] if precise else []
+    return Head(ES, (f"#version {ES} es", origin, *highp, *extensions))
 
 
 #: Outputs of the vertex shaders of bodies, of the pass over pixels, and of pictures in windows, each by location.
@@ -147,7 +154,7 @@ def in_vulkan(name: str, texts: Iterable[str], code: str) -> Iterator[str]:
     Parameters
     ----------
     name : str
-        File under ``shaders/``; its end tells the stage, and what is no stage is taken for fragments.
+        File under ``shaders/``; its suffix names the stage, and what is no stage is taken for fragments.
     texts : iterable of str
         Parts, with comments.
     code : str
@@ -360,10 +367,10 @@ def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Itera
             if word == "elif":
                 live.pop()
             taken = done.pop() if word == "elif" else False
-            asked = live[-1] and not taken
-            absent = {key for key in _NAME.findall(rest) if key not in defines} if asked else set()
+            reached = live[-1] and not taken
+            absent = {key for key in _NAME.findall(rest) if key not in defines} if reached else set()
             missing |= absent
-            holds = asked and not absent and _value(rest, defines)
+            holds = reached and not absent and _value(rest, defines)
             live.append(live[-1] and holds)
             done.append(taken or holds)
         elif word == "else":
@@ -467,7 +474,7 @@ def _faces(part: _Part) -> bool:
 
 def _constants(used: set[str]) -> list[str]:
     """Constants that are used, directly or by other constants, in the order in which they are written."""
-    wanted = {key for key in CONSTANTS if key in used}
-    while more := {key for one in wanted for key in _NAME.findall(CONSTANTS[one]) if key in CONSTANTS} - wanted:
-        wanted |= more
-    return [key for key in CONSTANTS if key in wanted]
+    needed = {key for key in CONSTANTS if key in used}
+    while more := {key for one in needed for key in _NAME.findall(CONSTANTS[one]) if key in CONSTANTS} - needed:
+        needed |= more
+    return [key for key in CONSTANTS if key in needed]

@@ -1,4 +1,8 @@
-"""Cameras that look from the lights of a scene, at its media or at all that throws shadows."""
+"""Cameras that look from the lights of a scene, and keys by which views from lights are kept while these see the same.
+
+Lists of crossings (`LightViewsPass`) and maps of shadows (`ShadowMapsPass`) have views of their own: lists fit the
+media, where their texels count, and maps all that throws shadows, large as it may be.
+"""
 
 from __future__ import annotations
 
@@ -114,7 +118,7 @@ def light_key(light: Light) -> tuple[object, ...]:
 def objects_key(scene: Scene) -> tuple[object, ...]:
     """Key of where the objects of a scene are, equal for scenes in which lights meet the same; keeps nothing alive.
 
-    It does not tell media apart.
+    Media do not count.
     """
     objects = tuple(
         (

@@ -77,7 +77,7 @@ class PassTimer:
         return result.value
 
     def _number(self, query: moderngl.Query) -> int:
-        """Number of a query, which moderngl keeps to itself, and OpenGL tells of the one that runs."""
+        """Number of a query, which moderngl keeps to itself, and OpenGL knows of the one that runs."""
         number = ctypes.c_int()
         query.mglo.begin()
         self._get_query(_TIME_ELAPSED, _CURRENT_QUERY, ctypes.byref(number))
@@ -138,14 +138,14 @@ class FrameTraffic:
         }
 
     def __str__(self) -> str:
-        told = [step for step in self.passes if step.pixel is not None]
+        counted = [step for step in self.passes if step.pixel is not None]
         rest = [step.name.value for step in self.passes if step.pixel is None]
         lines = ["bytes in targets at most, of one sample:"]
-        for step in told:
+        for step in counted:
             assert step.pixel is not None
             face = f" and {_words(*step.face)} for each face over it" if any(step.face) else ""
             lines.append(f"  {step.name}: {_words(*step.pixel)} per pixel{face}")
-        read, written = (sum(step.pixel[i] for step in told if step.pixel is not None) for i in range(2))
+        read, written = (sum(step.pixel[i] for step in counted if step.pixel is not None) for i in range(2))
         lines.append(f"  together: {_words(read, written)} per pixel, and {self.read_back} read back")
         if rest:
             lines.append(f"  not counted, as it goes with what a ray meets: {', '.join(rest)}")

@@ -167,7 +167,7 @@ def _expected_count(body: Object, camera: Camera) -> tuple[float, float]:
     number = round(body.winding_number(camera.eye), 6)
     local = np.linalg.solve(body.matrix[:3, :3], camera.eye - body.matrix[:3, 3])
     if body.mesh.diagnosis.solid and body.mesh.is_near(local, NEAR_SURFACE * body.mesh.diagonal):
-        # On the surface, and where float32 cannot tell, a ray may start on either side of it.
+        # On the surface, and where float32 cannot decide, a ray may start on either side of it.
         return max(float(np.ceil(number)) - 1.0, 0.0), float(np.floor(number)) + 1.0
     return float(round(number)), float(round(number))
 

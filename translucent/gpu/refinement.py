@@ -60,7 +60,7 @@ class PhotonLight:
             stack.callback(self._job.release)
             stack.callback(lambda: gl.detect_framebuffer(0).use())  # a released framebuffer must not be the bound one
             self._pass.draw_depth(self._job, objects)
-            self._pass.paint(self._job, objects)
+            self._pass.draw_base(self._job, objects)
             self._tracer = self._pass.begin(stack, self._job)
             self._stack = stack.pop_all()
 

@@ -37,9 +37,10 @@ from translucent.gpu.pass_costs import PassTimer
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.caustics import CausticsPass
 from translucent.gpu.passes.path_trace import PathTracePass, PathTracer
+from translucent.gpu.passes.variants import Variants
 from translucent.gpu.placement import COVERAGE_FLOOR
 from translucent.gpu.resources import Resources
-from translucent.gpu.shaders import before_drawing, before_making, build_program, set_uniform
+from translucent.gpu.shaders import before_drawing, before_making, set_uniform
 from translucent.gpu.shadow_atlas import ShadowAtlas
 from translucent.gpu.targets import SHADER_STORAGE, Targets, read_floats
 from translucent.gpu.uniforms import bounded_extinction
@@ -52,21 +53,16 @@ class PresentPass:
     """Exposure, tone curve and sRGB encoding of the frame's radiance, into any framebuffer of the same size."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._gl = gl
-        self._curves: dict[str, tuple[moderngl.Program, moderngl.VertexArray]] = {}
+        self._curves = Variants(gl, "geometry/fullscreen.vert", "present/present.frag", "picture")
 
     def run(self, job: FrameJob, framebuffer: moderngl.Framebuffer, stops: float, tone: str) -> None:
         """Draw the radiance, `stops` brighter, through the curve of that name."""
-        if tone not in self._curves:
-            defines = {"TONE": TONES.index(tone)}
-            program = build_program(self._gl, "geometry/fullscreen.vert", "present/present.frag", defines, picture=0)
-            self._curves[tone] = program, self._gl.vertex_array(program, [])
-        program, fullscreen = self._curves[tone]
+        program = self._curves.program(TONE=TONES.index(tone))
         framebuffer.use()
         job.gl.enable_only(moderngl.NOTHING)
-        job.picture.color_attachments[0].use(0)
+        self._curves.bind(picture=job.picture.color_attachments[0])
         set_uniform(program, "stops", stops)
-        fullscreen.render(moderngl.TRIANGLES, vertices=3)
+        self._curves.draw_fullscreen(program)
 
 
 #: Largest share of a pixel's light that may come along rays that went astray.
@@ -90,10 +86,10 @@ def read_arrays(job: FrameJob, samples: int) -> dict[str, Any]:
         found["valid"] &= lost <= MOST_LOST
     elif job.features.traced:
         # Rays that end inside a body, or in more of them than they can remember, have no right color.
-        share = read_floats(job.targets.surfaced(), 1, 4)[..., 3] if trusted is None else trusted
+        share = read_floats(job.targets["surfaced"], 1, 4)[..., 3] if trusted is None else trusted
         found["valid"] &= share >= np.float32(1.0 - MOST_LOST)
     if job.plan.ordered:
-        counts = read_floats(job.targets.ordered(), 2, 4)[::-1]
+        counts = read_floats(job.targets["ordered"], 2, 4)[::-1]
         found["layers"] = np.rint(counts[..., 0]).astype(np.int32)
         found["truncated"] = np.rint(counts[..., 0] - counts[..., 1]).astype(np.int32)
     if job.features.has_surfaces:
@@ -102,7 +98,7 @@ def read_arrays(job: FrameJob, samples: int) -> dict[str, Any]:
 
 
 def _whole_arrays(job: FrameJob) -> dict[str, Any]:
-    result = job.targets.result()
+    result = job.targets["result"]
     flags = np.empty(job.targets.size[::-1], dtype=np.uint8)
     result.read_into(flags, components=1, attachment=4, alignment=1)
     return {
@@ -145,7 +141,7 @@ def _read_normals(job: FrameJob) -> Floats:
     width, height = job.targets.size
     normals = np.zeros((height, width, 3), dtype=np.float32)
     if job.covered:
-        found = read_floats(job.targets.entered(), 0, 4)[::-1]
+        found = read_floats(job.targets["entered"], 0, 4)[::-1]
         np.copyto(normals, found[..., :3], where=found[..., 3:] < float(CONSTANTS["NOTHING"]))
     return normals
 
@@ -153,7 +149,7 @@ def _read_normals(job: FrameJob) -> Floats:
 def read_paths(job: FrameJob) -> tuple[Floats, Floats, Floats]:
     """Radiance (h, w, 3) of random paths, its standard error, and the share (h, w) of them that were lost."""
     count = job.paths_traced
-    known = job.targets.paths()
+    known = job.targets["paths"]
     mean, squares = read_floats(known, 0, 4), read_floats(known, 1, 3)
     with np.errstate(under="ignore"):
         error = np.sqrt(squares / np.float32(count * (count - 1.0)))
@@ -410,12 +406,12 @@ class GpuRenderer:
             self._adaptive = self._adaptive or AdaptiveSampling(self.context.gl)
             self._adaptive.run(job, samples, lambda leave_out: self._run_passes(job, leave_out=leave_out))
             return
-        job.targets.average().clear()
+        job.targets["average"].clear()
         for number, (right, down) in enumerate(sample_shifts(samples)):
             job.sample, job.samples = number, samples
             job.place((right, down))
             self._run_passes(job)
-            if not job.features.path_traced:  # of these, the share of paths is told
+            if not job.features.path_traced:  # of these, the fraction of paths is reported
                 self.context.gl.finish()
                 job.report((number + 1) / samples)
 

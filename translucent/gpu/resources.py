@@ -16,7 +16,8 @@ from translucent.gpu.hierarchies import HierarchyCache
 from translucent.gpu.shaders import before_making
 from translucent.gpu.shadow_atlas import ShadowAtlas
 from translucent.gpu.targets import Storage
-from translucent.gpu.textures import EnvironmentMaps, TextureCache
+from translucent.gpu.textures import AnyTexture, EnvironmentMaps, TextureCache
+from translucent.scene.environment import Environment
 
 #: Faces whose corners are written at a time, so that little memory is taken meanwhile.
 _CHUNK = 1 << 18
@@ -45,7 +46,7 @@ class MeshBuffers:
         """
         if (array := self._arrays.get(program.glo)) is None:
             if "corner_normal" in program or ("uv" in program and "normal" not in program):
-                # What only glows has no use for normals.
+                # What only emits has no use for normals.
                 lit = "corner_normal" in program
                 layout = ("3f 3f 2f", "offset", "corner_normal", "uv") if lit else ("3f 12x 2f", "offset", "uv")
                 content = [(self._smooth_faces(mesh), *layout), *self._corner_looks(program, mesh)]
@@ -176,6 +177,21 @@ class Resources:
     def shadows(self) -> ShadowAtlas:
         """Maps of shadows of the frame that is being drawn."""
         return self._shadows[self.photons_carry]
+
+    def light_textures(self, environment: Environment) -> dict[str, AnyTexture]:
+        """Maps of an environment that lights surfaces, and of what these reflect, by the names of their samplers."""
+        maps = self.environments.light(environment)
+        return {
+            "light_map": self.environments.sharp(environment),
+            "light_levels": maps.levels,
+            "light_irradiance": maps.irradiance,
+            "reflectance_table": self.textures.reflectance,
+        }
+
+    def seen_textures(self, environment: Environment) -> dict[str, AnyTexture]:
+        """Map of an environment as a background, by the name of its sampler; none where it is no picture."""
+        seen = environment.seen
+        return {"seen_map": self.environments.sharp(seen)} if seen.kind == "image" else {}
 
     def release(self) -> None:
         """Free all caches."""

@@ -107,7 +107,7 @@ _CONDITION = re.compile(r"^\s*#\s*(?:if|elif|ifdef|ifndef)\b(.*)$")
 # "0:12(5): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (others)
 _LOCATION = re.compile(r"\b(\d+)(?::(\d+)\(\d+\)|\((\d+)\)|:(\d+):)")
 
-#: What makes a driver compute values declared ``precise`` as they are written, where it can be told so before OpenGL 4.
+#: What makes a driver compute values declared ``precise`` as they are written, where that is possible before OpenGL 4.
 _PRECISE = ("#extension GL_ARB_gpu_shader5 : enable", "#ifndef GL_ARB_gpu_shader5", "#define precise", "#endif")
 
 
@@ -286,8 +286,8 @@ def build_program(
 def _stage(name: str, defines: Mapping[str, int], version: int) -> ShaderSource:
     """Preprocessed stage, with those of the defines that it uses."""
     gathered = gather(name)
-    asked = {key: value for key, value in defines.items() if key in gathered.switches}
-    return _with_switches(name, gathered, asked, version)
+    used = {key: value for key, value in defines.items() if key in gathered.switches}
+    return _with_switches(name, gathered, used, version)
 
 
 def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:
@@ -297,3 +297,10 @@ def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:
     except KeyError:
         known = ", ".join(sorted(program))
         raise RenderError(f"uniform {name!r}", f"the program has only {known}", "check the spelling") from None
+
+
+def set_used(program: moderngl.Program, values: Mapping[str, Any]) -> None:
+    """Set those of these loose uniforms that the program has: variants of a shader use some of them each."""
+    for name, value in values.items():
+        if name in program:
+            set_uniform(program, name, value)

@@ -19,7 +19,7 @@ from translucent.scene.camera import Camera
 #: Bytes of a texel at most: sums in three channels and a count, the place of the first opaque surface, and depth.
 _TEXEL = 24
 
-#: Bytes that all maps may take together: beyond, they are smaller than asked for.
+#: Bytes that all maps may take together: beyond, they are smaller than requested.
 MOST_BYTES = 512 << 20
 
 #: Maps of the environment's directions along the side of a light's map.

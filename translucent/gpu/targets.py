@@ -31,42 +31,55 @@ class Format:
     with_depth: bool = False
     windings: int = 0
 
-    @property
-    def attachment_bytes(self) -> tuple[int, ...]:
-        """Bytes of a pixel in each color attachment."""
-        return (*(4 * count if count > 0 else -count for count in self.components), *(16,) * self.windings)
-
     def bytes_of(self, *attachments: int) -> int:
         """Bytes of a pixel in some of the color attachments, or in all of them where none is named."""
-        sizes = self.attachment_bytes
+        sizes = (*(4 * count if count > 0 else -count for count in self.components), *(16,) * self.windings)
         return sum(sizes[i] for i in attachments) if attachments else sum(sizes)
 
 
 FORMATS = {
     "accumulated": Format((2,)),
     "accumulated-spectral": Format((4, 1)),
+    # RGBA32F: nearest front face, farthest back face, nothing, number of faces.
     "nearest_and_farthest": Format((4,)),
+    # R32F depth and RGBA32F radiance of the nearest opaque surface, with a depth buffer.
     "opaque": Format((1, 4), with_depth=True),
-    "paint": Format((4, 4), with_depth=True),
+    # RGBA32F share of light that the nearest opaque surface reflects diffusely, and its normal; depth buffer.
+    "base": Format((4, 4), with_depth=True),
+    # RGBA32F irradiance of photons on the nearest opaque surface, and how many there are.
     "photons": Format((4,)),
+    # RG32F: how far the photons of a pixel are spread, and the share that each pixel gets.
     "photon_spread": Format((2,)),
+    # RGBA32F interface where a ray first enters a body: normal, axial depth, parameters, color; with a depth buffer.
     "entered": Format((4, 4, 4), with_depth=True),
+    # RGBA32F interface where a ray first leaves one beyond it: normal, axial depth, parameters; with a depth buffer.
     "left": Format((4, 4), with_depth=True),
+    # RGBA32F radiance with what interfaces do to it, and transmittance, with a depth buffer.
     "surfaced": Format((4, 4), with_depth=True),
+    # RGBA32F optical depth and soundness, emitted radiance and thickness, and counts of layers.
     "ordered": Format((4, 4, 4)),
     "peeled": Format((4,), with_depth=True),
     "peel_state": Format((4, 4, 4, 4, 4), windings=2),
     "nothing": Format((-1,)),
+    # R32F: how far the rasterizer may misplace the steepest face of a pixel, in axial depth.
     "steepest": Format((1,)),
+    # Arrays of a frame: radiance, transmittance, optical depth (RGBA32F), thickness (R32F) and flags (R8).
     "result": Format((4, 4, 4, 1, -1)),
     "compact": Format((4, 1)),
     "compact-spectral": Format((4, 1, 4)),
+    # RGBA32F radiance and transmittance, summed over the samples of a pixel, with a depth buffer.
     "average": Format((4, 4), with_depth=True),
+    # RGBA32F light of traced samples of a pixel and their number; squared luminance and trust; depth buffer.
     "bent": Format((4, 4), with_depth=True),
+    # R8: pixels that need more samples.
     "unsettled": Format((-1,)),
+    # RGBA32F radiance of opaque surfaces, the mean of all samples, and the share of the pixel that they fill.
     "opaque_mean": Format((4,)),
+    # RGBA32F means of random paths and how many were lost, and sums of squared differences from the means.
     "paths": Format((4, 4)),
+    # RGBA32F layers in front of all bodies, and those behind the first one on a ray.
     "layers": Format((4, 4)),
+    # R32F depth at which a ray first meets a body, with a depth buffer.
     "fronts": Format((1,), with_depth=True),
 }
 
@@ -161,52 +174,20 @@ class Targets:
         self._views: dict[tuple[str, int], moderngl.Framebuffer] = {}
         self.buffers = Storage(gl, f"frame size {size[0]}x{size[1]}")
 
+    def __getitem__(self, name: str) -> moderngl.Framebuffer:
+        """The framebuffer of this name, as `FORMATS` says what it holds."""
+        return self._get(name)
+
     def path_and_count(self, spectral: bool, name: str = "accumulated") -> moderngl.Framebuffer:
         """Accumulator of thickness passes: RG32F (path, count), or RGBA32F (optical depth, count) and R32F (path)."""
         return self._get(f"{name}-{spectral}", accumulator_format(spectral))
 
-    def nearest_and_farthest(self) -> moderngl.Framebuffer:
-        """RGBA32F: nearest front face, farthest back face, nothing, number of faces."""
-        return self._get("nearest_and_farthest")
-
-    def opaque(self) -> moderngl.Framebuffer:
-        """R32F depth and RGBA32F radiance of the nearest opaque surface, with a depth buffer."""
-        return self._get("opaque")
-
-    def paint(self) -> moderngl.Framebuffer:
-        """RGBA32F share of light that the nearest opaque surface reflects diffusely, and its normal; depth buffer."""
-        return self._get("paint")
-
-    def photons(self) -> moderngl.Framebuffer:
-        """RGBA32F irradiance of photons on the nearest opaque surface, and how many there are."""
-        return self._get("photons")
-
-    def photon_spread(self) -> moderngl.Framebuffer:
-        """RG32F: how far the photons of a pixel are spread, and the share that each pixel gets."""
-        return self._get("photon_spread")
-
     def opaque_ends(self) -> moderngl.Framebuffer:
         """Framebuffer `opaque` without radiance."""
         if ("opaque", 0) not in self._views:
-            both = self.opaque()
+            both = self["opaque"]
             self._views["opaque", 0] = self._gl.framebuffer(both.color_attachments[:1], both.depth_attachment)
         return self._views["opaque", 0]
-
-    def entered(self) -> moderngl.Framebuffer:
-        """RGBA32F interface where a ray first enters a body: normal, axial depth, finish, color; with depth buffer."""
-        return self._get("entered")
-
-    def left(self) -> moderngl.Framebuffer:
-        """RGBA32F interface where a ray first leaves one beyond it: normal, axial depth, finish; with depth buffer."""
-        return self._get("left")
-
-    def surfaced(self) -> moderngl.Framebuffer:
-        """RGBA32F radiance with what interfaces do to it, and transmittance, with a depth buffer."""
-        return self._get("surfaced")
-
-    def ordered(self) -> moderngl.Framebuffer:
-        """RGBA32F optical depth and soundness, emitted radiance and thickness, and counts of layers."""
-        return self._get("ordered")
 
     def peeled(self, number: int) -> moderngl.Framebuffer:
         """RGBA32F: what one pass of depth peeling finds, with a depth buffer that all of them share."""
@@ -226,45 +207,9 @@ class Targets:
         framebuffer.color_mask = (False, False, False, False)
         return framebuffer
 
-    def steepest(self) -> moderngl.Framebuffer:
-        """R32F: how far the rasterizer may misplace the steepest face of a pixel, in axial depth."""
-        return self._get("steepest")
-
-    def result(self) -> moderngl.Framebuffer:
-        """Arrays of a frame: radiance, transmittance, optical depth (RGBA32F), thickness (R32F) and flags (R8)."""
-        return self._get("result")
-
     def compact(self, *, with_depth: bool) -> moderngl.Framebuffer:
         """RGBA32F radiance; R32F thickness, with the sign bit where it cannot be trusted; and RGBA32F optical depth."""
         return self._get(f"compact-{with_depth}", compact_format(with_depth))
-
-    def average(self) -> moderngl.Framebuffer:
-        """RGBA32F radiance and transmittance, summed over the samples of a pixel, with a depth buffer."""
-        return self._get("average")
-
-    def bent(self) -> moderngl.Framebuffer:
-        """RGBA32F light of traced samples of a pixel and their number; squared luminance and trust; depth buffer."""
-        return self._get("bent")
-
-    def unsettled(self) -> moderngl.Framebuffer:
-        """R8: pixels that need more samples."""
-        return self._get("unsettled")
-
-    def opaque_mean(self) -> moderngl.Framebuffer:
-        """RGBA32F radiance of opaque surfaces, the mean of all samples, and the share of the pixel that they fill."""
-        return self._get("opaque_mean")
-
-    def paths(self) -> moderngl.Framebuffer:
-        """RGBA32F means of random paths and how many were lost, and sums of squared differences from the means."""
-        return self._get("paths")
-
-    def layers(self) -> moderngl.Framebuffer:
-        """RGBA32F layers in front of all bodies, and those behind the first one on a ray."""
-        return self._get("layers")
-
-    def fronts(self) -> moderngl.Framebuffer:
-        """R32F depth at which a ray first meets a body, with a depth buffer."""
-        return self._get("fronts")
 
     def view(self, name: str, attachment: int) -> moderngl.Framebuffer:
         """Framebuffer with only one attachment of the framebuffer of this name."""
@@ -325,6 +270,13 @@ class Targets:
             framebuffer.release()
         self._framebuffers.clear()
         self.buffers.release()
+
+
+def add_up(gl: moderngl.Context, also: int = 0) -> None:
+    """Have what is drawn next be added to what its target holds, with `also` these flags of moderngl."""
+    gl.enable_only(moderngl.BLEND | also)
+    gl.blend_equation = moderngl.FUNC_ADD
+    gl.blend_func = moderngl.ONE, moderngl.ONE
 
 
 def read_floats(framebuffer: moderngl.Framebuffer, attachment: int, components: int) -> npt.NDArray[np.float32]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
 from weakref import WeakKeyDictionary
 
 import moderngl
@@ -15,6 +17,9 @@ from translucent.scene.environment import Environment, filtered
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.surface import TEXTURE_FIELDS, Surface
 from translucent.scene.texture import Texture
+
+#: Textures that a sampler reads.
+AnyTexture: TypeAlias = moderngl.Texture | moderngl.TextureArray | moderngl.Texture3D
 
 #: Neutral texels in place of a missing texture: factors of 1, and an unperturbed normal.
 _WHITE = Texture(np.ones((1, 1, 3), dtype=np.float32))
@@ -43,20 +48,6 @@ def kind_of(texture: Texture) -> int:
     return found
 
 
-def texture_units(first: int) -> dict[str, int]:
-    """Units of a surface's textures by the names of their samplers, as in ``shaders/shade/surface_textures.glsl``."""
-    return {name: unit for unit, name in enumerate(TEXTURE_FIELDS, first)}
-
-
-def reflectance_table(gl: moderngl.Context) -> moderngl.Texture:
-    """`brdf_table` on the GPU."""
-    table = brdf_table()
-    texture = gl.texture(table.shape[1::-1], 2, table, dtype="f4")
-    texture.filter = moderngl.LINEAR, moderngl.LINEAR
-    texture.repeat_x = texture.repeat_y = False
-    return texture
-
-
 class TextureCache:
     """Cache of each texture that has been drawn and is still alive, with mipmaps.
 
@@ -66,6 +57,15 @@ class TextureCache:
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         self._textures: WeakKeyDictionary[Texture, moderngl.Texture] = WeakKeyDictionary()
+
+    @cached_property
+    def reflectance(self) -> moderngl.Texture:
+        """`brdf_table`, which is the same for all scenes and kept as long as the context."""
+        table = brdf_table()
+        texture = self._gl.texture(table.shape[1::-1], 2, table, dtype="f4")
+        texture.filter = moderngl.LINEAR, moderngl.LINEAR
+        texture.repeat_x = texture.repeat_y = False
+        return texture
 
     def bind(self, surface: Surface, program: moderngl.Program, first_unit: int) -> None:
         """Bind a surface's textures for a program that includes ``shade/surface_textures.glsl``."""

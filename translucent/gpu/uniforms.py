@@ -185,8 +185,8 @@ _NO_DIFFUSION: Fields = {
     "exit_share": 0.0,
     "mean_cosine": 1.0,
     "ahead": 0.0,
-    "haze_far": 0.0,
-    "haze_near": 0.0,
+    "in_scattered_far": 0.0,
+    "in_scattered_near": 0.0,
 }
 
 
@@ -271,7 +271,7 @@ def _type(body: Object, sheet: float | None) -> str:
     return "SOLID" if sheet is None else "THIN_WALL" if body.has_interface else "ABSORBER"
 
 
-#: Optical depth, across the scene, of what stops the straight light of lamps.
+#: Optical depth, across the scene, of what stops the straight light of point and spot lights.
 STOPPING = 1e5
 
 
@@ -382,7 +382,7 @@ def scatter_uniforms(
     points : int
         Gauss-Legendre points for each interval and light.
     stopping : int
-        A bit for each slot that stops the straight light of lamps.
+        A bit for each slot that stops the straight light of point and spot lights.
     """
     scene, camera, media = placed.scene, placed.scene.camera, placed.media
     half_width, half_height = camera.half_extent(size)
@@ -414,7 +414,7 @@ def scatter_uniforms(
 
 
 def slot_bits(count: int) -> int:
-    """Number of bits that tell `count` slots apart."""
+    """Number of bits of the numbers of `count` slots."""
     return max(count - 1, 0).bit_length()
 
 

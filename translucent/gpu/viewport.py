@@ -256,7 +256,7 @@ class Viewport:
         self._sides.reverse()
 
     def mean_radiance(self) -> float:
-        """Mean radiance of the first side, whose pixels are all there; waits for it."""
+        """Mean radiance of the first side, whose pixels are all there; blocks until it is drawn."""
         side = self._side(0, self.size)
         values = np.frombuffer(side.light.read(components=4, dtype="f4"), np.float32).reshape(-1, 4)
         with np.errstate(under="ignore"):
@@ -453,7 +453,7 @@ class Viewport:
         self._gather_into(into, job, blends=not first)
 
     def _gather_into(self, into: moderngl.Framebuffer, job: FrameJob, *, blends: bool) -> None:
-        for unit, one in enumerate([job.picture.color_attachments[0], *job.targets.result().color_attachments[2:5]]):
+        for unit, one in enumerate([job.picture.color_attachments[0], *job.targets["result"].color_attachments[2:5]]):
             one.use(unit)
         into.use()
         self._gl.enable_only(moderngl.BLEND if blends else moderngl.NOTHING)

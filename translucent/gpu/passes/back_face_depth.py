@@ -7,7 +7,6 @@ import moderngl
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
-from translucent.gpu.shaders import build_program
 from translucent.planning.passes import PassSpec
 
 
@@ -15,23 +14,22 @@ class BackFaceDepthPass:
     """Extreme distances by maximum blending, with a count of faces that finds concave pixels."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._faces = Variants(gl, "geometry/body.vert", "thickness/back_face_depth.frag", opaque_axial_depth=0)
-        self._combine = build_program(
-            gl, "geometry/fullscreen.vert", "thickness/back_face_combine.frag", nearest_and_farthest=0
-        )
-        self._fullscreen = gl.vertex_array(self._combine, [])
+        self._faces = Variants(gl, "geometry/body.vert", "thickness/back_face_depth.frag", "opaque_axial_depth")
+        combine = "thickness/back_face_combine.frag"
+        self._combine = Variants(gl, "geometry/fullscreen.vert", combine, "nearest_and_farthest")
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw front faces, then back faces, then turn both into a path."""
         gl = job.gl
         nothing = -float(CONSTANTS["NOTHING"])
-        faces = job.targets.nearest_and_farthest()
+        faces = job.targets["nearest_and_farthest"]
         faces.use()
         faces.clear(nothing, nothing, 0.0, 0.0)
         gl.enable_only(moderngl.BLEND | moderngl.CULL_FACE)
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MAX, moderngl.FUNC_ADD
         job.bind_opaque(0)
+        combine = self._combine.program()
         program = self._faces.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.features.has_opaque)
         for culled in ("back", "front"):
             gl.cull_face = culled
@@ -40,5 +38,5 @@ class BackFaceDepthPass:
         gl.blend_equation = moderngl.FUNC_ADD
         gl.enable_only(moderngl.NOTHING)
         job.accumulator().use()
-        faces.color_attachments[0].use(0)
-        self._fullscreen.render(moderngl.TRIANGLES, vertices=3)
+        self._combine.bind(nearest_and_farthest=faces.color_attachments[0])
+        self._combine.draw_fullscreen(combine)

@@ -19,12 +19,8 @@ from translucent.scene.backdrop import Backdrop
 #: Depth of infinitely far pixels: behind everything, and yet seen.
 _BEHIND_ALL = 0.1 * float(CONSTANTS["NOTHING"])
 
-_COLOR, _DEPTH = range(2)
-
-#: Texture units of ``shaders/shade/backdrop_shadows.frag``.
-_SHADOW_UNITS = {
-    name: unit for unit, name in enumerate(("opaque_axial_depth", "light_irradiance", "shadow_sums", "shadow_ends"))
-}
+#: Samplers of ``shaders/shade/backdrop_shadows.frag``.
+_SHADOW_SAMPLERS = ("opaque_axial_depth", "light_irradiance", "shadow_sums", "shadow_ends")
 
 
 class BackdropPass:
@@ -33,10 +29,9 @@ class BackdropPass:
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._variants = Variants(
-            gl, "geometry/fullscreen.vert", "shade/backdrop.frag", backdrop_color=_COLOR, backdrop_depth=_DEPTH
-        )
-        self._shadows = Variants(gl, "geometry/fullscreen.vert", "shade/backdrop_shadows.frag", **_SHADOW_UNITS)
+        samplers = "backdrop_color", "backdrop_depth"
+        self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/backdrop.frag", *samplers)
+        self._shadows = Variants(gl, "geometry/fullscreen.vert", "shade/backdrop_shadows.frag", *_SHADOW_SAMPLERS)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Fill the target; but for shadows of the environment, it is the same for all samples of a pixel."""
@@ -48,10 +43,9 @@ class BackdropPass:
             self._shadow(job, job.backdrop.ambient)
 
     def _draw(self, job: FrameJob, backdrop: TextureBackdrop) -> None:
-        job.targets.opaque().use()
+        job.targets["opaque"].use()
         job.gl.enable_only(moderngl.NOTHING)
-        backdrop.color.use(_COLOR)
-        backdrop.depth.use(_DEPTH)
+        self._variants.bind(backdrop_color=backdrop.color, backdrop_depth=backdrop.depth)
         program = self._variants.program(ORTHOGRAPHIC=backdrop.orthographic, INFINITE=math.isinf(backdrop.far))
         media = job.placed.media
         set_uniform(program, "near", backdrop.near)
@@ -65,7 +59,7 @@ class BackdropPass:
 
     def _shadow(self, job: FrameJob, ambient: ColorLike | None) -> None:
         """Multiply the radiance by the share of its light that reaches it."""
-        axial_depth = job.targets.opaque().color_attachments[0]
+        axial_depth = job.targets["opaque"].color_attachments[0]
         job.targets.view("opaque", 1).use()  # what is read may not be attached
         job.gl.enable_only(moderngl.BLEND)
         job.gl.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
@@ -74,11 +68,10 @@ class BackdropPass:
         program = self._shadows.program(
             LIGHT_MAP=light_map, EVEN_LIGHT=ambient is not None, **shadow_switches(True, job.resources)
         )
-        axial_depth.use(_SHADOW_UNITS["opaque_axial_depth"])
-        job.resources.shadows.use(_SHADOW_UNITS)
+        self._shadows.bind(opaque_axial_depth=axial_depth)
+        job.resources.shadows.use(self._shadows.units)
         if light_map:
-            irradiance = job.resources.environments.light(environment).irradiance
-            irradiance.use(_SHADOW_UNITS["light_irradiance"])
+            self._shadows.bind(light_irradiance=job.resources.environments.light(environment).irradiance)
         set_uniform(program, "behind_all", _BEHIND_ALL)
         if ambient is not None:
             set_uniform(program, "even_light", ambient)
@@ -94,5 +87,5 @@ def _upload(job: FrameJob, backdrop: Backdrop) -> None:
         axial_depth = np.where(backdrop.coverage, axial_depth, np.float32(CONSTANTS["NOTHING"]))
     radiance = np.ones((*axial_depth.shape, 4), dtype=np.float32)
     radiance[..., :3] = backdrop.radiance
-    for texture, rows in zip(job.targets.opaque().color_attachments, (axial_depth, radiance), strict=True):
+    for texture, rows in zip(job.targets["opaque"].color_attachments, (axial_depth, radiance), strict=True):
         texture.write(np.ascontiguousarray(rows[::-1]))

@@ -12,18 +12,17 @@ from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS, PHOTON_WIDTH
 from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps, OpaquePass, shadow_switches
-from translucent.gpu.passes.traced_interfaces import all_closed
+from translucent.gpu.passes.opaque import SURFACE_SAMPLERS, OpaquePass, set_surface, shadow_switches
+from translucent.gpu.passes.traced_interfaces import RAY_SAMPLERS, ray_switches, traced_scene
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
-from translucent.gpu.shaders import before_making, build_program, set_uniform
+from translucent.gpu.shaders import set_uniform, set_used
+from translucent.gpu.targets import add_up
 from translucent.gpu.uniforms import media_center
 from translucent.planning.caustics import PhotonAim, photon_aims
 from translucent.planning.passes import PassSpec
 
-_TRACED = {name: unit for unit, name in enumerate(("object_table", "hierarchy_nodes", "hierarchy_triangles"))}
 _LANDED = ("landed_point", "landed_power", "landed_normal")
-_RECEIVED = {"photon_irradiance": 0, "opaque_axial_depth": 1, "receiver_normal": 2}
-_SPLAT = {name: unit for unit, name in enumerate((*_LANDED, "opaque_axial_depth"))}
+_RECEIVED = ("photon_irradiance", "opaque_axial_depth", "receiver_normal")
 
 #: Photons of a pixel from which on they stay in it; fewer are spread. With 4 and 16 errors of pictures are larger.
 ENOUGH = 8.0
@@ -39,7 +38,7 @@ class Tracer:
     aims: list[PhotonAim]
     landed: moderngl.Framebuffer
     program: moderngl.Program
-    textures: tuple[moderngl.Texture, ...]
+    textures: dict[str, moderngl.Texture]
 
 
 class CausticsPass:
@@ -47,17 +46,16 @@ class CausticsPass:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
-        self._photons = Variants(gl, "geometry/fullscreen.vert", "transport/photons.frag", **_TRACED)
-        self._spread = Variants(gl, "geometry/fullscreen.vert", "shade/photon_spread.frag", **_RECEIVED)
+        self._photons = Variants(gl, "geometry/fullscreen.vert", "transport/photons.frag", *RAY_SAMPLERS)
+        self._spread = Variants(gl, "geometry/fullscreen.vert", "shade/photon_spread.frag", *_RECEIVED)
         self._shade = Variants(
-            gl, "geometry/fullscreen.vert", "shade/caustics.frag", photon_spread=3, receiver_base=4, **_RECEIVED
+            gl, "geometry/fullscreen.vert", "shade/caustics.frag", *_RECEIVED, "photon_spread", "receiver_base"
         )
-        self._known = Variants(gl, "geometry/fullscreen.vert", "shade/known_photons.frag", photon_light=0)
+        self._known = Variants(gl, "geometry/fullscreen.vert", "shade/known_photons.frag", "photon_light")
         self._opaque = OpaquePass(gl)
-        self._plain = Variants(gl, "geometry/body.vert", "shade/receiver.frag", **FINISH_UNITS)
-        self._finished = Variants(gl, "geometry/interface.vert", "shade/receiver.frag", **FINISH_UNITS)
-        self._maps = FinishMaps(gl)
-        self._splat: moderngl.VertexArray | None = None
+        self._plain = Variants(gl, "geometry/body.vert", "shade/receiver.frag", *SURFACE_SAMPLERS)
+        self._surfaced = Variants(gl, "geometry/interface.vert", "shade/receiver.frag", *SURFACE_SAMPLERS)
+        self._splat = Variants(gl, "transport/landed.vert", "transport/landed.frag", *_LANDED, "opaque_axial_depth")
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Follow the photons of this sample, and add their light to the opaque objects."""
@@ -68,14 +66,14 @@ class CausticsPass:
             for number, aim in enumerate(tracer.aims):
                 begin, end = (aim.photons * (job.sample + i) // job.samples for i in range(2))
                 self.follow(job, tracer, number, begin, end)
-        self.paint(job, spec.objects)
+        self.draw_base(job, spec.objects)
         return self.shade(job, job.targets.view("opaque", 1))
 
     def begin(self, stack: ExitStack, job: FrameJob) -> Tracer:
         """Get ready to follow photons in the scene of a job, and forget those that have landed."""
         require_interfaces(job.gl.info)
         assert job.plan.caustics is not None
-        job.targets.photons().clear()
+        job.targets["photons"].clear()
         aims = photon_aims(job.scene, media_center(job.scene), job.plan.caustics.photons)
         return Tracer(aims, self._landed(stack), *self._tracer(stack, job))
 
@@ -84,8 +82,7 @@ class CausticsPass:
         self._aim(tracer.program, tracer.aims[number], number, job)
         for first in range(begin, end, BATCH):
             count = min(BATCH, end - first)
-            for unit, texture in enumerate(tracer.textures):
-                texture.use(unit)
+            self._photons.bind(**tracer.textures)
             self._follow(tracer.program, tracer.landed, first, count)
             self._add(job, tracer.landed, count)
 
@@ -102,14 +99,12 @@ class CausticsPass:
             texture.filter = moderngl.NEAREST, moderngl.NEAREST
         return framebuffer
 
-    def _tracer(self, stack: ExitStack, job: FrameJob) -> tuple[moderngl.Program, tuple[moderngl.Texture, ...]]:
+    def _tracer(self, stack: ExitStack, job: FrameJob) -> tuple[moderngl.Program, dict[str, moderngl.Texture]]:
         """Program that follows photons through the scene of a job, with its uniforms, and its textures."""
         scene = job.scene
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         program = self._photons.program(
-            ONE_OBJECT=len(scene.objects) == 1,
-            PRIORITY=scene.overlap == "priority",
-            UNION=scene.overlap == "union",
+            **ray_switches(scene),
             EMISSION=False,
             FROM_EYE=False,
             LIGHTS=False,
@@ -117,21 +112,10 @@ class CausticsPass:
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             **coat_switches(scene.bodies),
         )
-        hierarchies = job.resources.hierarchies.of(scene)
-        placements, frame = hierarchies.place(scene, media_center(scene))
-        bodies = job.object_table(placements)
-        stack.callback(bodies.release)
+        textures, values = traced_scene(job, stack)
         assert job.plan.caustics is not None
-        values = {
-            "seed": job.plan.caustics.seed,
-            "all_closed": all_closed(scene),
-            "object_nodes": hierarchies.object_nodes,
-            "objects_frame": frame,
-        }
-        for name, value in values.items():
-            if name in program:
-                set_uniform(program, name, value)
-        return program, (bodies, hierarchies.nodes, hierarchies.triangles)
+        set_used(program, {"seed": job.plan.caustics.seed, **values})
+        return program, textures
 
     def _aim(self, program: moderngl.Program, aim: PhotonAim, number: int, job: FrameJob) -> None:
         assert job.plan.caustics is not None
@@ -162,15 +146,12 @@ class CausticsPass:
 
     def _add(self, job: FrameJob, landed: moderngl.Framebuffer, count: int) -> None:
         """Add the irradiance of a batch of photons to the pixels that show where they have landed."""
-        if self._splat is None:
-            before_making(self._gl, (("transport/landed.vert", "transport/landed.frag"), ()))
-            program = build_program(self._gl, "transport/landed.vert", "transport/landed.frag", **_SPLAT)
-            self._splat = self._gl.vertex_array(program, [])
-        textures = *landed.color_attachments, job.targets.opaque().color_attachments[0]
-        for unit, texture in enumerate(textures):
-            texture.use(unit)
-        self._add_up(job.targets.photons())
-        self._splat.render(moderngl.POINTS, vertices=count)
+        program = self._splat.program()
+        landed_on = dict(zip(_LANDED, landed.color_attachments, strict=True))
+        self._splat.bind(**landed_on, opaque_axial_depth=job.targets["opaque"].color_attachments[0])
+        job.targets["photons"].use()
+        add_up(self._gl)
+        self._splat.draw_points(program, count)
 
     def draw_depth(self, job: FrameJob, objects: tuple[int, ...]) -> None:
         """Draw where opaque objects are, and nothing else of them."""
@@ -178,9 +159,9 @@ class CausticsPass:
         ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
         self._opaque.draw_depth(job, objects, ends)
 
-    def paint(self, job: FrameJob, objects: tuple[int, ...]) -> None:
+    def draw_base(self, job: FrameJob, objects: tuple[int, ...]) -> None:
         """Draw what opaque objects reflect diffusely, as `OpaquePass` draws their radiance."""
-        framebuffer = job.targets.paint()
+        framebuffer = job.targets["base"]
         framebuffer.use()
         framebuffer.clear(depth=1.0)
         self._gl.enable_only(moderngl.DEPTH_TEST)
@@ -194,30 +175,30 @@ class CausticsPass:
                     WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **bare
                 )
             else:
-                program = self._finished.program(
+                program = self._surfaced.program(
                     SURFACE=1, **look_switches(body), **unshadowed, **coat_switches([body])
                 )
-                self._maps.bind(job)
-                self._maps.set_finish(job, program, surface, surface.alpha_cutoff)
+                self._surfaced.bind(**job.resources.light_textures(job.scene.environment))
+                set_surface(job, program, surface, surface.alpha_cutoff)
             job.draw(program, (i,))
         self._gl.depth_func = "<"
 
     def shade(self, job: FrameJob, into: moderngl.Framebuffer, rounds: int = 1) -> None:
         """Add the light that opaque objects reflect of the photons that have landed, the mean of so many rounds."""
-        paint, normal = job.targets.paint().color_attachments
-        depth = job.targets.opaque().color_attachments[0]
-        for unit, texture in enumerate((job.targets.photons().color_attachments[0], depth, normal)):
-            texture.use(unit)
+        base, normal = job.targets["base"].color_attachments
+        depth = job.targets["opaque"].color_attachments[0]
+        photons = job.targets["photons"].color_attachments[0]
+        self._spread.bind(photon_irradiance=photons, opaque_axial_depth=depth, receiver_normal=normal)
         program = self._spread.program()
         set_uniform(program, "enough", ENOUGH / job.samples)
-        job.targets.photon_spread().use()
+        job.targets["photon_spread"].use()
         self._gl.enable_only(moderngl.NOTHING)
         self._spread.draw_fullscreen(program)
-        job.targets.photon_spread().color_attachments[0].use(3)
-        paint.use(4)
+        self._shade.bind(photon_spread=job.targets["photon_spread"].color_attachments[0], receiver_base=base)
         shading = self._shade.program()
         set_uniform(shading, "share", 1.0 / rounds)
-        self._add_up(into)
+        into.use()
+        add_up(self._gl)
         self._shade.draw_fullscreen(shading)
 
     def _add_known(self, job: FrameJob, light: moderngl.Texture, stride: int, phase: tuple[int, int]) -> None:
@@ -226,11 +207,6 @@ class CausticsPass:
         set_uniform(program, "stride", stride)
         set_uniform(program, "phase", (phase[0], stride - 1 - phase[1]))  # stored with row 0 at the bottom
         light.use(0)
-        self._add_up(job.targets.view("opaque", 1))
+        job.targets.view("opaque", 1).use()
+        add_up(self._gl)
         self._known.draw_fullscreen(program)
-
-    def _add_up(self, framebuffer: moderngl.Framebuffer) -> None:
-        framebuffer.use()
-        self._gl.enable_only(moderngl.BLEND)
-        self._gl.blend_equation = moderngl.FUNC_ADD
-        self._gl.blend_func = moderngl.ONE, moderngl.ONE

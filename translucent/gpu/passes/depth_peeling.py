@@ -16,27 +16,21 @@ from translucent.planning.passes import PassSpec
 
 _STATE = ("near_depth", "near_emitted", "layers", "far_depth", "far_emitted", "near_winding", "far_winding")
 
-#: Texture units of the previous pass's result, and of the ends of rays, for shaders that draw bodies.
-_PREVIOUS, _OPAQUE = 0, 1
-
 
 class DepthPeelingPass:
     """Depth peeling from one end of the rays or from both; see ``shaders/intervals/peel.frag``.
 
-    The first pass counts the crossings of each pixel, which tells when all are found: then a depth mask keeps the pixel
+    The first pass counts the crossings of each pixel, which says when all are found: then a depth mask keeps the pixel
     out of further passes.
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._peel = Variants(
-            gl, "geometry/body.vert", "intervals/peel.frag", previous=_PREVIOUS, opaque_axial_depth=_OPAQUE
-        )
-        self._mask = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_mask.frag", previous=_PREVIOUS)
-        self._remaining = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_remaining.frag", found=0)
-        self._counted = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_counted.frag", first=0)
-        batch = {f"pass_{i}": i for i in range(PEEL_BATCH)}
-        state = {name: PEEL_BATCH + i for i, name in enumerate(_STATE)}
-        self._fold = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_fold.frag", **batch, **state)
+        self._peel = Variants(gl, "geometry/body.vert", "intervals/peel.frag", "previous", "opaque_axial_depth")
+        self._mask = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_mask.frag", "previous")
+        self._remaining = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_remaining.frag", "found")
+        self._counted = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_counted.frag", "first")
+        batch = (f"pass_{i}" for i in range(PEEL_BATCH))
+        self._fold = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_fold.frag", *batch, *_STATE)
         self._any = gl.query(samples=True)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
@@ -86,7 +80,7 @@ class DepthPeelingPass:
             target.clear(nothing, nothing, nothing, 0.0)
             gl.enable_only(moderngl.BLEND)
         else:
-            batch[-2].color_attachments[0].use(_PREVIOUS)
+            self._peel.bind(previous=batch[-2].color_attachments[0])
             gl.enable_only(moderngl.DEPTH_TEST)
             gl.depth_func = "1"
             self._mask.draw_fullscreen(self._mask.program(FIRST=number == 1, **ends))
@@ -95,7 +89,7 @@ class DepthPeelingPass:
             target.depth_mask = False
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MIN, moderngl.FUNC_ADD
-        job.bind_opaque(_OPAQUE)
+        job.bind_opaque(self._peel.units["opaque_axial_depth"])
         job.draw(program, spec.objects)
         gl.blend_equation = moderngl.FUNC_ADD
         gl.enable_only(moderngl.NOTHING)
@@ -132,7 +126,7 @@ class DepthPeelingPass:
         last: bool,
     ) -> None:
         """Walk along the crossings of the first `walked` passes of a batch."""
-        framebuffer = job.targets.ordered() if last else job.targets.peel_state(folds % 2)
+        framebuffer = job.targets["ordered"] if last else job.targets.peel_state(folds % 2)
         # Samplers of passes that this batch is short of must not stay with what is drawn into.
         for unit in range(PEEL_BATCH):
             batch[min(unit, len(batch) - 1)].color_attachments[0].use(unit)

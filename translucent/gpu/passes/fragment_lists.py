@@ -29,16 +29,15 @@ class FragmentListsPass:
     """A-buffer that never drops a fragment; see ``shaders/intervals/fragment_lists.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_axial_depth=0)
+        self._lists = Variants(
+            gl, "geometry/body.vert", "intervals/fragment_lists.frag", "opaque_axial_depth", version=430
+        )
         self._resolve = Variants(
             gl,
             "geometry/fullscreen.vert",
             "intervals/fragment_lists_resolve.frag",
-            430,
-            opaque_axial_depth=0,
-            density_grids=1,
-            steepest=2,
-            scattered_light=3,
+            *("opaque_axial_depth", "density_grids", "steepest", "scattered_light"),
+            version=430,
         )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
@@ -49,7 +48,7 @@ class FragmentListsPass:
         try:
             self._run_bands(job, spec)
         finally:
-            job.targets.steepest().scissor = None
+            job.targets["steepest"].scissor = None
 
     def _run_bands(self, job: FrameJob, spec: PassSpec) -> None:
         width, height = job.targets.size
@@ -88,8 +87,8 @@ class FragmentListsPass:
         heads.clear()
         for name, buffer in (("count", count), ("heads", heads), ("nodes", self._nodes(job))):
             buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
-        _use_rows(job.targets.steepest(), first, last)
-        job.targets.steepest().clear()
+        _use_rows(job.targets["steepest"], first, last)
+        job.targets["steepest"].clear()
         gl.enable_only(moderngl.BLEND)
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MAX
@@ -105,7 +104,7 @@ class FragmentListsPass:
     def _walk(self, job: FrameJob, first: int, last: int) -> None:
         job.bind_opaque(0)
         job.bind_grids(1, 3)
-        job.targets.steepest().color_attachments[0].use(2)
+        job.targets["steepest"].color_attachments[0].use(2)
         switches = {"OPAQUE": job.features.has_opaque, "INTERFACES": job.features.finds_exits}
         program = self._resolve.program(**walk_switches(job.features), GRADIENT=0, **switches)
         if job.features.marches:
@@ -114,7 +113,7 @@ class FragmentListsPass:
             set_uniform(program, "march_rule", int(CONSTANTS[f"MARCH_{method.quadrature.upper()}"]))
             set_uniform(program, "march_seed", method.seed - (1 << 32 if method.seed >= 1 << 31 else 0))
             set_uniform(program, "march_jitter", int(method.jitter))
-        self._resolve.draw_covered(job, program, job.targets.ordered(), rows=(first, last))
+        self._resolve.draw_covered(job, program, job.targets["ordered"], rows=(first, last))
         # The next lists must not begin before these have been walked along.
         job.gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
 

@@ -19,9 +19,14 @@ class KBufferPass:
     """k-buffer filled with atomic minima; see ``shaders/intervals/k_buffer.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._insert = Variants(gl, "geometry/body.vert", "intervals/k_buffer.frag", 430, opaque_axial_depth=0)
+        self._insert = Variants(gl, "geometry/body.vert", "intervals/k_buffer.frag", "opaque_axial_depth", version=430)
         self._resolve = Variants(
-            gl, "geometry/fullscreen.vert", "intervals/k_buffer_resolve.frag", 430, opaque_axial_depth=0, steepest=1
+            gl,
+            "geometry/fullscreen.vert",
+            "intervals/k_buffer_resolve.frag",
+            "opaque_axial_depth",
+            "steepest",
+            version=430,
         )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
@@ -35,7 +40,7 @@ class KBufferPass:
         # A count of 0, and k times no crossing.
         words.clear(chunk=np.array([0] + [0xFFFFFFFF] * k, np.uint32).tobytes(), size=4 * (k + 1) * width * height)
         words.bind_to_storage_buffer(STORAGE_BINDINGS["words"])
-        steepest = job.targets.steepest()
+        steepest = job.targets["steepest"]
         steepest.use()
         steepest.clear()
         gl.enable_only(moderngl.BLEND)
@@ -53,6 +58,6 @@ class KBufferPass:
             **walk_switches(job.features), OPAQUE=job.features.has_opaque, INTERFACES=job.features.finds_exits
         )
         set_uniform(program, "k", k)
-        self._resolve.draw_covered(job, program, job.targets.ordered())
+        self._resolve.draw_covered(job, program, job.targets["ordered"])
         # The next frame must not clear the words before these have been walked along.
         gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)

@@ -105,8 +105,12 @@ class LightViewsPass:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
-        self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_axial_depth=0)
-        self._sorting = Variants(gl, "geometry/fullscreen.vert", "volume/light_lists.frag", 430, opaque_axial_depth=0)
+        self._lists = Variants(
+            gl, "geometry/body.vert", "intervals/fragment_lists.frag", "opaque_axial_depth", version=430
+        )
+        self._sorting = Variants(
+            gl, "geometry/fullscreen.vert", "volume/light_lists.frag", "opaque_axial_depth", version=430
+        )
         self._opaque = OpaquePass(gl)
         self._targets: dict[int, Targets] = {}
         self._held: tuple[object, LightLookup] | None = None

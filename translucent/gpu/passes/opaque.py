@@ -10,25 +10,22 @@ from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import CameraView, FrameJob
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.resources import Resources
-from translucent.gpu.shaders import set_uniform
-from translucent.gpu.textures import reflectance_table, texture_units
+from translucent.gpu.shaders import set_uniform, set_used
 from translucent.planning.passes import PassSpec
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS
-from translucent.scene.surface import Surface
+from translucent.scene.surface import TEXTURE_FIELDS, Surface
 
 _MAPS = ("light_irradiance", "light_map", "light_levels", "reflectance_table", "shadow_sums", "shadow_ends")
-_FIRST_TEXTURE = len(_MAPS)
-#: Texture units of ``shaders/shade/opaque_surface.glsl``.
-FINISH_UNITS = {name: unit for unit, name in enumerate(_MAPS)} | texture_units(_FIRST_TEXTURE)
+#: Samplers of ``shaders/shade/opaque_surface.glsl``.
+SURFACE_SAMPLERS = *_MAPS, *TEXTURE_FIELDS
 
 
 class OpaquePass:
     """Nearest opaque surface of each pixel; see ``shaders/shade/opaque.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._plain = Variants(gl, "geometry/body.vert", "shade/opaque.frag", **FINISH_UNITS)
-        self._finished = Variants(gl, "geometry/interface.vert", "shade/opaque.frag", **FINISH_UNITS)
-        self._maps = FinishMaps(gl)
+        self._plain = Variants(gl, "geometry/body.vert", "shade/opaque.frag", *SURFACE_SAMPLERS)
+        self._surfaced = Variants(gl, "geometry/interface.vert", "shade/opaque.frag", *SURFACE_SAMPLERS)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the opaque objects with the depth test on."""
@@ -37,7 +34,7 @@ class OpaquePass:
             ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
             self.draw_depth(job, spec.objects, ends)
             return
-        framebuffer = job.targets.opaque()
+        framebuffer = job.targets["opaque"]
         framebuffer.use()
         _clear(framebuffer)
         job.gl.enable_only(moderngl.DEPTH_TEST)
@@ -46,11 +43,11 @@ class OpaquePass:
         environment = job.scene.environment
         light_map = environment.kind == "image"
         if job.features.has_shadow_maps:
-            job.resources.shadows.use(FINISH_UNITS)
+            job.resources.shadows.use(self._plain.units)
         common = {"LIGHT_MAP": light_map, "DEPTH_ONLY": False, "PROJECTED_DEPTH": False}
         common |= shadow_switches(job.features.has_shadow_maps, job.resources)
         if light_map:
-            job.resources.environments.light(environment).irradiance.use(FINISH_UNITS["light_irradiance"])
+            job.resources.environments.light(environment).irradiance.use(self._plain.units["light_irradiance"])
         for i in spec.objects[::-1]:
             if (surface := job.scene.objects[i].surface) is None:
                 program = self._plain.program(
@@ -66,9 +63,9 @@ class OpaquePass:
                 if job.features.has_shadow_maps:
                     require_interfaces(job.gl.info)
                 looks = look_switches(job.scene.objects[i]) | coat_switches([job.scene.objects[i]])
-                program = self._finished.program(SURFACE=1, **common, **looks)
-                self._maps.bind(job)
-                self._maps.set_finish(job, program, surface, surface.alpha_cutoff)
+                program = self._surfaced.program(SURFACE=1, **common, **looks)
+                self._surfaced.bind(**job.resources.light_textures(environment))
+                set_surface(job, program, surface, surface.alpha_cutoff)
             job.draw(program, (i,))
         job.gl.depth_func = "<"
 
@@ -89,8 +86,8 @@ class OpaquePass:
                 switches = {"WITH_NORMAL": 1, "WITH_POSITION": 1, "SURFACE": 0, "VERTEX_COLORS": 0, "OCCLUSION": 0}
                 program = self._plain.program(**switches, **common)
             else:
-                program = self._finished.program(SURFACE=1, **common, **look_switches(view.scene.objects[i]))
-                self._maps.set_finish(view, program, surface, surface.alpha_cutoff)
+                program = self._surfaced.program(SURFACE=1, **common, **look_switches(view.scene.objects[i]))
+                set_surface(view, program, surface, surface.alpha_cutoff)
             view.draw(program, (i,))
 
 
@@ -105,46 +102,27 @@ def interface_shadow_switches(job: FrameJob) -> dict[str, bool]:
     return shadow_switches(job.features.has_shadow_maps and enough, job.resources)
 
 
-class FinishMaps:
-    """Inputs of ``shaders/shade/opaque_surface.glsl``: maps of the environment, and the surface of an object."""
-
-    def __init__(self, gl: moderngl.Context) -> None:
-        self._gl = gl
-        self._reflectance: moderngl.Texture | None = None
-
-    def bind(self, view: CameraView) -> None:
-        """Bind the environment's maps to the texture units of `FINISH_UNITS`."""
-        if self._reflectance is None:
-            self._reflectance = reflectance_table(self._gl)
-        environment = view.scene.environment
-        maps = view.resources.environments.light(environment)
-        textures = maps.irradiance, view.resources.environments.sharp(environment), maps.levels, self._reflectance
-        for unit, texture in enumerate(textures):
-            texture.use(unit)
-
-    def set_finish(self, view: CameraView, program: moderngl.Program, surface: Surface, hole_below: float) -> None:
-        """Set the uniforms of an object's surface; there is a hole where alpha is less than `hole_below`."""
-        view.resources.textures.bind(surface, program, _FIRST_TEXTURE)
-        passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
-        finish = surface.metallic, surface.roughness, surface.ior, hole_below
-        set_uniform(program, "opaque_parameters", finish)
-        values = {
-            "opaque_emissive": tuple(np.asarray(surface.emissive)),
-            "opaque_passed": (*passed, surface.double_sided),
-            "opaque_passed_share": surface.diffuse_transmission,
-            "opaque_film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
-            "opaque_clearcoat": (surface.clearcoat, surface.clearcoat_roughness),
-        }
-        for name, value in values.items():
-            if name in program:  # not all are where an object only glows, or only its depth is needed
-                set_uniform(program, name, value)
+def set_surface(view: CameraView, program: moderngl.Program, surface: Surface, hole_below: float) -> None:
+    """Set the surface of an object for ``shaders/shade/opaque_surface.glsl``, with holes where alpha is below that."""
+    view.resources.textures.bind(surface, program, len(_MAPS))
+    passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
+    set_uniform(program, "opaque_parameters", (surface.metallic, surface.roughness, surface.ior, hole_below))
+    # Not all are where an object only emits light, or only its depth is needed.
+    values = {
+        "opaque_emissive": tuple(np.asarray(surface.emissive)),
+        "opaque_passed": (*passed, surface.double_sided),
+        "opaque_passed_share": surface.diffuse_transmission,
+        "opaque_film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
+        "opaque_clearcoat": (surface.clearcoat, surface.clearcoat_roughness),
+    }
+    set_used(program, values)
 
 
 def blurred_opaque(job: FrameJob) -> tuple[moderngl.Texture, moderngl.Texture]:
     """Axial depth and radiance of the opaque objects; the latter with its blurs, if a rough body may show them."""
-    axial_depth, radiance = job.targets.opaque().color_attachments
+    axial_depth, radiance = job.targets["opaque"].color_attachments
     if job.bending:
-        (radiance,) = job.targets.opaque_mean().color_attachments
+        (radiance,) = job.targets["opaque_mean"].color_attachments
     if any(body.surface is not None and body.surface.roughness > 0 for body in job.scene.bodies):
         radiance.build_mipmaps()
         radiance.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR

@@ -6,45 +6,37 @@ import time
 from collections.abc import Generator, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
 
 from translucent.errors import RenderError
 from translucent.gpu.context import require_interfaces
-from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import interface_shadow_switches
-from translucent.gpu.passes.traced_interfaces import all_closed, bodies_radius, interior_at_eye
-from translucent.gpu.passes.variants import Variants, coat_switches
-from translucent.gpu.shaders import set_uniform
-from translucent.gpu.textures import reflectance_table
-from translucent.gpu.uniforms import media_center
+from translucent.gpu.passes.traced_interfaces import RAY_SAMPLERS, ray_switches, traced_scene
+from translucent.gpu.passes.variants import Variants, coat_switches, seen_switches
+from translucent.gpu.shaders import set_uniform, set_used
+from translucent.gpu.targets import add_up
 from translucent.planning.passes import PassSpec
 
 _STATE = ("path_origin", "path_direction", "path_light", "path_interior", "path_counts", "path_mean", "path_spread")
 _COUNTS = _STATE.index("path_counts")
 _UNSIGNED = ("path_interior", "path_counts")
-_UNITS = {
-    name: unit
-    for unit, name in enumerate(
-        (
-            *_STATE,
-            "object_table",
-            "hierarchy_nodes",
-            "hierarchy_triangles",
-            "light_map",
-            "opaque_axial_depth",
-            "opaque_radiance",
-            "light_irradiance",
-            "light_levels",
-            "reflectance_table",
-            "seen_map",
-            "shadow_sums",
-            "shadow_ends",
-        )
-    )
-}
+_SAMPLERS = (
+    *_STATE,
+    *RAY_SAMPLERS,
+    "light_map",
+    "opaque_axial_depth",
+    "opaque_radiance",
+    "light_irradiance",
+    "light_levels",
+    "reflectance_table",
+    "seen_map",
+    "shadow_sums",
+    "shadow_ends",
+)
 
 #: Pixels along a side of a tile: 220 bytes each are kept of it.
 TILE = 512
@@ -82,11 +74,10 @@ class PathTracer:
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         vertex = "geometry/fullscreen.vert"
-        self._begin = Variants(gl, vertex, "transport/path_begin.frag", known_mean=0, known_spread=1)
-        self._trace = Variants(gl, vertex, "transport/path_trace.frag", **_UNITS)
-        self._end = Variants(gl, vertex, "transport/path_end.frag", path_mean=0, path_spread=1)
-        self._picture = Variants(gl, vertex, "transport/path_picture.frag", path_mean=0, straight_transmittance=1)
-        self._reflectance = reflectance_table(gl)
+        self._begin = Variants(gl, vertex, "transport/path_begin.frag", "known_mean", "known_spread")
+        self._trace = Variants(gl, vertex, "transport/path_trace.frag", *_SAMPLERS)
+        self._end = Variants(gl, vertex, "transport/path_end.frag", "path_mean", "path_spread")
+        self._picture = Variants(gl, vertex, "transport/path_picture.frag", "path_mean", "straight_transmittance")
         self._unfinished = gl.query(samples=True)
         self._events = 4
         self._rest = gl.framebuffer([gl.texture((1, 1), 1)])
@@ -115,11 +106,12 @@ class PathTracer:
         corners = [(x, y) for y in range(0, height, tile) for x in range(0, width, tile)]
         with ExitStack() as stack:
             states = [self._state(stack, job, tile) for _ in range(2)]
-            bodies, hierarchies, values = self._bodies(stack, job)
-            values["spread"] = spread
+            textures, values = traced_scene(job, stack)
+            assert job.plan.paths is not None
+            values |= {"seed": job.plan.paths.seed, "spread": spread}
             for number, corner in enumerate(corners):
                 size = min(tile, width - corner[0]), min(tile, height - corner[1])
-                for part in self._tile(job, states, (bodies, hierarchies, values), corner, size, last, seconds):
+                for part in self._tile(job, states, (textures, values), corner, size, last, seconds):
                     yield Progress((number + part) / len(corners), False)
             job.paths_traced = last
         yield Progress(1.0, True)
@@ -127,13 +119,14 @@ class PathTracer:
     def show(self, job: FrameJob) -> None:
         """Write the picture so far, or add the transmittance of a sample where several are being summed up."""
         sums = job.averaging
-        framebuffer = job.targets.average() if sums else job.targets.surfaced()
-        job.targets.paths().color_attachments[0].use(0)
-        job.targets.result().color_attachments[1].use(1)
+        framebuffer = job.targets["average"] if sums else job.targets["surfaced"]
+        mean, through = job.targets["paths"].color_attachments[0], job.targets["result"].color_attachments[1]
+        self._picture.bind(path_mean=mean, straight_transmittance=through)
         program = self._picture.program()
-        self._gl.enable_only(moderngl.BLEND if sums else moderngl.NOTHING)
-        self._gl.blend_equation = moderngl.FUNC_ADD
-        self._gl.blend_func = moderngl.ONE, moderngl.ONE
+        if sums:
+            add_up(self._gl)
+        else:
+            self._gl.enable_only(moderngl.NOTHING)
         framebuffer.use()
         self._picture.draw_fullscreen(program)
 
@@ -141,7 +134,7 @@ class PathTracer:
         self,
         job: FrameJob,
         states: list[moderngl.Framebuffer],
-        scene: tuple[moderngl.Texture, SceneHierarchies, dict[str, object]],
+        scene: tuple[dict[str, moderngl.Texture], dict[str, Any]],
         corner: tuple[int, int],
         size: tuple[int, int],
         last: int,
@@ -157,8 +150,8 @@ class PathTracer:
             clock = time.perf_counter()
             into, source = states[(number + 1) % 2], states[number % 2]
             values = {"tile_origin": corner, "last_path": last, "events": self._events, "pass_number": float(number)}
-            self._bind(job, scene, source)
-            self._set(program, {**scene[2], **values})
+            self._bind(job, scene[0], source)
+            set_used(program, {**scene[1], **values})
             self._aim(into, size)
             with self._unfinished:
                 self._trace.draw_fullscreen(program)
@@ -177,11 +170,10 @@ class PathTracer:
     def _start(
         self, job: FrameJob, state: moderngl.Framebuffer, corner: tuple[int, int], size: tuple[int, int]
     ) -> None:
-        known = job.targets.paths()
-        for unit, texture in enumerate(known.color_attachments):
-            texture.use(unit)
+        mean, spread = job.targets["paths"].color_attachments
+        self._begin.bind(known_mean=mean, known_spread=spread)
         program = self._begin.program()
-        self._set(program, {"tile_origin": corner, "first_path": job.paths_traced})
+        set_used(program, {"tile_origin": corner, "first_path": job.paths_traced})
         self._aim(state, size)
         self._begin.draw_fullscreen(program)
         state.scissor = None
@@ -189,11 +181,11 @@ class PathTracer:
     def _finish(
         self, job: FrameJob, state: moderngl.Framebuffer, corner: tuple[int, int], size: tuple[int, int]
     ) -> None:
-        into = job.targets.paths()
-        for unit, texture in enumerate(state.color_attachments[-2:]):
-            texture.use(unit)
+        into = job.targets["paths"]
+        mean, spread = state.color_attachments[-2:]
+        self._end.bind(path_mean=mean, path_spread=spread)
         program = self._end.program()
-        self._set(program, {"tile_origin": corner})
+        set_uniform(program, "tile_origin", corner)
         into.scissor = *corner, *size
         into.use()
         self._gl.enable_only(moderngl.NOTHING)
@@ -227,32 +219,12 @@ class PathTracer:
             texture.filter = moderngl.NEAREST, moderngl.NEAREST
         return framebuffer
 
-    def _bodies(self, stack: ExitStack, job: FrameJob) -> tuple[moderngl.Texture, SceneHierarchies, dict[str, object]]:
-        """Texture of the objects, hierarchies of their meshes, and the uniforms that are the same for all passes."""
-        hierarchies = job.resources.hierarchies.of(job.scene)
-        placements, frame = hierarchies.place(job.scene, media_center(job.scene))
-        bodies = job.object_table(placements)
-        stack.callback(bodies.release)
-        assert job.plan.paths is not None
-        values = {
-            "seed": job.plan.paths.seed,
-            "all_closed": all_closed(job.scene),
-            "start_interior": interior_at_eye(job),
-            "object_nodes": hierarchies.object_nodes,
-            "objects_frame": frame,
-            "bodies_radius": bodies_radius(job.scene),
-        }
-        return bodies, hierarchies, values
-
     def _program(self, job: FrameJob) -> moderngl.Program:
         scene, environment = job.scene, job.scene.environment
         media = [body.medium for body in scene.bodies if body.medium is not None]
-        seen_map = environment.seen.kind == "image"
         return self._trace.program(
             FROM_EYE=job.placed.starts_inside,
-            ONE_OBJECT=len(scene.objects) == 1,
-            PRIORITY=scene.overlap == "priority",
-            UNION=scene.overlap == "union",
+            **ray_switches(scene),
             SCATTER=any(medium.scatters for medium in media),
             EMISSION=any(medium.emits for medium in media),
             LIGHTS=bool(scene.lights),
@@ -261,41 +233,22 @@ class PathTracer:
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
             DIMMED=job.features.dims_interfaces,
-            SEEN_MAP=seen_map,
-            SEEN_LIGHTS=seen_map and environment.seen is environment,
+            **seen_switches(environment),
             **coat_switches(scene.objects),
         )
 
-    def _bind(
-        self,
-        job: FrameJob,
-        scene: tuple[moderngl.Texture, SceneHierarchies, dict[str, object]],
-        source: moderngl.Framebuffer,
-    ) -> None:
-        environment, environments = job.scene.environment, job.resources.environments
-        maps = environments.light(environment)
+    def _bind(self, job: FrameJob, traced: dict[str, moderngl.Texture], source: moderngl.Framebuffer) -> None:
+        environment, resources = job.scene.environment, job.resources
         textures = {
             **dict(zip(_STATE, source.color_attachments, strict=True)),
-            "object_table": scene[0],
-            "hierarchy_nodes": scene[1].nodes,
-            "hierarchy_triangles": scene[1].triangles,
-            "light_map": environments.sharp(environment),
-            "light_irradiance": maps.irradiance,
-            "light_levels": maps.levels,
-            "reflectance_table": self._reflectance,
+            **traced,
+            **resources.light_textures(environment),
+            **resources.seen_textures(environment),
         }
-        job.resources.shadows.use(_UNITS)
         if job.features.has_opaque:
-            textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets.opaque().color_attachments
-        if environment.seen.kind == "image":
-            textures["seen_map"] = environments.sharp(environment.seen)
-        for name, texture in textures.items():
-            texture.use(_UNITS[name])
-
-    def _set(self, program: moderngl.Program, values: dict[str, object]) -> None:
-        for name, value in values.items():
-            if name in program:  # each variant uses some of them
-                set_uniform(program, name, value)
+            textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets["opaque"].color_attachments
+        self._trace.bind(**textures)
+        resources.shadows.use(self._trace.units)
 
 
 class PathTracePass:

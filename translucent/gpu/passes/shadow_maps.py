@@ -40,7 +40,7 @@ from translucent.scene.shadow_directions import shadow_directions
 #: Most shares of the directions of the environment where one sample of a pixel may have to do.
 _FEW_SHARES = 16
 
-#: Largest ratio of distances from a lamp that a projected depth buffer resolves: its step at the far end is
+#: Largest ratio of distances from a light that a projected depth buffer resolves: its step at the far end is
 #: 2^-24 far^2 / near, so at most 1e-6 of the distance.
 _FARTHEST = 16.0
 
@@ -118,7 +118,7 @@ class ShadowMapsPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Render those of the maps that the frame reads and that are not there, and write the uniforms.
 
-        Where a window waits, they may take several frames; what is there stays until objects or lights change.
+        For a window they may take several frames; what is there stays until objects or lights change.
         """
         job.resources.photons_carry = bool(job.plan.opaque_to_shadows)
         atlas, scene, count = job.resources.shadows, job.scene, job.scene.environment_shadows
@@ -189,7 +189,7 @@ class ShadowMapsPass:
                 else:
                     self._copy(FrameJob(self._gl, *before), view, center)
             except BaseException:
-                atlas.held = None  # half of a map cannot be told from a whole one
+                atlas.held = None  # half of a map looks like a whole one
                 raise
             atlas.drawn.add(view)
         for key in self._plans.keys() - used:
@@ -266,7 +266,7 @@ def _read(job: FrameJob, views: ShadowViews | None, first: int, step: int) -> li
 
 
 def _resolves(scene: Scene) -> bool:
-    """True if a depth buffer of 24 bits tells what is before what, and nothing is clipped that is before the camera."""
+    """True if a depth buffer of 24 bits resolves the scene, and clips nothing that is before the camera."""
     if scene.camera.fov_y is None:
         return True
     near, far = depth_range(scene.boxes, scene.camera, scene.diagonal)
@@ -307,7 +307,7 @@ def _slots(scene: Scene) -> tuple[tuple[int, ...], list[Medium | None]]:
 
 
 def _has_two_media(plan: RenderPlan) -> bool:
-    """Tell whether paths in two media are all that light goes through."""
+    """True if light goes through two media and no more."""
     names = {step.name for step in plan.passes}
     return PassName.SIGNED_DEPTH in names and names.issubset(_SUMS) and len(_slots(plan.scene)[1]) == 2
 

@@ -11,7 +11,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import build_program, set_uniform
-from translucent.gpu.targets import Targets
+from translucent.gpu.targets import Targets, add_up
 from translucent.planning.passes import PassName, PassSpec
 
 
@@ -124,7 +124,7 @@ class HalfFloatPass:
     with_depth = False
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", opaque_axial_depth=0)
+        self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", "opaque_axial_depth")
         self._halves: WeakKeyDictionary[Targets, dict[bool, list[moderngl.Framebuffer]]] = WeakKeyDictionary()
         self._wholes: WeakKeyDictionary[Targets, dict[bool, list[moderngl.Framebuffer]]] = WeakKeyDictionary()
 
@@ -134,9 +134,7 @@ class HalfFloatPass:
         half.use()
         half.clear()
         gl = job.gl
-        gl.enable_only(moderngl.BLEND)
-        gl.blend_equation = moderngl.FUNC_ADD
-        gl.blend_func = moderngl.ONE, moderngl.ONE
+        add_up(gl)
         job.draw(
             self._variants.program(WITH_NORMAL=0, WITH_POSITION=0, SPECTRAL=job.plan.spectral, OPAQUE=0), _bodies(job)
         )

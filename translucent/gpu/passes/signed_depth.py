@@ -13,8 +13,8 @@ class SignedDepthPass:
     """Sum of sign * distance, and of sign, over all faces; see ``shaders/thickness/signed_depth.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", opaque_axial_depth=0)
-        self._paths = Variants(gl, "geometry/body.vert", "thickness/signed_path.frag", opaque_axial_depth=0)
+        self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", "opaque_axial_depth")
+        self._paths = Variants(gl, "geometry/body.vert", "thickness/signed_path.frag", "opaque_axial_depth")
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies."""

@@ -18,9 +18,9 @@ class ThinLayerPass:
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
-        units = {"opaque_axial_depth": 0, "color_texture": 1}
-        self._variants = Variants(gl, "geometry/body.vert", "thickness/thin_layer.frag", **units)
-        self._with_holes = Variants(gl, "geometry/holes.vert", "thickness/thin_layer.frag", **units)
+        samplers = "opaque_axial_depth", "color_texture"
+        self._variants = Variants(gl, "geometry/body.vert", "thickness/thin_layer.frag", *samplers)
+        self._with_holes = Variants(gl, "geometry/holes.vert", "thickness/thin_layer.frag", *samplers)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the sheets."""

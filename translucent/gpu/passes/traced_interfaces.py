@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
@@ -10,14 +11,12 @@ import numpy as np
 
 from translucent.formulas.footprint import FOOTPRINT_STEP
 from translucent.gpu.context import require_interfaces
-from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
-from translucent.gpu.passes.variants import Variants, coat_switches
+from translucent.gpu.passes.variants import Variants, coat_switches, seen_switches
 from translucent.gpu.placement import extents, part_of
-from translucent.gpu.shaders import set_uniform
-from translucent.gpu.textures import reflectance_table
+from translucent.gpu.shaders import set_used
 from translucent.gpu.uniforms import media_center
 from translucent.planning.mirrors import Mirror, ground_of, mirror_of
 from translucent.planning.passes import PassSpec
@@ -45,8 +44,9 @@ _SAMPLERS = (
     "shadow_ends",
 )
 _ENTERED = ("entered", "surface_parameters", "surface_color")
-_UNITS = {name: unit for unit, name in enumerate(_SAMPLERS)}
 
+#: Samplers of ``shaders/transport/hierarchy.glsl``, and of the table of objects.
+RAY_SAMPLERS = ("object_table", "hierarchy_nodes", "hierarchy_triangles")
 
 #: Share of a ray's light below which it is not followed, with two forks or fewer.
 FAINTEST_SHARE = 1.2e-2
@@ -62,11 +62,10 @@ class TracedInterfacesPass:
     """Tree of reflected and refracted rays; see ``shaders/transport/traced_interfaces.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._variants = Variants(gl, "geometry/fullscreen.vert", "transport/traced_interfaces.frag", **_UNITS)
-        self._reflectance = reflectance_table(gl)
+        self._variants = Variants(gl, "geometry/fullscreen.vert", "transport/traced_interfaces.frag", *_SAMPLERS)
         self._no_interface = NoInterface(gl)
         self._where_unsettled = Variants(
-            gl, "geometry/fullscreen.vert", "transport/where_unsettled.frag", entered=0, unsettled=1
+            gl, "geometry/fullscreen.vert", "transport/where_unsettled.frag", "entered", "unsettled"
         )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
@@ -74,9 +73,9 @@ class TracedInterfacesPass:
         gl = job.gl
         require_interfaces(gl.info)
         sums = job.sums_after(spec.name)
-        framebuffer = job.targets.average() if sums else job.targets.surfaced()
+        framebuffer = job.targets["average"] if sums else job.targets["surfaced"]
         if job.bending:
-            framebuffer = job.targets.bent()
+            framebuffer = job.targets["bent"]
         blending = moderngl.BLEND if sums else moderngl.NOTHING
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
@@ -90,14 +89,9 @@ class TracedInterfacesPass:
                 self._no_interface.draw(job, framebuffer, blending)
             if not job.covered or (job.bent_apart and not job.bending and mirror is None):
                 return
-        hierarchies = job.resources.hierarchies.of(job.scene)
-        placements, frame = hierarchies.place(job.scene, media_center(job.scene))
-        diffused = job.diffused_light
-        table = job.object_table(placements)
-        self._bind(job, hierarchies, table)
-        if diffused is not None:
-            diffused.texture.use(_UNITS["diffused_light"])
-        job.resources.shadows.use(_UNITS)
+        stack = ExitStack()
+        textures, scene_values = traced_scene(job, stack)
+        self._bind(job, textures)
         program = self._program(job, mirror=mirror is not None)
         depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
         values = {
@@ -105,17 +99,13 @@ class TracedInterfacesPass:
             "adaptive": int(job.bending),
             "faintest_share": faintest_share(forks),
             "most_interfaces": depth,
-            "all_closed": all_closed(job.scene),
-            "start_interior": record,
             "sample_number": job.sample,
             "blurred_share": blurred_share(job.samples),
-            "object_nodes": hierarchies.object_nodes,
-            "objects_frame": frame,
-            "bodies_radius": bodies_radius(job.scene),
+            **scene_values,
             **_ground(job.scene),
             **_footprint(job),
         }
-        _set(program, values)
+        set_used(program, values)
         if mirror is not None and not any(record):
             # What is drawn next finds zeros. Software rasterizers compile a program again for every other state.
             gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
@@ -124,12 +114,12 @@ class TracedInterfacesPass:
         if mirror is not None and not job.bending:
             self._draw_mirrored(job, mirror, framebuffer, program)
         gl.enable_only(blending)
-        table.release()
+        stack.close()
 
     def _mark_unsettled(self, job: FrameJob, framebuffer: moderngl.Framebuffer) -> None:
         """Leave a depth test that passes where an interface is seen in a pixel that needs more samples."""
-        job.targets.entered().color_attachments[0].use(0)
-        job.targets.unsettled().color_attachments[0].use(1)
+        entered, unsettled = (t.color_attachments[0] for t in (job.targets["entered"], job.targets["unsettled"]))
+        self._where_unsettled.bind(entered=entered, unsettled=unsettled)
         job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         job.gl.depth_func = "1"
         self._where_unsettled.draw_covered(job, self._where_unsettled.program(), framebuffer, top_first=True)
@@ -142,8 +132,8 @@ class TracedInterfacesPass:
         surface = mirror.ground.surface
         assert surface is not None
         height = mirror.height - float(mirror.normal @ media_center(job.scene))
-        finish = surface.roughness, surface.ior
-        _set(program, {"mirrored": 1, "mirror_plane": (*mirror.normal, height), "mirror_surface": finish})
+        mirroring = surface.roughness, surface.ior
+        set_used(program, {"mirrored": 1, "mirror_plane": (*mirror.normal, height), "mirror_surface": mirroring})
         twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
         width, rows = job.targets.size
         boxes, radii = np.array([twin.bounds for twin in twins]), np.array([twin.radius for twin in twins])
@@ -163,14 +153,11 @@ class TracedInterfacesPass:
     def _program(self, job: FrameJob, *, mirror: bool) -> moderngl.Program:
         scene, environment = job.scene, job.scene.environment
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
-        seen_map = environment.seen.kind == "image"
         rough = any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces)
         return self._variants.program(
             FORKS=job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
             FROM_EYE=job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
-            ONE_OBJECT=len(scene.objects) == 1,
-            PRIORITY=scene.overlap == "priority",
-            UNION=scene.overlap == "union",
+            **ray_switches(scene),
             EMISSION=job.features.emits and not job.features.scatters,
             LAYERED=any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
             DIFFUSED=job.diffused_light is not None,
@@ -182,41 +169,28 @@ class TracedInterfacesPass:
             **interface_shadow_switches(job),
             DIMMED=job.features.dims_interfaces,
             DIFFUSE_BASE=any(s.transmission < 1 or s.transmission_texture is not None for s in surfaces),
-            SEEN_MAP=seen_map,
-            SEEN_LIGHTS=seen_map and environment.seen is environment,
+            **seen_switches(environment),
             SINGLE_SCATTERING=job.features.scatters,
             FOOTPRINTS=environment.kind == "image",
             **coat_switches(scene.objects),
         )
 
-    def _bind(
-        self,
-        job: FrameJob,
-        hierarchies: SceneHierarchies,
-        table: moderngl.Texture,
-    ) -> None:
-        environment = job.scene.environment
-        environments = job.resources.environments
-        emitted, through, *_ = job.targets.result().color_attachments
-        maps = environments.light(environment)
+    def _bind(self, job: FrameJob, traced: dict[str, moderngl.Texture]) -> None:
+        emitted, through, *_ = job.targets["result"].color_attachments
+        entered = dict(zip(_ENTERED, job.targets["entered"].color_attachments, strict=True))
+        environment, resources = job.scene.environment, job.resources
         textures = {
-            "emitted_radiance_sum": emitted,
-            "straight_transmittance": through,
-            **dict(zip(_ENTERED, job.targets.entered().color_attachments, strict=True)),
-            "object_table": table,
-            "hierarchy_nodes": hierarchies.nodes,
-            "hierarchy_triangles": hierarchies.triangles,
-            "reflectance_table": self._reflectance,
-            "light_map": environments.sharp(environment),
-            "light_levels": maps.levels,
-            "light_irradiance": maps.irradiance,
+            **entered,
+            **traced,
+            **resources.light_textures(environment),
+            **resources.seen_textures(environment),
         }
         if job.features.has_opaque:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = blurred_opaque(job)
-        if environment.seen.kind == "image":
-            textures["seen_map"] = environments.sharp(environment.seen)
-        for name, texture in textures.items():
-            texture.use(_UNITS[name])
+        if job.diffused_light is not None:
+            textures["diffused_light"] = job.diffused_light.texture
+        self._variants.bind(emitted_radiance_sum=emitted, straight_transmittance=through, **textures)
+        resources.shadows.use(self._variants.units)
 
 
 def _footprint(job: FrameJob) -> dict[str, float]:
@@ -230,12 +204,6 @@ def _ground(scene: Scene) -> dict[str, Any]:
         return {"ground_object": -1}
     height = ground.height - float(ground.normal @ media_center(scene))
     return {"ground_object": scene.objects.index(ground.ground), "ground_plane": (*ground.normal, height)}
-
-
-def _set(program: moderngl.Program, values: dict[str, Any]) -> None:
-    for name, value in values.items():
-        if name in program:
-            set_uniform(program, name, value)
 
 
 def faintest_share(forks: int) -> float:
@@ -254,15 +222,33 @@ def blurred_share(samples: int) -> float:
     return 1.0 if samples < FEW_SAMPLES else float(samples**-0.15)
 
 
-def all_closed(scene: Scene) -> bool:
-    """True if rays can leave each solid only through its surface."""
-    return all(body.mesh.diagnosis.sound for body in scene.bodies if body.sheet_thickness is None)
-
-
-def bodies_radius(scene: Scene) -> float:
-    """Metres from the center of the media within which all bodies are."""
+def traced_scene(job: FrameJob, stack: ExitStack) -> tuple[dict[str, moderngl.Texture], dict[str, Any]]:
+    """Textures by which rays find what they hit in the scene of a job, and loose uniforms; released with the stack."""
+    scene, center = job.scene, media_center(job.scene)
+    hierarchies = job.resources.hierarchies.of(scene)
+    placements, frame = hierarchies.place(scene, center)
+    table = job.object_table(placements)
+    stack.callback(table.release)
     boxes = scene.boxes[scene.filled]
-    return 0.5 * float(np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)))
+    values = {
+        # Rays can leave each solid only through its surface.
+        "all_closed": all(body.mesh.diagnosis.sound for body in scene.bodies if body.sheet_thickness is None),
+        "start_interior": interior_at_eye(job),
+        "object_nodes": hierarchies.object_nodes,
+        "objects_frame": frame,
+        # Metres from the center of the media within which all bodies are.
+        "bodies_radius": 0.5 * float(np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0))),
+    }
+    return dict(zip(RAY_SAMPLERS, (table, hierarchies.nodes, hierarchies.triangles), strict=True)), values
+
+
+def ray_switches(scene: Scene) -> dict[str, bool]:
+    """Switches of the shaders that follow rays through a scene: how bodies overlap, and whether there is one object."""
+    return {
+        "ONE_OBJECT": len(scene.objects) == 1,
+        "PRIORITY": scene.overlap == "priority",
+        "UNION": scene.overlap == "union",
+    }
 
 
 def interior_at_eye(job: FrameJob) -> tuple[int, int, int, int]:

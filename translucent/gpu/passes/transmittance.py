@@ -11,7 +11,8 @@ import numpy.typing as npt
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
-from translucent.gpu.shaders import set_uniform
+from translucent.gpu.shaders import set_uniform, set_used
+from translucent.gpu.targets import add_up
 from translucent.gpu.uniforms import bounded_extinction, view_span
 from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Scene
@@ -41,36 +42,33 @@ class TransmittancePass:
     """Beer-Lambert transmittance over the background, per pixel; see ``shaders/shade/transmittance.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        units = {name: unit for unit, name in enumerate(_SAMPLERS)}
-        self._variants = Variants(gl, "shade/transmittance.vert", "shade/transmittance.frag", **units)
+        self._variants = Variants(gl, "shade/transmittance.vert", "shade/transmittance.frag", *_SAMPLERS)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Shade the frame from its accumulated paths; for a job of several samples, add a sample's radiance and
         transmittance instead.
         """
-        gl, features = job.gl, job.features
-        seen = job.scene.environment.seen
-        seen_map = seen.kind == "image" and not features.has_surfaces
-        if seen_map:
-            job.resources.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
+        features = job.features
+        seen = {} if features.has_surfaces else job.resources.seen_textures(job.scene.environment)
+        self._variants.bind(**seen)
         sums = job.sums_after(spec.name)
-        into = job.targets.average() if sums else job.compact_result if job.compact else job.targets.result()
+        into = job.targets["average"] if sums else job.compact_result if job.compact else job.targets["result"]
         into.use()
         if sums:
-            gl.enable_only(moderngl.BLEND)
-            gl.blend_equation = moderngl.FUNC_ADD
-            gl.blend_func = moderngl.ONE, moderngl.ONE
+            add_up(job.gl)
         else:
-            gl.enable_only(moderngl.NOTHING)
+            job.gl.enable_only(moderngl.NOTHING)
         paths = self._bind_paths(job)
         switches = {
             "MAP": False,
             "AVERAGE": sums,
             "COMPACT": job.compact and not sums,
             "SURFACES": features.has_surfaces,
-            "SEEN_MAP": seen_map,
+            "SEEN_MAP": bool(seen),
             # Where others look at the targets, they may change the environment, too.
-            "SEEN_KIND": 1 + int(CONSTANTS[f"ENVIRONMENT_{seen.kind.upper()}"]) if job.compact else 0,
+            "SEEN_KIND": 1 + int(CONSTANTS[f"ENVIRONMENT_{job.scene.environment.seen.kind.upper()}"])
+            if job.compact
+            else 0,
             "OPAQUE": features.has_opaque,
         }
         program = self._variants.program(**switches, **paths)
@@ -113,9 +111,7 @@ class TransmittancePass:
         if job.media_apart is not None:
             values["media_extinction"] = _extinctions(job.scene, job.media_apart)
         for program in programs:
-            for name, value in values.items():
-                if name in program:
-                    set_uniform(program, name, value)
+            set_used(program, values)
 
     def _bind_paths(self, job: FrameJob) -> dict[str, bool | int]:
         """Bind what passes before have found, and the switches that say what that is."""
@@ -124,16 +120,16 @@ class TransmittancePass:
             "accumulated": job.accumulator() if features.accumulates and apart is None else None,
             "fallback": job.accumulator("fallback") if features.has_fallback else None,
             "unlit": job.accumulator("unlit") if features.has_unlit else None,
-            "ordered_depth": job.targets.ordered() if plan.ordered else None,
-            "opaque_axial_depth": job.targets.opaque() if features.has_opaque else None,
+            "ordered_depth": job.targets["ordered"] if plan.ordered else None,
+            "opaque_axial_depth": job.targets["opaque"] if features.has_opaque else None,
         }
         for first, framebuffer in inputs.items():
             if framebuffer is not None:
-                for unit, texture in enumerate(framebuffer.color_attachments, _SAMPLERS.index(first)):
+                for unit, texture in enumerate(framebuffer.color_attachments, self._variants.units[first]):
                     texture.use(unit)
         if apart is not None:
             for name, framebuffer in zip(_APART, job.accumulators_apart, strict=False):
-                framebuffer.color_attachments[0].use(_SAMPLERS.index(name))
+                self._variants.bind(**{name: framebuffer.color_attachments[0]})
         return {
             "SPECTRAL": plan.spectral if apart is None else int(apart.max()) + 1,
             "FALLBACK": features.has_fallback,

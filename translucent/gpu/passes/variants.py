@@ -12,6 +12,8 @@ from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
 from translucent.gpu.placement import Part
 from translucent.gpu.shaders import before_making, build_program
+from translucent.gpu.textures import AnyTexture
+from translucent.scene.environment import Environment
 from translucent.scene.scene import Object
 
 
@@ -23,35 +25,47 @@ class Variants:
     gl : moderngl.Context
     vertex, fragment : str
         Files under ``shaders/``.
+    samplers : str
+        Names of the samplers; each has its place among them for its texture unit.
     version : int
         Of GLSL.
-    samplers : int
+
+    Attributes
+    ----------
+    units : dict of str to int
         Texture unit of each sampler.
     """
 
-    def __init__(self, gl: moderngl.Context, vertex: str, fragment: str, version: int = 330, **samplers: int) -> None:
+    def __init__(self, gl: moderngl.Context, vertex: str, fragment: str, *samplers: str, version: int = 330) -> None:
         self._gl = gl
         self._files = vertex, fragment
         self._version = version
-        self._samplers = samplers
+        self.units = {name: unit for unit, name in enumerate(samplers)}
         self._programs: dict[tuple[tuple[str, int], ...], moderngl.Program] = {}
-        self._fullscreen: dict[int, moderngl.VertexArray] = {}
+        self._arrays: dict[int, moderngl.VertexArray] = {}
 
     def program(self, **switches: bool | int) -> moderngl.Program:
         """The program with these switches; raises `PostponedError` if the context's compile budget is spent."""
         key = tuple(sorted((name, int(value)) for name, value in switches.items()))
         if key not in self._programs:
             before_making(self._gl, (self._files, key))
-            made = build_program(self._gl, *self._files, dict(key), self._version, **self._samplers)
+            made = build_program(self._gl, *self._files, dict(key), self._version, **self.units)
             made.extra = self._files, key
             self._programs[key] = made
         return self._programs[key]
 
+    def bind(self, **textures: AnyTexture) -> None:
+        """Bind textures to the units of the samplers of these names."""
+        for name, texture in textures.items():
+            texture.use(self.units[name])
+
     def draw_fullscreen(self, program: moderngl.Program) -> None:
         """Run one of the programs for every pixel of the current framebuffer."""
-        if program.glo not in self._fullscreen:
-            self._fullscreen[program.glo] = self._gl.vertex_array(program, [])
-        self._fullscreen[program.glo].render(moderngl.TRIANGLES, vertices=3)
+        self._vertices(program).render(moderngl.TRIANGLES, vertices=3)
+
+    def draw_points(self, program: moderngl.Program, count: int) -> None:
+        """Draw so many points without attributes by one of the programs."""
+        self._vertices(program).render(moderngl.POINTS, vertices=count)
 
     def draw_covered(
         self,
@@ -95,6 +109,12 @@ class Variants:
         part = job.covered.flipped(job.targets.size[1]) if top_first else job.covered
         self._draw_parts(program, framebuffer, part.rest(job.targets.size))
 
+    def _vertices(self, program: moderngl.Program) -> moderngl.VertexArray:
+        """Vertices without attributes."""
+        if program.glo not in self._arrays:
+            self._arrays[program.glo] = self._gl.vertex_array(program, [])
+        return self._arrays[program.glo]
+
     def _draw_parts(
         self, program: moderngl.Program, framebuffer: moderngl.Framebuffer, parts: tuple[Part, ...]
     ) -> None:
@@ -129,6 +149,12 @@ def look_switches(body: Object) -> dict[str, bool]:
     """Switches of ``geometry/interface.vert`` and ``shade/surface_textures.glsl``: features that few objects have."""
     occluded = body.surface is not None and body.surface.occlusion_texture is not None
     return {"VERTEX_COLORS": body.mesh.colors is not None, "OCCLUSION": occluded}
+
+
+def seen_switches(environment: Environment) -> dict[str, bool]:
+    """Switches of shaders in which rays end at the environment: whether it is a picture, and the one that lights."""
+    seen_map = environment.seen.kind == "image"
+    return {"SEEN_MAP": seen_map, "SEEN_LIGHTS": seen_map and environment.seen is environment}
 
 
 def coat_switches(objects: Iterable[Object]) -> dict[str, bool]:

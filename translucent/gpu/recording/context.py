@@ -282,7 +282,7 @@ _TRIANGLE_ROW = "uniform int hierarchy_triangle_row;"
 
 
 def _declares(text: str, sampler: str) -> bool:
-    """Tell whether a shader declares a sampler."""
+    """True if a shader declares a sampler."""
     return re.search(rf"^uniform u?sampler2D {sampler};", text, re.MULTILINE) is not None
 
 

@@ -78,7 +78,7 @@ class FrameRecorder:
     most_layers : int
         Crossings of a ray that depth peeling is to find.
     texture_units : int
-        As the planner was told.
+        Textures that one shader can read, as the planner knows it.
     """
 
     def __init__(self, samples: int, most_layers: int, texture_units: int) -> None:
@@ -112,8 +112,8 @@ class FrameRecorder:
         job.place(tuple(sample_shifts(self._samples)[0]))
         again: list[dict[str, Any]] = []
         self._run(job, again, frame.averaged)
-        result, picture = self._targets.result(), job.picture
-        average = self._targets.average()
+        result, picture = self._targets["result"], job.picture
+        average = self._targets["average"]
         found = {
             "radiance": picture.color_attachments[0],
             "transmittance": result.color_attachments[1],
@@ -126,7 +126,7 @@ class FrameRecorder:
         if job.features.accumulates:
             found["count"] = job.accumulator().color_attachments[0]
         if plan.ordered:
-            found["layers"] = self._targets.ordered().color_attachments[2]
+            found["layers"] = self._targets["ordered"].color_attachments[2]
         if job.features.has_surfaces:
             found["sound"] = picture.color_attachments[1]
         frame.targets = {name: self.gl.number_of_texture(cast(Any, texture)) for name, texture in found.items()}
