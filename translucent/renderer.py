@@ -20,7 +20,7 @@ from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.job import TextureBackdrop
 from translucent.gpu.renderer import GpuRenderer
 from translucent.planning.caustics import Caustics
-from translucent.planning.interfaces import Interfaces
+from translucent.planning.interfaces import InterfaceMode
 from translucent.planning.methods import Method
 from translucent.planning.passes import NoteKind
 from translucent.planning.plan import plan_scene
@@ -116,7 +116,7 @@ class Renderer:
         method: Method | None = None,
         *,
         over_backdrop: bool = False,
-        interfaces: Interfaces | None = None,
+        interfaces: InterfaceMode | None = None,
         scattering: Scattering | None = None,
         caustics: Caustics | None = None,
         shadows: ShadowMaps | None = None,
@@ -143,7 +143,7 @@ class Renderer:
         backdrop: Backdrop | TextureBackdrop | None = None,
         *,
         transparent: bool = False,
-        interfaces: Interfaces | None = None,
+        interfaces: InterfaceMode | None = None,
         scattering: Scattering | None = None,
         caustics: Caustics | None = None,
         shadows: ShadowMaps | None = None,
@@ -276,7 +276,7 @@ class Renderer:
         exposure: float = 0.0,
         tone: str = "none",
         *,
-        interfaces: Interfaces | None = None,
+        interfaces: InterfaceMode | None = None,
         scattering: Scattering | None = None,
         shadows: ShadowMaps | None = None,
     ) -> RenderPlan:

@@ -1,5 +1,5 @@
 // Begins a pass of depth peeling: nothing is found yet, blue keeps how many faces are left, and depth keeps the pass out
-// of pixels of which everything is known.
+// of pixels in which everything is known.
 
 #include <constants>
 #include "intervals/crossing.glsl"

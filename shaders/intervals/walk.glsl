@@ -22,7 +22,7 @@ struct Walk {
     vec3 optical_depth;
     vec3 emitted;            // radiance: towards the start for a walk that goes on, from the end for one that comes back
     float thickness;
-    float inside_out;        // metres with a negative winding number, beyond those that silhouettes explain
+    float inside_out;        // metres with a negative winding number, beyond what silhouettes explain
 };
 
 struct Contents {

@@ -1,4 +1,4 @@
-// Light in nine real spherical harmonics, and what a body gives back of it: all that reads `translucent bake --mode scatter`.
+// Light in nine real spherical harmonics, and the subsurface radiance of a body in it: all that reads `translucent bake --mode scatter`.
 // Pure. Coefficient i = l (l + 1) + m; radiance in W/(m^2 sr). Each function is the float32 twin of the same name in
 // translucent/formulas/spherical_harmonics.py, where the sources are cited.
 
@@ -12,7 +12,7 @@ float[9] real_harmonics(vec3 direction) {
                     HARMONIC_2_ZONAL * (3.0 * z * z - 1.0), HARMONIC_2 * x * z, 0.5 * HARMONIC_2 * (x * x - y * y));
 }
 
-// Mean radiance that a point of a body gives back. transfer: as baked there; light: coefficients of the radiance that
+// Mean subsurface radiance of a point of a body. transfer: as baked there; light: coefficients of the radiance that
 // arrives from each direction, in the frame of the object.
 vec3 scattered_radiance(vec3 transfer[9], vec3 light[9]) {
     vec3 found = vec3(0.0);

@@ -1,6 +1,6 @@
 // What the previewer shows: a picture or a quantity, and right of a split the same of another frame, or their
-// difference. A frame is kept as stride x stride smaller ones, each of every so many pixels; those that are not yet
-// drawn are stood in for by a neighbor. The second frame may be smaller; its pixels are then as large as they are.
+// difference. A frame is kept as stride x stride smaller ones, each of every so many pixels; a neighbor
+// shows in place of a pixel that is not drawn yet. The second frame may be smaller; its pixels are then as large as they are.
 // MODE: 0 picture, 1 thickness, 2 transmittance, 3 validity. RIGHT: 0 the same frame, 1 the second, 2 the first minus
 // the second.
 

@@ -1,5 +1,5 @@
 // Light that reaches a point of an opaque surface through everything on the straight way, or an interface past what is opaque: a
-// lookup in maps of paths to the first opaque surface on each ray of a light. Transmittance is interpolated between four texels, each of which counts only if the surface, made
+// lookup in maps of paths to the first opaque surface on each ray of a light. Transmittance is interpolated between four texels, and a texel counts only if the surface, made
 // flat, is not behind what is opaque there (receiver plane, Isidoro 2006): so no surface shadows itself, however it is inclined.
 // Needs <constants>. Points count from the center of the media; normals are unit vectors.
 

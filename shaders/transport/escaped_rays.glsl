@@ -51,7 +51,7 @@ bool opaque_in_picture(EscapedRay end, out vec3 light) {
     }
 #endif
     vec4 found = texelFetch(opaque_radiance, texel, 0);
-    light = adaptive == 1 ? found.rgb / max(found.a, 1e-3) : found.rgb;  // the mean of samples some of which may pass it
+    light = adaptive == 1 ? found.rgb / max(found.a, 1e-3) : found.rgb;  // the mean of samples, some may pass it
     return true;
 }
 #endif

@@ -3,10 +3,9 @@
 // Needs <constants>, lib/interface.glsl, hierarchy.glsl, interaction.glsl and environment_light.glsl. FOOTPRINTS.
 
 #if FOOTPRINTS
-uniform float pixel_step;  // in pixels: what a sample stands for
+uniform float pixel_step;  // width of a sample in pixels
 
-// Differentials of a ray's point and direction by a step to the right and one down in the picture, as large as what a sample
-// stands for.
+// Differentials of a ray's point and direction by a step to the right and one down in the picture, as large as a sample.
 struct Footprint {
     mat2x3 point;
     mat2x3 direction;

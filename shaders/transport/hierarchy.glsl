@@ -50,7 +50,7 @@ LocalRay local_ray(vec3 origin, vec3 direction) {
     return LocalRay(origin, (origin + 1.0) * HIERARCHY_STEPS, inverse / HIERARCHY_STEPS);
 }
 
-// Which of the eight orders of nodes a ray goes through: those that it comes to first are first, and so are their bounds.
+// Order of nodes, one of eight, for the octant of a ray: nearer nodes come first, and so do their bounds.
 int octant_of(vec3 direction) {
     return (direction.x < 0.0 ? 1 : 0) + (direction.y < 0.0 ? 2 : 0) + (direction.z < 0.0 ? 4 : 0);
 }

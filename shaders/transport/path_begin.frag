@@ -1,4 +1,4 @@
-// States of paths, before any is followed: what is known of those that have ended, and how many these are.
+// States of paths, before any is followed: the mean over the paths that have ended, and their number.
 
 uniform sampler2D known_mean;
 uniform sampler2D known_spread;

@@ -126,7 +126,7 @@ vec4 chosen_phase(uvec4 interior, int effective, vec3 scattering, vec3 carried, 
 #endif
 }
 
-// Ends paths that carry little, or lets them carry more for those that end (Arvo & Kirk 1990).
+// Ends paths that carry little, or lets them carry more in place of the ended ones (Arvo & Kirk 1990).
 void play_roulette(inout Path path, float share) {
     float chance = min(largest_of(path.throughput) / ROULETTE, 1.0);
     if (path.depth > MANY_INTERFACES) { chance = min(chance, GOES_ON); }

@@ -23,7 +23,7 @@ uvec4 pcg4d(uvec4 v) {
     return v;
 }
 
-// Four numbers between 0 and 1, neither of which is ever drawn.
+// Four numbers between 0 and 1, both excluded.
 vec4 random_shares(inout Draws draws) {
     uvec4 bits = pcg4d(uvec4(draws.pixel, draws.path, draws.count, seed));
     ++draws.count;

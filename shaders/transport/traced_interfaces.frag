@@ -1,7 +1,7 @@
 // Rays traced through the meshes wherever interfaces reflect and refract them: a tree of exact branches. The stronger branch is
 // always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked up in the environment;
-// so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first interface is that
-// which the rasterizer has found. adaptive: of several samples of a pixel, those that are worth it; with the square of their
+// so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The rasterizer has found the
+// first interface. adaptive: only samples of a pixel that are worth it; with the square of their
 // luminance in place of the transmittance. ROUGH: some body is. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
 
 #include <constants>
@@ -68,7 +68,7 @@ struct PrimaryHit {
     Surface surface;
 };
 
-// Rays still to follow, and rays of which it is not known yet what they see: a step ends two at most.
+// Rays still to follow, and rays whose ends are not known yet: a step ends two at most.
 #if FORKS > 0
 Ray stack[MOST_STACKED];
 #else

@@ -53,7 +53,7 @@ vec4 scattered_here(float turns[SLOTS], int light, ViewRay ray, float s, out vec
     return vec4(arriving.irradiance * scattering_phase(turns, dot(arriving.towards, ray.direction)), depth.a);
 }
 
-// Between which distances, within metres, a ray is in a cone, of which rest is 1 - cos of the half angle: cones are convex, and
+// Between which distances, within metres, a ray is in a cone; rest is 1 - cos of its half angle. Cones are convex, and
 // their edges are where (sin * along the axis)^2 = (cos * across)^2.
 vec2 cone_part(vec3 from_light, vec3 direction, vec3 axis, float rest, float metres) {
     vec2 along = vec2(dot(direction, axis), dot(from_light, axis));
@@ -79,7 +79,7 @@ vec2 cone_part(vec3 from_light, vec3 direction, vec3 axis, float rest, float met
     return clamp(ends, 0.0, metres);
 }
 
-// Ends of the three parts of a segment, of which some are empty, in which a light shines smoothly: a spot between its outer
+// Ends of the three parts of a segment, some empty, in which a light shines smoothly: a spot between its outer
 // and inner cone, in the inner one, and behind.
 vec4 lit_parts(int light, ViewRay ray, float metres) {
     vec4 cone = light_cone[light];

@@ -54,7 +54,7 @@ def test_a_frame_shows_its_picture_and_its_thickness_with_a_scale(scene: tl.Scen
     covered = f"{frame.coverage.mean():.0%}"
     most = f"{1000 * frame.thickness.max():.3g} mm at most"
     for alt in (said, lengths, data["text/html"]):
-        assert f"48 x 36 pixels, of which media cover {covered}" in alt
+        assert f"48 x 36 pixels; media cover {covered}" in alt
         assert most in alt
     assert base64.b64decode(data["image/png"]) == frame._repr_png_()
     assert metadata["image/png"]["alt"] == said

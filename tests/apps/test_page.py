@@ -159,7 +159,7 @@ def test_peeled_pages_tell_one_number_of_surfaces(method: tl.DepthPeeling | None
     (told,) = [str(note) for note in planned.notes if note.kind is NoteKind.LAYER_LIMIT]
     assert str(most) in told
     assert planned.most_layers == most
-    assert ("asked for" in planned.plan.passes[0].reason) == (method is not None)
+    assert ("requested" in planned.plan.passes[0].reason) == (method is not None)
 
 
 def test_a_poster_is_a_picture(run: Run, cube: Path, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ def test_a_picture_of_paths_with_its_noise(run: Run, tmp_path: Path) -> None:
 def test_the_plan_of_paths_is_explained(run: Run) -> None:
     done = run("explain", *JADE[:5], "--paths", 8)
     assert done.code == 0
-    assert "path_trace: asked for: 8 random paths for each pixel" in done.out
+    assert "path_trace: requested: 8 random paths for each pixel" in done.out
     assert "limit: radiance is a mean over 8 random paths: it has noise" in done.out
 
 

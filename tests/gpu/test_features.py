@@ -9,7 +9,7 @@ import translucent as tl
 from tests.values.plan_scenes import DIAMOND, EMBER, FIRE, GLASS, MILK, NO_STORAGE, OPEN, WINE, body, scene, sheet
 from translucent.gpu.features import FrameFeatures
 from translucent.planning.assembly import FALLBACK_SHEET
-from translucent.planning.interfaces import Interfaces
+from translucent.planning.interfaces import InterfaceMode
 from translucent.planning.methods import Method
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
@@ -40,7 +40,7 @@ def features(
     found: tl.Scene,
     method: Method | None = None,
     capabilities: Capabilities | None = None,
-    interfaces: Interfaces | None = None,
+    interfaces: InterfaceMode | None = None,
 ) -> FrameFeatures:
     return FrameFeatures(plan(found, method, capabilities or Capabilities(), interfaces=interfaces))
 

@@ -13,7 +13,7 @@ from PIL import Image
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.geometry.solids import Box, Sphere
-from translucent.gpu.refinement import PhotonLight
+from translucent.gpu.refinement import PhotonPicture
 from translucent.gpu.viewport import Viewport
 from translucent.planning import caustics
 from translucent.planning.rendered import Treatment
@@ -46,7 +46,7 @@ def test_rounds_add_up_to_the_photons_of_one_frame(view: ViewportRenderer) -> No
     with view.current():
         viewport = Viewport(view.renderer.gpu)
         viewport.resize(SIZE)
-        light = PhotonLight(view.renderer.gpu, plan, viewport.size)
+        light = PhotonPicture(view.renderer.gpu, plan, viewport.size)
         errors, lights = [], []
         for rounds in (4, 8, 16):
             while light.rounds < rounds:

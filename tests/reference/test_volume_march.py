@@ -156,7 +156,10 @@ def test_schemes_agree(scheme: str, quadrature: Any, aligned: bool) -> None:
 
 def test_an_opaque_layer_hides_what_is_behind(rng: np.random.Generator) -> None:
     color, depth = rng.random((2, 5, 3))
-    front, back = compositing.Layer(color, depth), compositing.Layer(rng.random((5, 3)), np.full((5, 3), np.inf))
+    front, back = (
+        compositing.ColorLayer(color, depth),
+        compositing.ColorLayer(rng.random((5, 3)), np.full((5, 3), np.inf)),
+    )
     both = compositing.over(front, back)
     np.testing.assert_allclose(both.color, color + np.exp(-depth) * back.color, rtol=1e-15)
     assert (both.opacity == 1).all()

@@ -169,7 +169,7 @@ def test_a_match_shows_what_was_asked_for_and_what_is_found() -> None:
     match = distance_for_color((3.0, 1.0, 0.0), (0.5, 0.6, 0.7))
     assert match.color == (0.5, 0.6, 0.7)
     found = color_at_distance((3.0, 1.0, 0.0), match.distance)
-    assert f"asked for<br>{to_hex((0.5, 0.6, 0.7))}" in html
+    assert f"requested<br>{to_hex((0.5, 0.6, 0.7))}" in html
     assert f"after {1e3 * match.distance:.3g} mm<br>{to_hex(found)}" in html
 
 

@@ -28,7 +28,7 @@ def test_a_method_has_a_name(name: str) -> None:
 def test_a_method_is_whole(method: type[Method]) -> None:
     """It has a cost, passes of its own with reasons, and a row in the report; the README tells of it."""
     default, scene = method(), SCENES["convex"]
-    found = default.passes(scene, "asked for")
+    found = default.passes(scene, "requested")
     assert method.cost > 0
     assert found
     assert all(step.reason and step.objects and step.cost > 0 for step in found)

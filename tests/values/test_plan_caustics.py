@@ -49,7 +49,7 @@ def test_photons_light_fog() -> None:
     assert found.method == tl.RayMarched(64)
     assert not found.has(PassName.CAUSTICS)
     (views,) = (step for step in found.passes if step.name is PassName.LIGHT_VIEWS)
-    assert "asked for: 250,000 photons, followed on the processor" in views.reason
+    assert "requested: 250,000 photons, followed on the processor" in views.reason
     assert "carry what 'box' bends into 'box', about 12 s" in views.reason
     assert "caustics in media that scatter" not in str(found)
     assert "photons that media scatter" in str(found)

@@ -22,13 +22,13 @@ from tests.values.plan_scenes import (
     scene,
     sheet,
 )
-from translucent.planning.interfaces import INTERFACES, ONE_INTERFACE, TRACE_COST, Interfaces
+from translucent.planning.interfaces import INTERFACES, ONE_INTERFACE, TRACE_COST, InterfaceMode
 from translucent.planning.passes import NoteKind, PassName
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
 
 TRACED, SCREEN, FRONT = tl.TracedInterfaces(), tl.ScreenInterfaces(), tl.FrontInterface()
-CHOICES: list[Interfaces] = [TRACED, SCREEN, FRONT]
+CHOICES: list[InterfaceMode] = [TRACED, SCREEN, FRONT]
 #: What the planner takes where light bends.
 USUAL = tl.TracedInterfaces(depth=12)
 ALWAYS: list[Any] = [None, tl.SignedDepth(), *ORDERED]

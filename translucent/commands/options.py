@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from translucent.media.medium import Medium
-    from translucent.planning.interfaces import Interfaces
+    from translucent.planning.interfaces import InterfaceMode
     from translucent.planning.methods import Method
     from translucent.planning.request import RenderRequest
     from translucent.planning.scattering import Scattering
@@ -474,7 +474,7 @@ class ChoiceOptions:
             raise InputError("--thickness", f"only --method {names} takes it", f"add --method {names}")
         return method.with_thickness(parse_length(self.thickness))
 
-    def _interfaces(self) -> Interfaces | None:
+    def _interfaces(self) -> InterfaceMode | None:
         from translucent.planning.interfaces import INTERFACES, TracedInterfaces
 
         stated = {"depth": self.interface_depth, "forks": self.interface_forks}

@@ -42,7 +42,7 @@ def write_film(path: Path, pictures: Iterator[Pixels], fps: float) -> None:
     count = 0
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as ffmpeg:
         assert ffmpeg.stdin is not None
-        told = _Told(ffmpeg)
+        output = _FilmOutput(ffmpeg)
         try:
             for picture in chain([first], pictures):
                 ffmpeg.stdin.write(_even(picture).tobytes())
@@ -54,7 +54,7 @@ def write_film(path: Path, pictures: Iterator[Pixels], fps: float) -> None:
         except BaseException:
             ffmpeg.kill()
             raise
-        why = told.line()
+        why = output.line()
     if ffmpeg.returncode != 0:
         raise OSError(f"ffmpeg ended with status {ffmpeg.returncode}{why and f': {why}'}")
     # It ends well, too, where the disk was full when it wrote the last of the film.
@@ -73,7 +73,7 @@ def _arguments(width: int, height: int, fps: float) -> list[str]:
     return ["-y", "-xerror", "-v", "error", *given, *made]
 
 
-class _Told:
+class _FilmOutput:
     """Reader of a process's error output, so that the process never blocks on a full pipe."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
@@ -99,7 +99,7 @@ def _even(picture: Pixels) -> Pixels:
     return np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
 
 
-#: Pictures per second unless told otherwise.
+#: Pictures per second unless requested otherwise.
 DEFAULT_FPS = 24.0
 
 
@@ -111,23 +111,23 @@ def check_animation(path: Path, fps: float) -> None:
     InputError
         If it has a suffix of no animation, there is no folder for it, or the rate is not in 1 to 100.
     RenderError
-        If a film is asked for without the imageio-ffmpeg package.
+        If a film is requested without the imageio-ffmpeg package.
     """
     if not 1.0 <= fps <= 100.0:
         raise InputError(f"{fps} pictures per second", "not in 1 to 100", "give for example 24")
-    asked = f"animation {str(path)!r}"
+    what = f"animation {str(path)!r}"
     if path.is_dir() or not path.suffix:
-        require_folder(path, asked)
+        require_folder(path, what)
         return
     if path.suffix.lower() not in WRITERS:
         raise InputError(
-            asked,
+            what,
             f"suffix {path.suffix!r}",
             f"use {', '.join(WRITERS)}, or a folder",
         )
-    require_output(path, asked)
+    require_output(path, what)
     if path.suffix.lower() == ".mp4":
-        require_package("imageio_ffmpeg", asked, "use .webp or .gif")
+        require_package("imageio_ffmpeg", what, "use .webp or .gif")
 
 
 def write_animation(path: str | Path, frames: Iterable[Pixels], fps: float = DEFAULT_FPS) -> None:
@@ -150,7 +150,7 @@ def write_animation(path: str | Path, frames: Iterable[Pixels], fps: float = DEF
     InputError
         If the suffix is another, there is no frame, their sizes differ, or the rate is beyond these.
     RenderError
-        If a file cannot be written, or ``.mp4`` is asked for without the imageio-ffmpeg package.
+        If a file cannot be written, or ``.mp4`` is requested without the imageio-ffmpeg package.
     """
     path = Path(path)
     check_animation(path, fps)

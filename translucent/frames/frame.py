@@ -23,7 +23,7 @@ from translucent.scene.scene import Scene
 
 
 class Deferred:
-    """Array that is made when it is first asked for, from values that nobody changes.
+    """Array that is made when it is first read, from values that nobody changes.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ MATTE_ARRAYS = ("alpha", "passed", "normals")
 #: Additional array of frames of random paths.
 NOISE_ARRAYS = ("standard_error",)
 
-#: Where a frame keeps the arrays that nobody has asked for yet.
+#: Where a frame keeps the arrays that nobody has read yet.
 _DEFERRED = "_deferred"
 
 #: Largest exposure in stops, beyond which radiance would overflow float64 or be black.
@@ -114,7 +114,7 @@ MAX_EXPOSURE = 100.0
 class Frame:
     """A rendered picture with its physical quantities. Row 0 is the top row; arrays are contiguous and the caller's.
 
-    Those that follow from what was read back are made when they are first asked for.
+    Those that follow from what was read back are made when they are first read.
 
     Attributes
     ----------
@@ -147,7 +147,7 @@ class Frame:
         Unit normals, in world axes, of the interfaces where rays enter bodies; 0 where there is none. Only of frames
         whose plan has interfaces.
     standard_error : (h, w, 3) float, optional
-        Of the radiance, where it is a mean over random paths; None where it has no noise to be told.
+        Of the radiance, where it is a mean over random paths; None where it has no noise.
     scene : Scene, optional
         Scene that was rendered, for `to_html`. None of frames before a backdrop, which is no part of it.
     """
@@ -170,7 +170,7 @@ class Frame:
     scene: Scene | None = None
 
     def __post_init__(self) -> None:
-        # Without their attribute, `__getattr__` is asked for them.
+        # Without their attribute, `__getattr__` finds them.
         deferred = {name: value for name, value in vars(self).items() if isinstance(value, Deferred)}
         for name in deferred:
             del self.__dict__[name]
@@ -179,13 +179,13 @@ class Frame:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> npt.NDArray[Any]:
-            """An array that is made when it is first asked for."""
+            """An array that is made when it is first read."""
             if (deferred := self.__dict__.get(_DEFERRED, {}).get(name)) is None:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
             return self.__dict__.setdefault(name, deferred.made())
 
     def __dir__(self) -> list[str]:
-        """Names, those of arrays that nobody has asked for yet included."""
+        """Names, those of arrays that nobody has read yet included."""
         return sorted({*super().__dir__(), *self.__dict__.get(_DEFERRED, {})})
 
     def rendered_from(self, scene: Scene, plan: RenderPlan) -> Frame:
@@ -278,7 +278,7 @@ class Frame:
         InputError
             If the suffix is none of these, or there is no such tone curve.
         RenderError
-            If the file cannot be written, or ``.exr`` is asked for without the OpenEXR package.
+            If the file cannot be written, or ``.exr`` is requested without the OpenEXR package.
         """
         write_frame(Path(path), self.arrays, partial(self.to_srgb8, exposure, tone))
 
@@ -337,7 +337,7 @@ class Frame:
         return frame_bundle(self.to_srgb8(), self.arrays, str(self.plan).partition("\n")[0], repr(self))
 
     def _repr_html_(self) -> str:
-        """The same, for those that know no bundles."""
+        """The same, for front ends that know no bundles."""
         return str(self._repr_mimebundle_()[0]["text/html"])
 
     def _repr_png_(self) -> bytes:

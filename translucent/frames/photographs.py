@@ -17,7 +17,7 @@ from translucent.errors import InputError
 from translucent.files.reading import read_text, shown, toml_value
 from translucent.formulas.color import linear_to_srgb, srgb_to_linear
 from translucent.media.conversion import CHANNELS
-from translucent.media.fitting import StepFit, Steps, fit_steps
+from translucent.media.fitting import PatchTransmittances, StepFit, fit_steps
 from translucent.media.pixel import read_encoded
 from translucent.scene.environment_files import read_linear
 from translucent.units import metres_per_unit, parse_length
@@ -29,7 +29,7 @@ LINEAR = (".exr", ".hdr", ".pic")
 LOSSY = (".jpg", ".jpeg", ".webp")
 
 
-class Picture(NamedTuple):
+class LinearPicture(NamedTuple):
     """Linear values (h, w, 3), the largest level of the file, such as 255, 0 of a linear one, which has none; and
     whether the file rounds whole blocks of pixels, as JPEG does, so that noise does not spread the error of that.
     """
@@ -47,7 +47,7 @@ class Picture(NamedTuple):
         return float(low), float(high)
 
 
-def read_picture(path: str | Path) -> Picture:
+def read_picture(path: str | Path) -> LinearPicture:
     """Read a picture, turned as its camera notes: .exr and .hdr are linear, all others sRGB-encoded.
 
     Raises
@@ -56,11 +56,11 @@ def read_picture(path: str | Path) -> Picture:
         If there is no such file, or it is no picture.
     """
     if Path(path).suffix.lower() in LINEAR:
-        return Picture(read_linear(Path(path)), 0)
+        return LinearPicture(read_linear(Path(path)), 0)
     encoded = read_encoded(path, f"picture {str(path)!r}")
     levels = int(np.iinfo(encoded.dtype).max)
     table = srgb_to_linear(np.arange(levels + 1) / levels).astype(np.float32)
-    return Picture(table[encoded], levels, Path(path).suffix.lower() in LOSSY)
+    return LinearPicture(table[encoded], levels, Path(path).suffix.lower() in LOSSY)
 
 
 #: Column and row of the top left pixel, width and height.
@@ -135,9 +135,9 @@ def fit_photographs(photographs: Sequence[Photograph], ior: float | None = None)
     photographs = tuple(photographs)
     if not (photographs and all(isinstance(one, Photograph) for one in photographs)):
         raise InputError("fit to photographs", "there are none", "give at least one tl.Photograph")
-    told: list[str] = []
-    fit = fit_steps([_steps(one, number, told) for number, one in enumerate(photographs)], ior)
-    return dataclasses.replace(fit, warnings=(*told, *fit.warnings))
+    left_out: list[str] = []
+    fit = fit_steps([_steps(one, number, left_out) for number, one in enumerate(photographs)], ior)
+    return dataclasses.replace(fit, warnings=(*left_out, *fit.warnings))
 
 
 def parse_patches(text: str, unit: str = "m") -> list[tuple[Rectangle, float]]:
@@ -187,47 +187,49 @@ def read_photographs(path: Path, unit: str = "m") -> list[Photograph]:
     """Read a .toml file of photographs: tables ``[[photograph]]`` with ``file``, ``white`` and ``patches``.
 
     ``white = "X,Y,W,H"`` and ``patches = ["X,Y,W,H=1mm", ...]``, as `parse_patches` reads them, may stand above all
-    tables, for those that have none of their own. Files are searched beside the .toml file.
+    tables, for tables without their own. Files are searched beside the .toml file.
 
     Raises
     ------
     InputError
         If it is no such file; the message says which photograph is wrong.
     """
-    asked = f"photographs {str(path)!r}"
+    what_for = f"photographs {str(path)!r}"
     metres_per_unit(unit)
     try:
-        shared = toml_value(read_text(path, asked))
+        shared = toml_value(read_text(path, what_for))
     except ValueError as error:
-        raise InputError(asked, f"no TOML ({shown(error)})", "see the docs on media for an example") from None
+        raise InputError(what_for, f"no TOML ({shown(error)})", "see the docs on media for an example") from None
     tables = shared.pop("photograph", None)
     if not (isinstance(tables, list) and tables and all(isinstance(table, dict) for table in tables)):
-        raise InputError(asked, "no table [[photograph]]", 'write [[photograph]] and file = "steps.jpg" below it')
-    return [_photograph({**shared, **table}, f"{asked}, number {n}", path, unit) for n, table in enumerate(tables, 1)]
+        raise InputError(what_for, "no table [[photograph]]", 'write [[photograph]] and file = "steps.jpg" below it')
+    return [
+        _photograph({**shared, **table}, f"{what_for}, number {n}", path, unit) for n, table in enumerate(tables, 1)
+    ]
 
 
-def _photograph(table: dict[str, Any], asked: str, path: Path, unit: str) -> Photograph:
+def _photograph(table: dict[str, Any], what_for: str, path: Path, unit: str) -> Photograph:
     wrong = sorted(table.keys() ^ {"file", "white", "patches"})
     if wrong:
         found = "is missing" if wrong[0] in ("file", "white", "patches") else "is not known"
-        raise InputError(asked, f"{wrong[0]!r} {found}", "give file, white and patches")
+        raise InputError(what_for, f"{wrong[0]!r} {found}", "give file, white and patches")
     file, white, patches = table["file"], table["white"], table["patches"]
     texts = [file, white, *patches] if isinstance(patches, list) else [None]
     if not all(isinstance(text, str) for text in texts):
         raise InputError(
-            asked, "a value is no text", 'write for example white = "10,10,60,60", patches = ["90,10,60,60=2mm"]'
+            what_for, "a value is no text", 'write for example white = "10,10,60,60", patches = ["90,10,60,60=2mm"]'
         )
     listed = [patch for text in patches for patch in parse_patches(text, unit)]
     return Photograph(path.parent / file, parse_rectangle(white), listed)
 
 
-def _steps(photograph: Photograph, number: int, told: list[str]) -> Steps:
-    """Transmittances of a photograph's patches; what is left out of them is `told`."""
+def _steps(photograph: Photograph, number: int, left_out: list[str]) -> PatchTransmittances:
+    """Transmittances of a photograph's patches; what is left out of them is `left_out`."""
     given = photograph.picture
     if isinstance(given, str | Path):
         picture, name = read_picture(given), Path(given).name
     else:
-        picture, name = Picture(np.asarray(given, dtype=np.float64), 0), f"photograph {number + 1}"
+        picture, name = LinearPicture(np.asarray(given, dtype=np.float64), 0), f"photograph {number + 1}"
     white = _measured(picture, photograph.white, f"white of {name}")
     if (white.saturated > MOST_LIMITED).any():
         share = 100 * white.saturated.max()
@@ -241,13 +243,13 @@ def _steps(photograph: Photograph, number: int, told: list[str]) -> Steps:
         if not 0 < thickness < np.inf:
             raise InputError(f"patch of {name}", f"thickness {thickness} m", "give a length above 0")
         what = f"patch {','.join(map(str, rectangle))} of {name}"
-        rows.append(_depth(_measured(picture, rectangle, what), white, what, told))
+        rows.append(_depth(_measured(picture, rectangle, what), white, what, left_out))
     depth, variance = (np.array(part) for part in zip(*rows, strict=True))
     thicknesses = np.array([float(thickness) for _, thickness in photograph.patches])
-    return Steps(name, thicknesses, depth, variance, white.variance / white.mean**2)
+    return PatchTransmittances(name, thicknesses, depth, variance, white.variance / white.mean**2)
 
 
-def _depth(patch: _Mean, white: _Mean, what: str, told: list[str]) -> tuple[Array, Array]:
+def _depth(patch: _Mean, white: _Mean, what: str, left_out: list[str]) -> tuple[Array, Array]:
     """-log(T) (3,) and its variance; NaN where a channel cannot be used."""
     bright = patch.mean > white.mean + 5.0 * np.sqrt(patch.variance + white.variance) + 0.02 * white.mean
     if (bright & (patch.saturated <= MOST_LIMITED)).any():
@@ -261,13 +263,13 @@ def _depth(patch: _Mean, white: _Mean, what: str, told: list[str]) -> tuple[Arra
     ):
         if limited.any():
             names = ", ".join(name for name, out in zip(CHANNELS, limited, strict=True) if out)
-            told.append(f"{what}: {names} left out, {why}")
+            left_out.append(f"{what}: {names} left out, {why}")
     out = (patch.saturated > MOST_LIMITED) | (patch.black > MOST_LIMITED) | noisy | (patch.mean <= 0)
     mean = np.where(out, 1.0, patch.mean)
     return np.where(out, np.nan, np.log(white.mean / mean)), patch.variance / mean**2
 
 
-def _measured(picture: Picture, rectangle: Rectangle, what: str) -> _Mean:
+def _measured(picture: LinearPicture, rectangle: Rectangle, what: str) -> _Mean:
     x, y, width, height = rectangle
     high, wide = picture.linear.shape[:2]
     if min(x, y) < 0 or x + width > wide or y + height > high:

@@ -53,7 +53,7 @@ def frame_text(thickness: npt.NDArray[Any], coverage: Mask, valid: Mask) -> str:
     """Frame in words: size, coverage, thickness, and pixels that cannot be trusted."""
     seen = thickness[coverage & valid]
     height, width = thickness.shape
-    said = f"{width} x {height} pixels, of which media cover {coverage.mean():.0%}"
+    said = f"{width} x {height} pixels; media cover {coverage.mean():.0%}"
     if seen.size:
         median, most = (length_text(float(found)) for found in (np.median(seen), seen.max()))
         said += f", {median} thick in the median and {most} at most"

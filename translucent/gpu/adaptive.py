@@ -33,8 +33,8 @@ Run = Callable[[tuple[PassName, ...]], None]
 class AdaptiveSampling:
     """Averages over samples in two rounds: what is cheap for every sample, then rays from interfaces where it matters.
 
-    The first round finds for every sample which pixels show an interface, and sums up the light of those that do not:
-    edges are as smooth as ever. The second traces rays; of each pixel, the mean of those traced stands for all of its
+    The first round finds for every sample which pixels show an interface, and sums up the light of all others:
+    edges are as smooth as ever. The second traces rays; in each pixel, their mean replaces all of its
     samples that meet an interface. Opaque objects are seen through interfaces as the mean of all samples shows them.
 
     Parameters
@@ -141,7 +141,7 @@ def traced_samples(job: FrameJob) -> float:
 
 
 def _central_first(samples: int) -> list[tuple[float, float]]:
-    """The shifts of the samples, that nearest to the center of the pixel first: it stands for smooth surroundings."""
+    """The shifts of the samples, that nearest to the center of the pixel first: smooth surroundings need no other."""
     shifts = sample_shifts(samples)
     nearest = int(np.argmin(np.square(shifts).sum(axis=1)))
     shifts[[0, nearest]] = shifts[[nearest, 0]]

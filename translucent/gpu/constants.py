@@ -39,7 +39,7 @@ from translucent.planning.methods.ray_marched import LEAST_SEEN, Quadrature
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
 PEEL_BATCH = 8
 
-#: Pixels along a side of the tiles of which peeling learns how many crossings they have at most.
+#: Pixels along a side of the tiles for which depth peeling reads the largest number of crossings.
 PEEL_TILE = 16
 
 #: Binding points of the buffers that shaders write to. Lists of lights are made at those of the lists of pixels, which
@@ -75,7 +75,7 @@ CONSTANTS: dict[str, str] = {
     "SERIES_LIMIT": "0.5",
     "NOTHING": "1e30",  # beyond every distance: coordinates end at 1e18
     "UNEXPECTED": "1e6",  # a count that no pixel expects
-    "AXIAL_BITS": "29",  # of a crossing's 30 bits, those that axial depth and slot share; one is the side's
+    "AXIAL_BITS": "29",  # bits that axial depth and slot share, of the 30 of a crossing; one is the side's
     "LARGEST_WORD": "0x3fffffffu",
     "SORTABLE_OFFSET": "0x00800000u",  # bits of the smallest normal float
     "PEEL_UNIT": "4096.0",  # alpha of a peeling pass holds two numbers: this times one, plus the other

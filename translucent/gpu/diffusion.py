@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 KEPT_GRIDS = 2
 
 
-class DiffusedLight:
+class DiffusedTexture:
     """Diffused light of the bodies of a scene.
 
     Attributes
@@ -85,7 +85,7 @@ class DiffusedLight:
         }
 
 
-def slot_grids(light: DiffusedLight | None, slots: Sequence[Slot], center: Array) -> dict[str, Array]:
+def slot_grids(light: DiffusedTexture | None, slots: Sequence[Slot], center: Array) -> dict[str, Array]:
     """Fields of the Density block: grids of the slots whose light is known, for positions from `center`."""
     low, grid = np.zeros((2, MAX_SLOTS, 4))
     for i, slot in enumerate(slots):
@@ -110,15 +110,15 @@ class DiffusionCache:
         #: One for each size of grids: a small one is solved without waiting for a large one.
         self._solvers: OrderedDict[Diffusion, FieldCache] = OrderedDict()
         self._lock = Lock()
-        self._last: DiffusedLight | None = None
+        self._last: DiffusedTexture | None = None
 
-    def of(self, plan: RenderPlan) -> DiffusedLight | None:
+    def of(self, plan: RenderPlan) -> DiffusedTexture | None:
         """Diffused light of the bodies of a plan, None where there is none."""
         if not plan.diffuses or not (fields := self._solver(plan.diffusion).of(plan)):
             return None
         if self._last is None or self._last.fields is not fields:
             self._release_last()
-            self._last = DiffusedLight(self._gl, fields)
+            self._last = DiffusedTexture(self._gl, fields)
         return self._last
 
     def has(self, key: Hashable) -> bool:
@@ -222,7 +222,7 @@ def scene_grids(scene: Scene, slots: Sequence[Slot]) -> list[DensityGrid]:
     return [density for density in densities if isinstance(density, DensityGrid)]
 
 
-def density_uniforms(scene: Scene, slots: Sequence[Slot], center: Array, light: DiffusedLight | None) -> bytes:
+def density_uniforms(scene: Scene, slots: Sequence[Slot], center: Array, light: DiffusedTexture | None) -> bytes:
     """Contents of the Density block; `center` (3,) is where the points of shaders count from, in metres."""
     rows = np.zeros((3 * MAX_SLOTS, 4))
     profile, grid = np.zeros((2, MAX_SLOTS, 4))

@@ -119,7 +119,7 @@ def frame(low: Array, high: Array) -> tuple[Array, float]:
 def packed_nodes(tree: Hierarchy) -> Words:
     """(8, n, 4): nodes of a hierarchy within -1 to 1, in the orders of all octants.
 
-    Bounds are rounded outwards by one to two steps: first those that rays of the octant come to first, x, y and z, then
+    Bounds are rounded outwards by one to two steps: first the bounds where rays of the octant enter, x, y and z, then
     the others. Links count from the first node of their order.
     """
     half = STEPS / 2
@@ -155,7 +155,7 @@ _WIDTH = 1 << HIERARCHY_WIDTH_BITS
 #: Rows of texels up to which the numbers of nodes and triangles fit into links.
 _MOST_ROWS = 1 << (FIRST_BITS - HIERARCHY_WIDTH_BITS)
 
-#: Bytes for each triangle that are kept, with the copy in OpenGL, and those that building takes for a while.
+#: Bytes for each triangle: kept, with the copy in OpenGL; and taken while the hierarchy is built.
 _PACKED_BYTES = 300
 _BUILD_BYTES = 650
 

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.gpu.diffusion import DiffusedLight, density_uniforms, scene_grids
+from translucent.gpu.diffusion import DiffusedTexture, density_uniforms, scene_grids
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import (
     BODY,
@@ -237,7 +237,7 @@ class FrameJob(CameraView):
     for_map : bool
         The frame is a map of shadows.
     path_only : bool
-        The accumulator has paths of one medium alone, and counts of those that an opaque surface ends at most.
+        The accumulator has paths of one medium alone, and counts of paths that an opaque surface ends at most.
     two_media : bool
         It has the paths in two media instead, which are the slots 0 and 1 of bodies.
     bent_apart : bool
@@ -301,7 +301,7 @@ class FrameJob(CameraView):
         return BodyRoles.of(self.features, counts)
 
     @cached_property
-    def diffused_light(self) -> DiffusedLight | None:
+    def diffused_light(self) -> DiffusedTexture | None:
         """Light that diffuses in bodies; None where it does not."""
         return self.resources.diffusion.of(self.plan)
 

@@ -198,7 +198,7 @@ BODY = UniformBlock(
             "snapping_share",
             "f4",
             (),
-        ),  # the same, over the metres that a share of 1 stands for
+        ),  # the same, divided by the metres of a share of 1
         # Axial depth: 0 where the scene's media begin along the forward axis, or at the eye; 1 where they end.
         ("axial_depth_scale", "f4", ()),  # axial depth per metre
         ("axial_depth_start", "f4", ()),  # axial depth of the anchor
@@ -222,7 +222,7 @@ SHADE = UniformBlock(
         ("emission", "f4", (4,)),
         ("expected_count", "f4", (2,)),  # least and greatest signed count of a trustworthy pixel
         ("rounding", "f4", ()),  # metres that a path may be below 0, besides what silhouettes explain
-        ("count_share", "f4", ()),  # metres along the forward axis that a share of 1 in a count stands for
+        ("count_share", "f4", ()),  # metres along the forward axis of a share of 1 in a count
         ("coverage_floor", "f4", ()),  # a path not longer than this is rounding
     ),
 )
@@ -305,7 +305,7 @@ SHADOWS = UniformBlock(
         ("shadow_second", "f4", (4,)),  # of another, with w 1, where they hold those in both
         ("sky_count", "i4", ()),  # directions of the environment,
         ("sky_first", "i4", ()),  # and those of them that this sample looks at: the first,
-        ("sky_step", "i4", ()),  # and every so-many-th after it; negative: these stand for all
+        ("sky_step", "i4", ()),  # and every so-many-th after it; negative: these represent all
         ("sky_size", "i4", ()),  # texels along a side of their maps
         ("sky_columns", "i4", ()),  # maps in a row of the atlas
     ),

@@ -31,7 +31,7 @@ Dialect = Literal["glsl", "webgl2", "vulkan"]
 _STORAGE = re.compile(r"\bstd430\b|\batomic\w+\s*\(")
 _SAMPLER = re.compile(r"\b[iu]?sampler\w+")
 
-#: Versions of GLSL: for all shaders, for those that write to buffers, for WebGL2, and for Vulkan.
+#: Versions of GLSL: for all shaders, for shaders that write to buffers, for WebGL2, and for Vulkan.
 PLAIN, WITH_STORAGE, ES, VULKAN = 330, 430, 300, 450
 
 
@@ -56,7 +56,7 @@ def check_dialect(dialect: str) -> None:
     Raises
     ------
     InputError
-        Naming those that there are.
+        With the known ones.
     """
     if dialect not in get_args(Dialect):
         raise InputError(f"target {dialect!r}", "unknown", f"use one of {', '.join(get_args(Dialect))}")
@@ -244,7 +244,7 @@ class Lifted:
     defines : dict of str to int
         By which its switches are decided.
     files : tuple of str
-        Those of which something is in it.
+        Files that it has parts of.
     blocks : tuple of UniformBlock
         Uniform blocks in it.
     text : str
@@ -446,7 +446,7 @@ def _parts(lines: Iterable[tuple[int, str]]) -> Iterator[_Part]:
 
 
 def _reached(parts: list[_Part]) -> list[_Part]:
-    """Parts that the shader needs, and the comments on files of which any part remains."""
+    """Parts that the shader needs, and the comments on files that have such parts."""
     functions = {part.function for part in parts}
     declaring: dict[str, list[_Part]] = {}
     for part in parts:

@@ -166,7 +166,7 @@ class _Stack:
         return self._count
 
     def add(self, rows: Array) -> None:
-        """Add the rows (n, width) of an object, of which there is one at least."""
+        """Add the rows (n, width) of an object, one or more."""
         self._starts.append(self._count)
         self._count += len(rows)
         if self._count > len(self._array):
@@ -230,7 +230,7 @@ class _Sides:
     planes : (faces, 4) float64
         Towards the light.
     lit : (n, 4) float64
-        Of those that the light reaches from outside.
+        Of faces that the light reaches from outside.
     """
 
     planes: Array
@@ -238,7 +238,7 @@ class _Sides:
 
 
 class ShadowThrowers:
-    """Objects that throw shadows in the light of one light, and those that only receive them.
+    """Objects that throw shadows in the light of one light, and objects that only receive them.
 
     Parameters
     ----------

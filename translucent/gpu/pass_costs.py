@@ -63,7 +63,7 @@ class PassTimer:
                 query.mglo.end()
 
     def seconds(self) -> dict[str, float]:
-        """Seconds per name, in the order of the frame; waits for the GPU."""
+        """Seconds per name, in the order of the frame; blocks until the GPU is done."""
         return {name: before + self._elapsed(name) for name, before in self._seconds.items()}
 
     def _elapsed(self, name: str) -> float:

@@ -20,7 +20,7 @@ from translucent.planning.render_plan import RenderPlan
 MOST_ROUNDS = 256
 
 
-class PhotonLight:
+class PhotonPicture:
     """Light of photons on the opaque objects of a picture: the mean of rounds, each with the photons of the plan.
 
     Each round follows other photons, and by itself expects the right light everywhere.

@@ -324,7 +324,7 @@ class GpuRenderer:
                 step.run(job, spec)
 
     def pass_seconds(self) -> dict[str, float]:
-        """Seconds that the GPU spent on each pass of the last frame; waits for it."""
+        """Seconds that the GPU spent on each pass of the last frame; blocks until it is done."""
         return self._timer.seconds()
 
     def read(self, job: FrameJob, samples: int = 1) -> Frame:

@@ -108,7 +108,7 @@ class MeshBuffers:
         return self._smooth
 
     def _written(self, faces: int, rows: Callable[[slice], npt.NDArray[np.float32]]) -> moderngl.Buffer:
-        """Buffer with the `rows` of so many faces, some of which are made at a time."""
+        """Buffer with the `rows` of all faces, made some at a time."""
         if faces <= _CHUNK:
             return self._gl.buffer(rows(slice(None)))
         buffer, offset = None, 0

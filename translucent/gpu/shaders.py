@@ -250,7 +250,7 @@ def build_program(
     vertex, fragment : str
         Files under ``shaders/``.
     defines : dict, optional
-        Switches; each stage gets those that it asks for, and at least one stage must ask for each.
+        Switches; each stage gets the ones in its text, and at least one stage must have each.
     version : int
         Of GLSL: 330, or 430 where shaders write to buffers.
     samplers : int

@@ -206,7 +206,7 @@ class Seen:
     media : tuple of bytes or None
         Extinction in each object.
     slots : tuple of int
-        Number of the extinction of each object that throws a shadow among those that differ, -1 of others and of 0.
+        Number of the extinction of each object that throws a shadow, among all different ones; -1 of others and of 0.
     step : int
         There are maps of every so-many-th direction of the environment.
     """

@@ -442,7 +442,7 @@ def light_uniforms(scene: Scene, shine: bool) -> bytes:
 
 
 def shade_uniforms(scene: Scene, balance: Balance) -> bytes:
-    """Contents of the Shade block; the first body's medium stands for all where they are the same."""
+    """Contents of the Shade block; with the medium of the first body, where all are the same."""
     medium = scene.bodies[0].medium
     assert medium is not None
     return SHADE.pack(

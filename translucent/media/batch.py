@@ -60,7 +60,7 @@ class Batch:
         return "".join([*shown, *(f"<div>error: {escape(line)}</div>" for line in self.errors[:MOST_SHOWN])])
 
     def to_json(self) -> str:
-        """The records as a JSON list, one record per line; null stands for infinity."""
+        """The records as a JSON list, one record per line; null is infinity."""
         return "[\n" + ",\n".join(json.dumps(record) for record in self.records) + "\n]\n"
 
     def to_csv(self) -> str:
@@ -126,9 +126,9 @@ def _record(row: Row, unit: str, unit_out: str, clamp: bool) -> tuple[dict[str, 
     distance = row.length("distance", str(row.cells.get("unit", unit)))
     lighter, channels = clamp_colors(color)
     changed = clamp and bool(channels.any())
-    wanted = lighter if changed else color
-    medium = Medium.from_color(wanted, distance)
-    told = summary(wanted, distance, medium.extinction, unit_out)
+    kept = lighter if changed else color
+    medium = Medium.from_color(kept, distance)
+    found = summary(kept, distance, medium.extinction, unit_out)
     if changed:
-        told["warnings"].insert(0, f"color clamped to {CLAMP:g} where it was below")
-    return {"name": name, **told}, changed
+        found["warnings"].insert(0, f"color clamped to {CLAMP:g} where it was below")
+    return {"name": name, **found}, changed

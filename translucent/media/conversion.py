@@ -19,7 +19,7 @@ from translucent.formulas import optics
 from translucent.media.swatches import html_swatches
 from translucent.units import length_text, metres_per_unit
 
-#: Value to which a channel of 0 is clamped if that is asked for: an optical depth of 9.2.
+#: Value to which a channel of 0 is clamped if that is requested: an optical depth of 9.2.
 CLAMP = 1e-4
 
 #: Multiples of the distance at which a medium's colors are shown.
@@ -164,7 +164,7 @@ class DistanceMatch:
     residual : tuple of float
         log(color at `distance` / color) per channel, 0 where it is met.
     color : tuple of float
-        The linear color that was asked for.
+        The linear color that was requested.
     """
 
     distance: float
@@ -173,10 +173,10 @@ class DistanceMatch:
     color: tuple[float, ...]
 
     def _repr_html_(self) -> str:
-        """Swatches of the color that was asked for and of the one that is found, for notebooks."""
+        """Swatches of the color that was requested and of the one that is found, for notebooks."""
         with np.errstate(under="ignore"):
             found = np.array(self.color) * np.exp(self.residual)
-        return html_swatches([(self.color, "asked for"), (found, f"after {length_text(self.distance)}")])
+        return html_swatches([(self.color, "requested"), (found, f"after {length_text(self.distance)}")])
 
 
 @checked
@@ -240,7 +240,7 @@ def doubts(color: npt.ArrayLike, distance: float) -> tuple[str, ...]:
 
 
 def summary(color: npt.ArrayLike, distance: float, extinction: npt.ArrayLike, unit: str = "m") -> dict[str, Any]:
-    """Summary of one color at a distance as values that JSON can hold: None stands for infinity. Lengths in metres.
+    """Summary of one color at a distance as values that JSON can hold: None is infinity. Lengths in metres.
 
     Parameters
     ----------

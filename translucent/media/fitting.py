@@ -35,7 +35,7 @@ _FLOOR = 1e-6
 _MOST, _HALVINGS = 1e3, 24
 
 
-class Steps(NamedTuple):
+class PatchTransmittances(NamedTuple):
     """Transmittances of the patches of one photograph.
 
     Attributes
@@ -71,7 +71,7 @@ class StepFit:
     interval : (3,) float64
         Half width in 1/m of the interval that holds the extinction with a probability of 95 %.
     surface_loss : (3,) float64
-        Share of light that the faces keep back by the fit, 1 - exp(-k); where an index of refraction tells it, by that.
+        Share of light that the faces keep back by the fit, 1 - exp(-k); with a known index of refraction, by that.
     chi2_per_degree : (3,) float64 or NaN
         About 1 where noise alone scatters the residuals; NaN with as many unknowns as samples. Where it is above, the
         errors have grown.
@@ -107,8 +107,8 @@ class _Line(NamedTuple):
         return max(1.0, np.sqrt(self.chi2 / self.degrees)) if self.degrees else 1.0
 
 
-class _Channel(NamedTuple):
-    """Samples of one channel: thickness and depth (n,), their covariance, and of which photograph each is."""
+class _ChannelSamples(NamedTuple):
+    """Samples of one channel: thickness and depth (n,), their covariance, and the photograph of each."""
 
     thickness: Array
     depth: Array
@@ -148,7 +148,7 @@ class _Channel(NamedTuple):
         return line
 
 
-def fit_steps(photographs: Sequence[Steps], ior: float | None = None) -> StepFit:
+def fit_steps(photographs: Sequence[PatchTransmittances], ior: float | None = None) -> StepFit:
     """Fit a medium to the transmittances of all photographs together.
 
     Parameters
@@ -186,7 +186,7 @@ def fit_steps(photographs: Sequence[Steps], ior: float | None = None) -> StepFit
     return StepFit(medium, error, interval, loss, chi2, samples, distance, tuple(dict.fromkeys(warnings)))
 
 
-def _slope(samples: _Channel) -> int:
+def _slope(samples: _ChannelSamples) -> int:
     """-1 where light clearly grows with thickness, whatever the faces keep back, 1 where it clearly falls, else 0."""
     if len(np.unique(samples.thickness)) < 2:
         return 0
@@ -197,7 +197,7 @@ def _slope(samples: _Channel) -> int:
 
 
 def _fit_channel(
-    photographs: Sequence[Steps], samples: _Channel, channel: int, ior: float | None
+    photographs: Sequence[PatchTransmittances], samples: _ChannelSamples, channel: int, ior: float | None
 ) -> tuple[float, float, float, float, float, int, list[str]]:
     from scipy.special import chdtrc, stdtrit
 
@@ -220,7 +220,7 @@ def _fit_channel(
     return line.best[0], error, quantile * error, float(loss), chi2, len(samples.depth), warnings
 
 
-def _channel(photographs: Sequence[Steps], channel: int, ior: float | None) -> _Channel:
+def _channel(photographs: Sequence[PatchTransmittances], channel: int, ior: float | None) -> _ChannelSamples:
     kept = [np.isfinite(one.depth[:, channel]) for one in photographs]
     counts = [int(use.sum()) for use in kept]
     if not sum(counts):
@@ -233,7 +233,7 @@ def _channel(photographs: Sequence[Steps], channel: int, ior: float | None) -> _
     shared = np.array([one.white_variance[channel] for one in photographs])[number]
     covariance = np.diag(noise) + np.where(number[:, None] == number, shared, 0.0)
     thickness = np.concatenate([one.thickness[use] for one, use in pairs])
-    return _Channel(thickness, _inside(depth, ior), covariance, number)
+    return _ChannelSamples(thickness, _inside(depth, ior), covariance, number)
 
 
 def _reflected(ior: float) -> float:
@@ -267,7 +267,7 @@ def _few(steps: int, ior: float | None) -> str:
     return "two thicknesses: nothing tells whether light dies away exponentially; photograph a third"
 
 
-def _bent(samples: _Channel, fixed: bool, channel: int, slope: float) -> list[str]:
+def _bent(samples: _ChannelSamples, fixed: bool, channel: int, slope: float) -> list[str]:
     """Warning where a parabola fits clearly better than a line."""
     from scipy.special import stdtrit
 
@@ -285,7 +285,9 @@ def _bent(samples: _Channel, fixed: bool, channel: int, slope: float) -> list[st
     return [f"{CHANNELS[channel]} dies away {why}: the extinction is right only about the steps photographed"]
 
 
-def _disagreeing(photographs: Sequence[Steps], samples: _Channel, fixed: bool, channel: int, slope: float) -> list[str]:
+def _disagreeing(
+    photographs: Sequence[PatchTransmittances], samples: _ChannelSamples, fixed: bool, channel: int, slope: float
+) -> list[str]:
     """Warning where the photographs have slopes of their own."""
     from scipy.special import chdtrc
 

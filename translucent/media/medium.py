@@ -32,7 +32,7 @@ MAX_IOR = 100.0
 @checked
 @dataclass(frozen=True, eq=False)
 class Medium(Frozen):
-    """A homogeneous participating medium. Triples are linear Rec.709 channels; a single number stands for all three.
+    """A homogeneous participating medium. Triples are linear Rec.709 channels; a single number is that of all three.
 
     Parameters
     ----------

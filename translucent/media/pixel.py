@@ -67,7 +67,7 @@ def read_encoded(path: str | Path, what: str) -> npt.NDArray[Any]:
     ----------
     path : str or Path
     what : str
-        What the error says was asked for.
+        What was requested, for errors.
     """
     image, channels = _read(what, path, "give an image file", per_pixel=40)
     if image.mode.startswith("I;16"):
@@ -99,7 +99,7 @@ def _read(what: str, path: str | Path, do: str, per_pixel: int = 16) -> tuple[Im
 
 
 def _is_deep(image: ImageFile, data: bytes) -> bool:
-    """True if an image has colors of 16 bits per channel, of which Pillow keeps 8."""
+    """True if an image has colors of 16 bits per channel; Pillow keeps 8 of them."""
     from PIL import TiffImagePlugin
 
     if image.mode not in ("RGB", "RGBA"):

@@ -153,14 +153,14 @@ class Preset:
         ior = self.medium.ior
         phases = [self.medium.phase or HenyeyGreenstein(float(g)) for g in self.channel_anisotropy]
         channels = zip(self.albedo.tolist(), phases, strict=True)
-        given_back = [half_space_reflectance(min(albedo, 1.0), ior, phase) for albedo, phase in channels]
-        return diffuse_interface(ior).entering * np.array(given_back)
+        reflected = [half_space_reflectance(min(albedo, 1.0), ior, phase) for albedo, phase in channels]
+        return diffuse_interface(ior).entering * np.array(reflected)
 
     @property
     def slab_reflectance(self) -> Array:
         """(2, 3, 3): what slabs of 1, 5 and 20 mm on a white and a black card (`CARDS`) send back of white light.
 
-        From all sides to all sides, polished, without the mirror image, the card below in optical contact: as paint on
+        From all sides to all sides, polished, without the mirror image, the card below in optical contact: as on
         a contrast chart. Exact where scattering is isotropic; else by the reduced coefficients; of thick
         slabs that is right to 0.04 (`diffuse_reflectance` is exact).
         """
@@ -179,7 +179,7 @@ class Preset:
             In each channel, less than a tenth of the events scatter (albedo < 0.1), or less than 5 % of the light
             is scattered within 1 cm (1 / sigma_s > 20 cm). Absorption alone gives the look.
         "single scattering"
-            What is in between: absorption gives the color, and scattering adds a haze.
+            What is in between: absorption gives the color, and scattering makes it milky.
         """
         reduced_extinction = self.absorption + self.reduced_scattering
         if ((self.reduced_albedo >= DOMINANT_ALBEDO) & (reduced_extinction * BODY_SIZE >= 1.0)).any():

@@ -108,9 +108,11 @@ def grouped(found: Mapping[str, Preset]) -> dict[str, list[Preset]]:
 
 
 def matching(found: Mapping[str, Preset], words: str) -> dict[str, Preset]:
-    """Presets of which names, aliases, groups, kinds, notes and sources have all of these words, or begin with them."""
-    wanted = re.findall(r"\w+", words.lower().replace("_", " "))
-    return {name: one for name, one in found.items() if all(any(w.startswith(x) for w in _words(one)) for x in wanted)}
+    """Presets whose names, aliases, groups, types, notes or sources have all of these words, or words that begin so."""
+    searched = re.findall(r"\w+", words.lower().replace("_", " "))
+    return {
+        name: one for name, one in found.items() if all(any(w.startswith(x) for w in _words(one)) for x in searched)
+    }
 
 
 @checked

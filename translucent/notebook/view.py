@@ -16,7 +16,7 @@ from translucent.formulas.color import to_hex
 from translucent.frames.writing import Bundle, bundle, png
 from translucent.page.payload import header_of, payload
 from translucent.page.plans import plan_page
-from translucent.planning.interfaces import Interfaces
+from translucent.planning.interfaces import InterfaceMode
 from translucent.planning.methods import Method
 from translucent.planning.request import RenderRequest
 from translucent.renderer import Renderer
@@ -118,7 +118,7 @@ def view(
     size: tuple[int, int] = (640, 480),
     *,
     method: Method | None = None,
-    interfaces: Interfaces | None = None,
+    interfaces: InterfaceMode | None = None,
     exposure: float = 0.0,
     tone: str = "neutral",
 ) -> SceneView:

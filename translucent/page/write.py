@@ -18,7 +18,7 @@ from translucent.formulas.tone import tone_curve
 from translucent.frames.frame import Frame, check_exposure
 from translucent.page.payload import name_of, payload
 from translucent.page.plans import PagePlan, plan_page
-from translucent.planning.interfaces import Interfaces
+from translucent.planning.interfaces import InterfaceMode
 from translucent.planning.methods import Method
 from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Scattering
@@ -66,7 +66,7 @@ def write_page(
     *,
     size: tuple[int, int] = (1280, 800),
     method: Method | None = None,
-    interfaces: Interfaces | None = None,
+    interfaces: InterfaceMode | None = None,
     scattering: Scattering | None = None,
     shadows: ShadowMaps | None = None,
     name: str | None = None,

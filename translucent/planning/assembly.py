@@ -1,4 +1,4 @@
-"""Parts of a plan beside the passes of its method: sheets, fallbacks, lights, opaque objects, interfaces, shading."""
+"""Passes of a plan beside those of its method: sheets, fallbacks, lights, opaque objects, interfaces, shading."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from translucent.errors import InputError
 from translucent.planning.bodies import (
     MAX_SLOTS,
     count_of,
-    glowing_bodies,
+    emitting_bodies,
     indices,
     media_differ,
     medium_slots,
@@ -17,7 +17,7 @@ from translucent.planning.bodies import (
     sheets_of,
     solids_of,
 )
-from translucent.planning.interfaces import Interfaces, touching_interfaces, with_interfaces
+from translucent.planning.interfaces import InterfaceMode, touching_interfaces, with_interfaces
 from translucent.planning.limits import (
     AMBIENT,
     MAX_SCATTER_LIGHTS,
@@ -50,7 +50,7 @@ def assembled(
     scene: Scene,
     method: Method,
     why: str,
-    interfaces: Interfaces,
+    interfaces: InterfaceMode,
     capabilities: Capabilities,
     *,
     instead: str,
@@ -126,7 +126,7 @@ def _check(scene: Scene, method: Method, capabilities: Capabilities) -> None:
     method.check(scene)
 
 
-def _interface_passes(scene: Scene, method: Method, interfaces: Interfaces, instead: str) -> tuple[PassSpec, ...]:
+def _interface_passes(scene: Scene, method: Method, interfaces: InterfaceMode, instead: str) -> tuple[PassSpec, ...]:
     """Passes that find and shade interfaces; none where no interface changes light."""
     if not (found := with_interfaces(scene)):
         return ()
@@ -137,7 +137,7 @@ def _interface_passes(scene: Scene, method: Method, interfaces: Interfaces, inst
     return drawn, shaded
 
 
-def _touching(scene: Scene, method: Method, interfaces: Interfaces) -> tuple[Note, ...]:
+def _touching(scene: Scene, method: Method, interfaces: InterfaceMode) -> tuple[Note, ...]:
     """Note for a method that does not find where rays leave all bodies, and so refracts them between touching ones."""
     if not interfaces.finds_exits or method.finds_exits or method.makes_sheets:
         return ()
@@ -147,14 +147,14 @@ def _touching(scene: Scene, method: Method, interfaces: Interfaces) -> tuple[Not
     return (Note(NoteKind.TOUCHING_INTERFACES, text),)
 
 
-def _through_bodies(scene: Scene, interfaces: Interfaces) -> tuple[Note, ...]:
+def _through_bodies(scene: Scene, interfaces: InterfaceMode) -> tuple[Note, ...]:
     """Notes on shadows on interfaces that are not rendered: maps have what is on the way to opaque objects alone."""
     notes = []
     if not interfaces.traced and dims_interfaces(scene):
-        notes.append("lights reach their highlights and paint through bodies")
-    painted = (body.surface is not None and body.surface.transmission < 1 for body in scene.bodies if not body.covers)
-    if scene.environment_shadows and any(painted):
-        notes.append("light of the environment reaches their paint through everything")
+        notes.append("lights reach their highlights and diffuse reflection through bodies")
+    reflects = (body.surface is not None and body.surface.transmission < 1 for body in scene.bodies if not body.covers)
+    if scene.environment_shadows and any(reflects):
+        notes.append("light of the environment reaches what they reflect diffusely through everything")
     return tuple(Note(NoteKind.SHADOWS, f"shadows on bodies: {text}") for text in notes)
 
 
@@ -205,7 +205,7 @@ def _light_views(scene: Scene, method: Method) -> tuple[PassSpec, ...]:
         )
     reason = (
         f"{lights} {'light' if lights == 1 else 'lights'} on a medium that scatters: the surfaces on the way from each "
-        f"light, in order, tell how much of it reaches the {method.light_points} points of an interval"
+        f"light, in order, give how much of it reaches the {method.light_points} points of an interval"
     )
     # From each light, surfaces are kept in lists.
     cost = lights * FragmentLists.cost
@@ -235,13 +235,15 @@ def _shading(scene: Scene, method: Method, *, ambient: bool) -> str:
 
 def _layer_passes(scene: Scene) -> tuple[PassSpec, ...]:
     """Pass that draws layers and the emission of interfaces; none where a scene has neither."""
-    layers, glowing = indices(scene, lambda item: item.covers), glowing_bodies(scene)
+    layers, emitting = indices(scene, lambda item: item.covers), emitting_bodies(scene)
     reasons = []
     if layers:
         names = object_names(scene.objects[i] for i in layers)
         reasons.append(f"{names}: each covers a share of what is behind it, and shows its own light there")
-    if glowing:
-        reasons.append(f"{object_names(scene.objects[i] for i in glowing)}: the surface glows")
+    if emitting:
+        reasons.append(f"{object_names(scene.objects[i] for i in emitting)}: the surface emits light")
     if not reasons:
         return ()
-    return (PassSpec(PassName.LAYERS, "; ".join(reasons), tuple(sorted((*layers, *glowing))), 1, cost=COSTS["layers"]),)
+    return (
+        PassSpec(PassName.LAYERS, "; ".join(reasons), tuple(sorted((*layers, *emitting))), 1, cost=COSTS["layers"]),
+    )

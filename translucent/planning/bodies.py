@@ -19,7 +19,7 @@ MAX_SLOTS = 16
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """Group of bodies that share one winding number, as their intervals need not be told apart.
+    """Group of bodies that share one winding number, as their intervals are not kept apart.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ def medium_slots(scene: Scene, apart: Sequence[int] = ()) -> tuple[Slot, ...]:
 
     Closed bodies of one medium share a slot: their winding numbers are never negative, so the sum of them says how
     often, and whether at all, the medium fills a point. An open body keeps a slot of its own, lest its holes cancel
-    those of another, and so does one whose density varies, or in which rays gather light. So do those that are to
+    those of another, and so does one whose density varies, or in which rays gather light. So do the bodies to
     be kept `apart`. With ``overlap="priority"`` only bodies of equal priority share one.
     """
     groups: dict[Hashable, list[int]] = {}
@@ -108,11 +108,11 @@ def _never_negative(body: Object) -> bool:
 
 def _fillings(scene: Scene) -> list[Hashable]:
     """Key of each object's medium: equal for two objects where it makes no difference which of them fills a point."""
-    # Many bodies share a medium, and what is told of it.
+    # Many bodies share a medium, and its key.
     media = {id(item.medium): item.medium for item in scene.objects}
-    told = {number: _told(medium, bool(scene.lights)) for number, medium in media.items()}
+    keys = {number: _medium_key(medium, bool(scene.lights)) for number, medium in media.items()}
     return [
-        i if (key := told[id(item.medium)]) is None or _is_like_no_other(item) else key
+        i if (key := keys[id(item.medium)]) is None or _is_like_no_other(item) else key
         for i, item in enumerate(scene.objects)
     ]
 
@@ -121,12 +121,12 @@ def _is_like_no_other(item: Object) -> bool:
     return item.density is not None or treatment_of(item) is Treatment.VOLUME
 
 
-def _told(medium: Medium | None, lit: bool) -> Hashable:
+def _medium_key(medium: Medium | None, lit: bool) -> Hashable:
     """Properties that matter of a medium that fills a point; None for none."""
     if medium is None:
         return None
-    told = (*medium.extinction.tolist(), *np.asarray(medium.emission).tolist())
-    return (*told, *np.asarray(medium.scattering).tolist(), medium.phase_function) if lit else told
+    key = (*medium.extinction.tolist(), *np.asarray(medium.emission).tolist())
+    return (*key, *np.asarray(medium.scattering).tolist(), medium.phase_function) if lit else key
 
 
 def indices(scene: Scene, keep: Callable[[Object], bool]) -> tuple[int, ...]:
@@ -149,7 +149,7 @@ def open_bodies(scene: Scene) -> tuple[int, ...]:
     return tuple(i for i in solids_of(scene) if not scene.objects[i].mesh.diagnosis.solid)
 
 
-def glowing_bodies(scene: Scene) -> tuple[int, ...]:
+def emitting_bodies(scene: Scene) -> tuple[int, ...]:
     """Indices of bodies whose surfaces emit light; layers, which do so in their own color, apart."""
     return indices(
         scene,

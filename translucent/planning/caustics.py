@@ -30,7 +30,7 @@ LEAST_IN_MEDIA, MOST_IN_MEDIA = 1 << 16, 1 << 18
 @checked
 @dataclass(frozen=True)
 class Caustics:
-    """Light of lamps and directional lights that interfaces bend and mirror onto opaque objects and media, by photons.
+    """Light of the lights of a scene that interfaces bend and mirror onto opaque objects and media, by photons.
 
     Photons (Jensen 1996) leave the lights towards the bodies, and are refracted or reflected there by chance, as
     Fresnel says; media absorb on the way. Those that have been bent or mirrored land on the first opaque surface, and
@@ -41,7 +41,7 @@ class Caustics:
 
     Others of them (`in_media`) are followed into bodies in which light diffuses, and light fog all along their ways.
 
-    The straight light of lamps ends at solids that bend light (`RenderPlan.opaque_to_shadows`).
+    The straight light of the lights ends at solids that bend light (`RenderPlan.opaque_to_shadows`).
 
     Interfaces show caustics behind them wherever the picture shows the receiver without them.
 
@@ -82,12 +82,12 @@ class Caustics:
 #: processor core: through a ball of glass into fog, measured on two busy cores.
 SECONDS_OF_A_PHOTON = 2.5e-5
 
-#: Passes that show light of media, of which the first that a plan has tells of photons in them.
+#: Passes that show light of media: the reason of the first one in a plan names the photons in them.
 _CARRYING = PassName.LIGHT_VIEWS, PassName.TRACED, PassName.SURFACES
 
 
 def opaque_to_shadows(scene: Scene) -> frozenset[int]:
-    """Numbers of the objects that stop the straight light of lamps where photons carry it: solids that bend it."""
+    """Numbers of the objects that stop the straight light of the lights where photons carry it: solids that bend it."""
     return frozenset(i for i, body in enumerate(scene.objects) if _turns_light(body) and body.sheet_thickness is None)
 
 
@@ -115,7 +115,7 @@ def check_caustics(scene: Scene, method: Method | None, lit: tuple[int, ...]) ->
 def passes_with_caustics(
     passes: tuple[PassSpec, ...], scene: Scene, caustics: Caustics, lit: tuple[int, ...]
 ) -> tuple[PassSpec, ...]:
-    """The passes of a plan with those that photons need, in their order."""
+    """The passes of a plan in their order, with the passes that photons need."""
     names = [one.name for one in passes]
     carries = next((name for name in _CARRYING if name in names), None)
     steps: list[PassSpec] = []
@@ -137,13 +137,13 @@ def _onto_opaque(scene: Scene, caustics: Caustics) -> PassSpec:
 def _shaded_with(step: PassSpec, scene: Scene, caustics: Caustics) -> PassSpec:
     """Pass that shades opaque objects without OpenGL, with the photons that land on them."""
     seconds = caustics.photons * SECONDS_OF_A_PHOTON * len(scene.objects)
-    told = f"{_landing(scene, caustics)}, followed on the processor, about {seconds:.2g} s"
-    return replace(step, reason=f"{step.reason}; {told}")
+    landed = f"{_landing(scene, caustics)}, followed on the processor, about {seconds:.2g} s"
+    return replace(step, reason=f"{step.reason}; {landed}")
 
 
 def _landing(scene: Scene, caustics: Caustics) -> str:
     return (
-        f"asked for: {caustics.photons:,} photons from {count_of(tuple(range(len(scene.lights))), 'light', 'lights')} "
+        f"requested: {caustics.photons:,} photons from {count_of(tuple(range(len(scene.lights))), 'light', 'lights')} "
         f"through {_bending(scene)}, added to what opaque objects reflect diffusely"
     )
 
@@ -152,7 +152,7 @@ def _into_media(step: PassSpec, scene: Scene, lit: tuple[int, ...], caustics: Ca
     """Pass that shows light of media, with the photons that carry it there."""
     seconds = caustics.in_media * SECONDS_OF_A_PHOTON * len(scene.objects)
     reason = (
-        f"{step.reason}; asked for: {caustics.in_media:,} photons, followed on the processor and again only where "
+        f"{step.reason}; requested: {caustics.in_media:,} photons, followed on the processor and again only where "
         f"objects or lights change, carry what {_bending(scene)} bends into {_names(scene, lit)}, about "
         f"{seconds:.2g} s"
     )
@@ -231,7 +231,7 @@ class PhotonAim:
     middle, right, up : (3,) float64
         Of the rectangle, and half its sides; these are 0 where photons leave in all directions.
     flux : (3,) float64
-        Of a directional light through the rectangle, or of a lamp as bright in all directions, in W; of a lamp
+        Of a directional light through the rectangle, or of a light as bright in all directions, in W; of a light
         that aims at a rectangle, to be multiplied by the cosine over the squared distance.
     weight : float
         Share of the photons, up to a factor.
@@ -347,7 +347,7 @@ def _bounds(places: Array) -> Array:
 
 
 def _apart(boxes: list[Array]) -> list[Array]:
-    """The boxes (2, 2), those that overlap joined, until none do: light through one is not that through another."""
+    """Boxes (2, 2), joined until no two overlap: no light goes through two of them."""
     found: list[Array] = []
     waiting = list(boxes)
     while waiting:

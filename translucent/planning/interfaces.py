@@ -39,7 +39,7 @@ LATER_REFRACTION = Note(
 
 
 @dataclass(frozen=True)
-class Interfaces:
+class InterfaceMode:
     """A way to find the interfaces at which light refracts and reflects; see its subclasses.
 
     Attributes
@@ -109,7 +109,7 @@ def touching_interfaces(scene: Scene) -> str | None:
         return None
     earlier, later = (solids[index] for index in found)
     names = f"{earlier.mesh.name!r} and {later.mesh.name!r}"
-    return f"interfaces of {names} may touch: the order tells where a ray leaves both"
+    return f"interfaces of {names} may touch: the order says where a ray leaves both"
 
 
 def owners(scene: Scene) -> str:
@@ -133,7 +133,7 @@ def effects_of(scene: Scene, *, bends: bool = True, mirrored: str = "the environ
     if any(surface.clearcoat for surface in surfaces):
         effects.append("clear coats mirror over them")
     if any(surface.transmission < 1 for surface in surfaces):
-        effects.append("paint reflects what does not enter")
+        effects.append("a diffuse base reflects what does not enter")
     if any((np.asarray(surface.color) != 1).any() or surface.color_texture for surface in surfaces):
         effects.append("colors tint what enters")
     if any(treatment_of(body) is Treatment.LAYER for body in bodies):
@@ -152,7 +152,7 @@ ONE_INTERFACE = Note(
 
 
 @dataclass(frozen=True)
-class FrontInterface(Interfaces):
+class FrontInterface(InterfaceMode):
     """The interface where each ray enters a body, and none where it leaves, as viewers of glTF have it.
 
     In one draw less than `ScreenInterfaces`; right for thin bodies, wrong for curved ones (KHR_materials_volume,
@@ -187,7 +187,7 @@ class FrontInterface(Interfaces):
 
 
 @dataclass(frozen=True)
-class ScreenInterfaces(Interfaces):
+class ScreenInterfaces(InterfaceMode):
     """The interface where each ray enters a body and the one where it leaves, both drawn in screen space (Wyman 2005).
 
     What lies farther on is crossed straight, interfaces mirror the environment only, and refracted rays find opaque
@@ -244,7 +244,7 @@ TRACE_COST = 50.0
 
 @checked
 @dataclass(frozen=True)
-class TracedInterfaces(Interfaces):
+class TracedInterfaces(InterfaceMode):
     """All interfaces that a ray meets, found by rays through the meshes: a tree of reflected and refracted ones.
 
     The tree of Whitted 1980: at an interface the reflected ray takes Fresnel's share, the refracted one the rest (Born
@@ -299,7 +299,7 @@ class TracedInterfaces(Interfaces):
         if (mirror := mirror_of(scene)) is not None:
             traced += f"; {mirror.ground.mesh.name!r} mirrors what stands on it, once"
         if dims_interfaces(scene):
-            traced += "; rays straight on to the lights tell what bodies keep of highlights, and of the light on paint"
+            traced += "; rays straight on to the lights find what bodies keep of highlights and diffuse reflection"
         return (
             PassSpec(PassName.INTERFACES, found, with_interfaces(scene), 1, cost=DRAW_COST * ONE_DRAWN),
             PassSpec(PassName.TRACED, traced, cost=TRACE_COST),
@@ -323,45 +323,43 @@ class TracedInterfaces(Interfaces):
         return "1 interface" if self.depth == 1 else f"{self.depth} interfaces"
 
 
-__all__ = ["INTERFACES", "FrontInterface", "Interfaces", "ScreenInterfaces", "TracedInterfaces"]
-
 #: Names on the command line.
-INTERFACES: dict[str, type[Interfaces]] = {
+INTERFACES: dict[str, type[InterfaceMode]] = {
     one.name: one for one in (TracedInterfaces, ScreenInterfaces, FrontInterface)
 }
 
 
-#: Interfaces that rays may meet if nobody asks for a number: wine in a glass needs them, and few rays go as far.
+#: Interfaces that rays may meet if no number is requested: wine in a glass needs them, and few rays go as far.
 USUAL_DEPTH = 12
 
 
-def _default_interfaces(*, solid: bool) -> Interfaces:
-    """The way that the planner takes, if nobody asks for one: sheets, which bend no ray, need no tracing."""
+def _default_interfaces(*, solid: bool) -> InterfaceMode:
+    """The way that the planner takes, if none is requested: sheets, which bend no ray, need no tracing."""
     return TracedInterfaces(depth=USUAL_DEPTH) if solid else ScreenInterfaces()
 
 
-def chosen_interfaces(scene: Scene, asked: Interfaces | None, *, sheets: bool) -> tuple[Interfaces, str]:
+def chosen_interfaces(scene: Scene, requested: InterfaceMode | None, *, sheets: bool) -> tuple[InterfaceMode, str]:
     """The way in which interfaces are found, and why it is not the one that the planner would rather take.
 
     Parameters
     ----------
     scene : Scene
-    asked : Interfaces, optional
+    requested : InterfaceMode, optional
     sheets : bool
         All bodies are drawn as sheets.
 
     Raises
     ------
     InputError
-        If what is asked for cannot be done in the scene.
+        If what is requested cannot be done in the scene.
     """
     solid = not sheets and any(scene.objects[i].sheet_thickness is None for i in with_interfaces(scene))
-    wanted = _default_interfaces(solid=solid) if asked is None else asked
-    if wanted.one_interface and not solid:
-        return ScreenInterfaces(), ""  # sheets have one interface, whatever is asked for
-    if sheets or not with_interfaces(scene) or (refusal := wanted.refusal(scene)) is None:
-        return wanted, ""
+    chosen = _default_interfaces(solid=solid) if requested is None else requested
+    if chosen.one_interface and not solid:
+        return ScreenInterfaces(), ""  # sheets have one interface, whatever is requested
+    if sheets or not with_interfaces(scene) or (refusal := chosen.refusal(scene)) is None:
+        return chosen, ""
     found, do = refusal
-    if asked is not None:
-        raise InputError(str(asked), found, do)
+    if requested is not None:
+        raise InputError(str(requested), found, do)
     return ScreenInterfaces(), found

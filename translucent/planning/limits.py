@@ -10,8 +10,8 @@ import numpy as np
 from translucent.formulas.color import luminance
 from translucent.formulas.two_stream import two_stream_absorption, two_stream_reflectance, two_stream_scattering
 from translucent.media.medium import Medium
-from translucent.planning.bodies import glowing_bodies, open_bodies, scatters, sheets_of
-from translucent.planning.interfaces import Interfaces
+from translucent.planning.bodies import emitting_bodies, open_bodies, scatters, sheets_of
+from translucent.planning.interfaces import InterfaceMode
 from translucent.planning.methods import Method
 from translucent.planning.passes import Note, NoteKind
 from translucent.planning.rendered import Treatment, treatment_of
@@ -73,7 +73,7 @@ def mesh_limits(scene: Scene, method: Method) -> list[Note]:
             marked = (
                 "their pixels are marked invalid"
                 if method.ordered
-                else f"{type(method).__name__} cannot tell which pixels show one, so all that it covers are marked "
+                else f"{type(method).__name__} cannot say which pixels show one, so all that it covers are marked "
                 "invalid; FragmentLists can"
             )
             limits.append(Note(NoteKind.INSIDE_OUT, f"{body.mesh.name!r}: {what}: {marked}"))
@@ -112,14 +112,14 @@ def layer_effects(scene: Scene, *, interfaces: bool) -> list[Note]:
     if layers := object_names(item for item in scene.bodies if item.covers):
         text = (
             f"{layers}: layers cast no shadows, rays that bend do not meet them, all media on a ray dim those behind "
-            "its first body, and they are painted object by object, far ones first, also where they cross"
+            "its first body, and they are drawn object by object, far ones first, also where they cross"
             if interfaces
             else f"what layers mirror: {layers} show diffuse light alone"
         )
         effects.append(Note(NoteKind.LAYERS, text))
-    if glowing := object_names(scene.objects[i] for i in glowing_bodies(scene)):
+    if emitting := object_names(scene.objects[i] for i in emitting_bodies(scene)):
         what = "add it where a ray first enters a body, and nowhere behind" if interfaces else "not at all"
-        effects.append(Note(NoteKind.GLOW, f"light of surfaces that glow: {glowing} {what}"))
+        effects.append(Note(NoteKind.GLOW, f"light of surfaces that emit: {emitting} {what}"))
     if cut := object_names(item for item in scene.bodies if _wants_holes(item)):
         text = f"holes by alpha_cutoff: {cut} drawn closed, since a solid with a hole has no inside"
         effects.append(Note(NoteKind.HOLES, text))
@@ -142,7 +142,7 @@ STRAIGHT = Note(
 AMBIENT = "of the ambient radiance A, media scatter sigma_s A for each metre, which counts as emitted"
 
 
-def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: Interfaces | None = None) -> tuple[Note, ...]:
+def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: InterfaceMode | None = None) -> tuple[Note, ...]:
     """Notes on effects that the scene asks for and a plan does not render.
 
     Parameters
@@ -150,7 +150,7 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: Interfaces
     scene : Scene
     scattering : bool
         The plan has light scattered into the rays.
-    interfaces : Interfaces, optional
+    interfaces : InterfaceMode, optional
         How the plan finds interfaces; None if it leaves out what they and the surfaces of opaque objects do to light.
     """
     surfaces = interfaces is not None
@@ -159,8 +159,8 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: Interfaces
     if clear := [body for body in scene.bodies if _is_invisible(body)]:
         text = f"{object_names(clear)}: invisible, since nothing in it absorbs, scatters or emits"
         effects.append(Note(NoteKind.INVISIBLE, text))
-    if not surfaces and (finished := [item for item in scene.opaque if item.surface is not None]):
-        text = f"surfaces of opaque objects: {object_names(finished)} reflect diffusely, in one color each"
+    if not surfaces and (surfaced := [item for item in scene.opaque if item.surface is not None]):
+        text = f"surfaces of opaque objects: {object_names(surfaced)} reflect diffusely, in one color each"
         effects.append(Note(NoteKind.OPAQUE_SURFACES, text))
     effects += layer_effects(scene, interfaces=surfaces)
     effects += shadow_effects(scene) if scene.opaque else []
@@ -215,7 +215,7 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
         if followed:
             densest = max(float(np.max(np.asarray(medium.scattering))) for medium in media)
             text = (
-                "light scattered more than once, of which there is much in bodies that are thicker than a mean free "
+                "light scattered more than once, which is much in bodies that are thicker than a mean free "
                 f"path, here {1 / densest:.2g} m; light of the environment scattered"
             )
             return [*notes, Note(NoteKind.SCATTERED_AGAIN, text)]
@@ -250,7 +250,7 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
     return notes
 
 
-def _refraction_effects(scene: Scene, interfaces: Interfaces | None) -> list[Note]:
+def _refraction_effects(scene: Scene, interfaces: InterfaceMode | None) -> list[Note]:
     """Notes on refracted and reflected light that is not rendered."""
     if not any(body.has_interface for body in scene.bodies):
         return []

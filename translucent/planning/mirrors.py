@@ -9,7 +9,7 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.scene.scene import Object, Scene
 
-#: Roughness above which a coat mirrors no more than a haze.
+#: Roughness above which a coat mirrors a blur and no more.
 MOST_ROUGHNESS = 0.4
 
 #: Largest distance of a ground's vertices from its plane, as a share of its size.
@@ -85,7 +85,7 @@ def _is_smooth(item: Object) -> bool:
 
 
 def _flat(item: Object) -> Mirror | None:
-    """Plane of an object all of which lies in one."""
+    """Plane of a flat object; None for others."""
     corners = (item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3])[item.mesh.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
     normal *= -1.0 if item.mirrored else 1.0

@@ -32,7 +32,7 @@ from translucent.planning.caustics import (
 )
 from translucent.planning.interfaces import (
     USUAL_DEPTH,
-    Interfaces,
+    InterfaceMode,
     ScreenInterfaces,
     TracedInterfaces,
     chosen_interfaces,
@@ -75,7 +75,7 @@ def plan(
     method: Method | None = None,
     capabilities: Capabilities | None = None,
     *,
-    interfaces: Interfaces | None = None,
+    interfaces: InterfaceMode | None = None,
     scattering: Scattering | None = None,
     caustics: Caustics | None = None,
     shadows: ShadowMaps | None = None,
@@ -101,8 +101,8 @@ def plan(
     Raises
     ------
     InputError
-        If no available method can render the scene, or not with interfaces, scattering, caustics or shadows as asked
-        for.
+        If no available method can render the scene, or not with interfaces, scattering, caustics or shadows as
+        requested.
     """
     request = RenderRequest(method, 1, interfaces, scattering, caustics, shadows)
     return plan_scene(scene, request, capabilities)
@@ -135,7 +135,7 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
         found = replace(
             found,
             scene=rendered_scene(scene, Treatments(everywhere)),
-            passes=(*found.passes, *paths.passes(scene, "asked for")),
+            passes=(*found.passes, *paths.passes(scene, "requested")),
             limits=(*found.limits, *paths.limits(scene)),
             unmodelled=paths.unmodelled(scene),
             paths=paths,
@@ -150,7 +150,7 @@ def _treatments(scene: Scene, request: RenderRequest, machine: Capabilities) -> 
     """How bodies show light that they scatter many times."""
     method, scattering = request.method, request.scattering
     # Where nothing bends, a method that is requested is the sum that is requested, of light scattered once; and ambient
-    # light stands for what is scattered often.
+    # light represents what is scattered often.
     matched = scattering is not None or (method is None and not scene.scatters_ambient)
     volumes = machine.opengl and machine.shader_storage and (method is None or method.marches)
     return choose_treatments(scene, scattering, layers=machine.opengl, matched=matched, volumes=volumes)
@@ -197,7 +197,7 @@ def _method(
     scene: Scene,
     method: Method | None,
     machine: Capabilities,
-    interfaces: Interfaces,
+    interfaces: InterfaceMode,
     caustics: Caustics | None = None,
 ) -> tuple[Method, str]:
     """The method of a renderer with OpenGL, and why it is that one; refuses what is requested if it cannot do."""
@@ -206,19 +206,19 @@ def _method(
     if method is None and any(treatment_of(body) is Treatment.VOLUME for body in scene.bodies):
         return scattered_again_method(scene, caustics), "light scattered again into the rays: steps look it up"
     if method is not None and method.ordered:
-        return method, "asked for"
+        return method, "requested"
     if (why := why_order_matters(scene, method, interfaces)) is not None:
         return _ordered_method(scene, method, machine, why), why
     if method is not None:
-        return method, "asked for"
+        return method, "requested"
     if scatters(scene) and machine.shader_storage:
         return FragmentLists(), "light scattered into the rays: each interval looks at the lights"
     if not solids_of(scene):
         return ThinLayer(), "all bodies are declared sheets"
-    return SignedDepth(), "a sum over each ray tells its picture"
+    return SignedDepth(), "a sum over each ray gives its picture"
 
 
-#: Smallest number of steps through an interval of varying density, unless told otherwise.
+#: Smallest number of steps through an interval of varying density, unless requested otherwise.
 LEAST_STEPS = 64
 
 
@@ -227,12 +227,12 @@ FOG_POINTS = 16
 
 
 def marching_method(scene: Scene, method: Method | None, capabilities: Capabilities) -> Method:
-    """Ray marching for varying densities: as asked for, or with a step for each voxel, and at least 64.
+    """Ray marching for varying densities: as requested, or with a step for each voxel, and at least 64.
 
     Raises
     ------
     InputError
-        If another method is asked for, or the machine cannot march.
+        If another method is requested, or the machine cannot march.
     """
     names = object_names(body for body in scene.bodies if body.density is not None)
     if not capabilities.shader_storage:
@@ -247,7 +247,7 @@ def marching_method(scene: Scene, method: Method | None, capabilities: Capabilit
     if not method.marches:
         raise InputError(
             type(method).__name__,
-            f"{names}: the density varies, and only steps through the intervals tell how deep they are",
+            f"{names}: the density varies, and only steps through the intervals find how deep they are",
             "use RayMarched, or leave the choice to the planner",
         )
     return method
@@ -256,7 +256,7 @@ def marching_method(scene: Scene, method: Method | None, capabilities: Capabilit
 def scattered_again_method(scene: Scene, caustics: Caustics | None = None) -> RayMarched:
     """Ray marching through fog of one density.
 
-    A few Gauss-Legendre points, which are more accurate than four times as many steps; near a lamp inside, where light
+    A few Gauss-Legendre points, which are more accurate than four times as many steps; near a light inside, where light
     falls off as 1 / r^2 from a peak, or for a spot, which shines between two angles, steps of equal angles instead; and
     even steps through light of photons, which is as narrow as cells.
     """
@@ -264,14 +264,14 @@ def scattered_again_method(scene: Scene, caustics: Caustics | None = None) -> Ra
         return RayMarched(steps=LEAST_STEPS)
     if any(isinstance(light, SpotLight) for light in scene.lights):
         return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
-    lamps = [np.asarray(light.position) for light in scene.lights if isinstance(light, PositionalLight)]
+    lights = [np.asarray(light.position) for light in scene.lights if isinstance(light, PositionalLight)]
     fogs = [body.bounds for body in scene.bodies if treatment_of(body) is Treatment.VOLUME]
-    if any((low <= lamp).all() and (lamp <= high).all() for lamp in lamps for low, high in fogs):
+    if any((low <= position).all() and (position <= high).all() for position in lights for low, high in fogs):
         return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
     return RayMarched(steps=FOG_POINTS, quadrature="gauss")
 
 
-def why_order_matters(scene: Scene, method: Method | None, interfaces: Interfaces) -> str | None:
+def why_order_matters(scene: Scene, method: Method | None, interfaces: InterfaceMode) -> str | None:
     """Reason why this scene needs ordered surfaces rather than a sum over each ray; None if a sum suffices."""
     bodies = scene.bodies
     if media_differ(scene) and any(body.medium is not None and body.medium.emits for body in bodies):
@@ -299,13 +299,13 @@ def why_order_matters(scene: Scene, method: Method | None, interfaces: Interface
 
 
 def _inside_out(scene: Scene) -> str | None:
-    """Reason that a body is inside out in places, so that a sum cannot tell its pixels apart; None where intervals
+    """Reason that a body is inside out in places, so that a sum cannot say which pixels show that; None where intervals
     cannot.
     """
     broken = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.inside_out]
     if not broken or len(medium_slots(scene)) > MAX_SLOTS:
         return None
-    return f"{broken[0].mesh.name!r} is inside out in places, and a sum does not tell which pixels show one"
+    return f"{broken[0].mesh.name!r} is inside out in places, and a sum does not say which pixels show one"
 
 
 def _ordered_method(scene: Scene, method: Method | None, machine: Capabilities, why: str) -> Method:
@@ -324,15 +324,15 @@ def _ordered_method(scene: Scene, method: Method | None, machine: Capabilities, 
 
 
 def _cheapest_ordered(scene: Scene, machine: Capabilities) -> Method:
-    """Method with the lowest expected cost of those that find all intervals."""
-    # Of two that cost the same the lists come first: peeling waits for a count before it goes on.
+    """Method with the lowest expected cost that finds all intervals."""
+    # Of two that cost the same the lists come first: peeling reads a count back before it goes on.
     candidates: list[Method] = [FragmentLists()] if machine.shader_storage else []
     candidates.append(DepthPeeling())
     return min(candidates, key=lambda method: sum(step.cost for step in method.passes(scene, "")))
 
 
 def _traced(
-    scene: Scene, method: Method | None, interfaces: Interfaces | None, machine: Capabilities, *, ambient: bool
+    scene: Scene, method: Method | None, interfaces: InterfaceMode | None, machine: Capabilities, *, ambient: bool
 ) -> RenderPlan:
     """Plan for a renderer without OpenGL, which finds all surfaces on each ray, whatever the method."""
     followed = _followed(scene, interfaces)
@@ -340,7 +340,7 @@ def _traced(
     sheets = chosen.makes_sheets
     reason = "no OpenGL: all surfaces on each ray, in float64"
     if method is not None and not sheets:
-        reason += f", in place of {method}, which was asked for"
+        reason += f", in place of {method}, which was requested"
     if followed is not None and interfaces is not None and not interfaces.traced:
         reason += f"; and {followed} in place of {interfaces}"
     shading = "sheets in order" if sheets else "the intervals between them in order, exactly"
@@ -354,15 +354,15 @@ def _traced(
     return RenderPlan(scene, chosen, passes, True, limits, unmodelled, interfaces=followed, traced=True)
 
 
-def _followed(scene: Scene, interfaces: Interfaces | None) -> Interfaces | None:
-    """The interfaces that a renderer without OpenGL follows: all, whatever is asked for, as far as tracing would."""
+def _followed(scene: Scene, interfaces: InterfaceMode | None) -> InterfaceMode | None:
+    """The interfaces that a renderer without OpenGL follows: all, whatever is requested, as far as tracing would."""
     if not with_interfaces(scene):
         return None
     return interfaces if interfaces is not None and interfaces.traced else TracedInterfaces(depth=USUAL_DEPTH)
 
 
 def _with_caustics(found: RenderPlan, scene: Scene, caustics: Caustics, machine: Capabilities) -> RenderPlan:
-    """The plan with photons; refuses those that could not land, or that the method does not follow."""
+    """The plan with photons; refuses them where none could land, or the method follows none."""
     volumes = found.treated(Treatment.VOLUME)
     lit = lit_by_photons(scene, found.treated(Treatment.VOLUME, Treatment.DIFFUSION))
     check_caustics(scene, found.request.method, lit)
@@ -423,9 +423,11 @@ _MAPS: weakref.WeakKeyDictionary[Object, tuple[Hashable, tuple[MapPlan, ...]]] =
 
 def _check_paths(scene: Scene, request: RenderRequest, method: PathTraced, machine: Capabilities) -> None:
     """Raise `InputError` if paths cannot render a scene, or something is requested that they take the place of."""
-    for what, asked in (("interfaces", request.interfaces), ("scattering", request.scattering)):
-        if asked is not None:
-            raise InputError(f"{method} with {what}={asked}", f"paths take the place of {what}", "give one of the two")
+    for what, requested in (("interfaces", request.interfaces), ("scattering", request.scattering)):
+        if requested is not None:
+            raise InputError(
+                f"{method} with {what}={requested}", f"paths take the place of {what}", "give one of the two"
+            )
     if not machine.opengl:
         found = "paths are followed by OpenGL, and this renderer works on the CPU"
         raise InputError(str(method), found, "use tl.reference.path_trace(scene, size, paths), or an OpenGL backend")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from translucent.arguments import checked
 from translucent.planning.caustics import Caustics
-from translucent.planning.interfaces import INTERIOR_SIZE, Interfaces, TracedInterfaces
+from translucent.planning.interfaces import INTERIOR_SIZE, InterfaceMode, TracedInterfaces
 from translucent.planning.methods import Method, PathTraced
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.rendered import Treatment, occluder_scene, occluders, treatment_of
@@ -102,12 +102,12 @@ class RenderPlan:
     caustics : Caustics, optional
         The photons that land on opaque objects, and light media; None where none do.
     opaque_to_shadows : frozenset of int
-        Numbers of the objects through which no straight light of lamps falls onto others, since photons carry what
+        Numbers of the objects through which no straight light of the lights falls onto others, since photons carry what
         their interfaces bend.
     shadows : ShadowMaps
         How shadows on opaque objects are found, if the plan has the pass.
     maps : tuple of MapPlan
-        Then, of the maps that lights see, and of those that the environment sees if they differ.
+        Then, of the maps of lights, and of the maps of the environment if they differ.
     request : RenderRequest
         What was requested.
     """
@@ -119,7 +119,7 @@ class RenderPlan:
     limits: tuple[Note, ...] = ()
     unmodelled: tuple[Note, ...] = ()
     remarks: tuple[Note, ...] = ()
-    interfaces: Interfaces | None = None
+    interfaces: InterfaceMode | None = None
     diffusion: Diffusion = field(default_factory=Diffusion)
     traced: bool = False
     paths: PathTraced | None = None
@@ -155,15 +155,10 @@ class RenderPlan:
         ways = (
             (Treatment.DIFFUSION, f"diffuses ({self.diffusion})"),
             (Treatment.VOLUME, f"is scattered on ({self.diffusion})"),
-            (Treatment.LAYER, "is given back as by layers"),
+            (Treatment.LAYER, "leaves as from layers"),
         )
         counts = ((len(self.treated(treatment)), way) for treatment, way in ways)
         return ", and ".join(f"{way} in {count} {'body' if count == 1 else 'bodies'}" for count, way in counts if count)
-
-    @property
-    def given_back(self) -> str:
-        """Former name of `multiple_scattering`."""
-        return self.multiple_scattering
 
     @property
     def exact(self) -> bool:

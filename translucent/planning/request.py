@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from translucent.arguments import brief
 from translucent.errors import InputError
 from translucent.planning.caustics import Caustics
-from translucent.planning.interfaces import FrontInterface, Interfaces, ScreenInterfaces, TracedInterfaces
+from translucent.planning.interfaces import FrontInterface, InterfaceMode, ScreenInterfaces, TracedInterfaces
 from translucent.planning.methods import Method
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
 from translucent.planning.shadow_maps import ShadowMaps
@@ -21,7 +21,7 @@ _OLD_NAMES = {"both": ScreenInterfaces(), "front": FrontInterface()}
 #: Choices, their types, what these are called, and examples.
 _TYPES: tuple[tuple[str, type, str, tuple[object, ...]], ...] = (
     ("method", Method, "a thickness method", ("SignedDepth()",)),
-    ("interfaces", Interfaces, "a choice of interfaces", (TracedInterfaces(), ScreenInterfaces(), FrontInterface())),
+    ("interfaces", InterfaceMode, "a choice of interfaces", (TracedInterfaces(), ScreenInterfaces(), FrontInterface())),
     ("scattering", Scattering, "a choice of scattering", (Diffusion(), ScatteringLayer(), SingleScattering())),
     ("caustics", Caustics, "tl.Caustics", ("Caustics(photons=1_000_000)",)),
     ("shadows", ShadowMaps, "a choice of shadows", ("ShadowMaps(size=2048)",)),
@@ -52,7 +52,7 @@ class RenderRequest:
 
     method: Method | None = None
     samples: int = 1
-    interfaces: Interfaces | None = None
+    interfaces: InterfaceMode | None = None
     scattering: Scattering | None = None
     caustics: Caustics | None = None
     shadows: ShadowMaps | None = None
@@ -62,8 +62,8 @@ class RenderRequest:
 
     def __post_init__(self) -> None:
         if not isinstance(self.samples, int) or not 1 <= self.samples <= MAX_SAMPLES:
-            asked, found = f"samples {brief(self.samples)}", f"not a whole number in 1 to {MAX_SAMPLES}"
-            raise InputError(asked, found, "give for example 16")
+            found = f"not a whole number in 1 to {MAX_SAMPLES}"
+            raise InputError(f"samples {brief(self.samples)}", found, "give for example 16")
         for name, kind, what, examples in _TYPES:
             value = getattr(self, name)
             if value is not None and not isinstance(value, kind):

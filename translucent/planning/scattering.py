@@ -25,19 +25,19 @@ class Scattering:
     ----------
     name : str
         On the command line.
-    gives_back : bool
-        Bodies give back what they scatter many times.
+    multiple : bool
+        Shows light that is scattered many times.
     """
 
     name: ClassVar[str] = ""
-    gives_back: ClassVar[bool] = False
+    multiple: ClassVar[bool] = False
 
     def refusal(self, body: Object) -> str | None:
         """Reason why a body cannot be shown so; None if it can."""
         return None
 
 
-#: Resolutions that make sense: below, no body has an inside; above, the memory told in the error is needed.
+#: Resolutions that make sense: below, no body has an inside; above, more memory is needed, as the error says.
 LEAST_RESOLUTION, MOST_RESOLUTION = 8, 128
 
 #: Resolution from which on solutions are corrected by uniform light. At 12, pixels of milk, jade and wax in bear and
@@ -69,7 +69,7 @@ class Diffusion(Scattering):
     """
 
     name: ClassVar[str] = "diffusion"
-    gives_back: ClassVar[bool] = True
+    multiple: ClassVar[bool] = True
 
     resolution: int = 32
 
@@ -121,7 +121,7 @@ class ScatteringLayer(Scattering):
     """
 
     name: ClassVar[str] = "layer"
-    gives_back: ClassVar[bool] = True
+    multiple: ClassVar[bool] = True
 
     def refusal(self, body: Object) -> str | None:
         """Reason: the density varies."""
@@ -138,7 +138,7 @@ class SingleScattering(Scattering):
     Parameters
     ----------
     points : int
-        On each interval, at which each light is looked at; a method that is asked for has its own.
+        On each interval, at which each light is looked at; a method that is requested has its own.
     """
 
     name: ClassVar[str] = "single"
@@ -193,7 +193,7 @@ def choose_treatments(
 ) -> Treatments:
     """Choose how the bodies of a scene show light that they scatter many times.
 
-    Unless it is requested, those that scatter little do not show any.
+    Unless it is requested, bodies that scatter little do not show any.
 
     Parameters
     ----------
@@ -211,9 +211,9 @@ def choose_treatments(
     InputError
         If what is requested can be done for none of the bodies that scatter.
     """
-    if requested is not None and not requested.gives_back:
+    if requested is not None and not requested.multiple:
         return Treatments()
-    wanted = Diffusion() if requested is None else requested
+    chosen = Diffusion() if requested is None else requested
     bodies = {
         i: body
         for i, body in enumerate(scene.objects)
@@ -223,7 +223,7 @@ def choose_treatments(
         and (body.has_interface or matched)
         and (requested is not None or _is_deep(body, body.medium))
     }
-    refused = {i: why for i, body in bodies.items() if (why := wanted.refusal(body)) is not None}
+    refused = {i: why for i, body in bodies.items() if (why := chosen.refusal(body)) is not None}
     if not volumes:
         refused |= {i: _NO_STEPS for i, body in bodies.items() if _is_cloud(body)}
     if requested is None and len(bodies) - len(refused) > MOST_DIFFUSED:
@@ -231,21 +231,21 @@ def choose_treatments(
         refused = dict.fromkeys(bodies, many) | refused
     layer, of = ScatteringLayer(), dict[int, Treatment]()
     for i, body in bodies.items():
-        if layers and (i in refused or wanted == layer) and layer.refusal(body) is None:
+        if layers and (i in refused or chosen == layer) and layer.refusal(body) is None:
             of[i] = Treatment.LAYER
-        elif i not in refused and isinstance(wanted, Diffusion):
+        elif i not in refused and isinstance(chosen, Diffusion):
             of[i] = Treatment.DIFFUSION
     if requested is not None and bodies and not of:
         i = next(iter(bodies))
         why = refused.get(i, "this renderer draws no layers")
         raise InputError(str(requested), f"{scene.objects[i].mesh.name!r}: {why}", "use SingleScattering()")
-    if not isinstance(wanted, Diffusion):
+    if not isinstance(chosen, Diffusion):
         return Treatments(of)
     if volumes:
         solved = [i for i, treatment in of.items() if treatment is Treatment.DIFFUSION]
-        of |= dict.fromkeys(_volumes(scene, solved, wanted), Treatment.VOLUME)
+        of |= dict.fromkeys(_volumes(scene, solved, chosen), Treatment.VOLUME)
     layered = tuple((i, why) for i, why in refused.items() if of.get(i) is Treatment.LAYER)
-    return Treatments(of, wanted, layered)
+    return Treatments(of, chosen, layered)
 
 
 def rendered_scene(scene: Scene, treatments: Treatments) -> Scene:
@@ -268,10 +268,10 @@ def rendered_scene(scene: Scene, treatments: Treatments) -> Scene:
     return replace(scene, objects=objects, ambient=(0.0, 0.0, 0.0))
 
 
-def _volumes(scene: Scene, solved: list[int], wanted: Diffusion) -> tuple[int, ...]:
+def _volumes(scene: Scene, solved: list[int], chosen: Diffusion) -> tuple[int, ...]:
     """The bodies into whose rays light is scattered, as far as each can have winding numbers of its own."""
     varying = tuple(i for i in solved if _is_cloud(scene.objects[i]))
-    even = tuple(i for i in solved if scene.objects[i].density is None and _is_volume(scene.objects[i], wanted))
+    even = tuple(i for i in solved if scene.objects[i].density is None and _is_volume(scene.objects[i], chosen))
     fogs = varying + even
     return fogs if not fogs or len(medium_slots(scene, apart=fogs)) <= MAX_SLOTS else varying
 
@@ -286,11 +286,11 @@ def _is_deep(body: Object, medium: Medium) -> bool:
     return bool(reduced.max() * densest * body.mean_thickness > LEAST_DEPTH)
 
 
-def _is_volume(body: Object, wanted: Diffusion) -> bool:
+def _is_volume(body: Object, chosen: Diffusion) -> bool:
     """True if rays gather light in a body of one density: where they see more than a skin beneath all cells."""
     if body.has_interface:
         return False
     assert body.medium is not None
     medium = body.medium
     reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
-    return float(reduced.max()) * wanted.cell_size(body) < MOST_CELL_DEPTH
+    return float(reduced.max()) * chosen.cell_size(body) < MOST_CELL_DEPTH

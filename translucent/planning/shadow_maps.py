@@ -85,7 +85,7 @@ def shadow_passes(scene: Scene, *, over_backdrop: bool = False) -> tuple[PassSpe
     receivers = "the picture drawn elsewhere" if over_backdrop else count_of(opaque, "opaque object", "opaque objects")
     reason = (
         f"{sources} on {receivers}: signed depth from each, as far as the "
-        "first opaque surface, tells the color of its shadow; kept until objects or lights change"
+        "first opaque surface, gives the color of its shadow; kept until objects or lights change"
     )
     cost = views * (1.0 + SignedDepth.cost_for(spectral=media_differ(scene)))
     return (PassSpec(PassName.SHADOW_MAPS, reason, tuple(range(len(scene.objects))), views, cost=cost),)

@@ -26,7 +26,7 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import drawn_normals, has_drawn_normals, keep_drawn_normals, made_normals
 from translucent.geometry.solids import Box
 from translucent.gpu.hierarchies import has_packed, keep_packed, pack_mesh
-from translucent.gpu.refinement import PhotonLight
+from translucent.gpu.refinement import PhotonPicture
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import CompileBudget, ProgramName
 from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
@@ -200,7 +200,7 @@ def compile_frames(plans: Sequence[RenderPlan], device: str, presents: bool = Fa
                 for _ in range(2):  # into other types of targets: the centers of pixels, and what is added to them
                     viewport.step(0, plan, 1, 1)
                 if plan.caustics is not None:
-                    light = PhotonLight(engine, plan, FRAME)
+                    light = PhotonPicture(engine, plan, FRAME)
                     light.step(0.0)
                     light.show()
                     viewport.step(1, plan, 1, photons=light.texture)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 from translucent.diffusion.keys import diffusion_key, media_lit_by_photons, place_of
 from translucent.errors import InputError
 from translucent.gpu.diffusion import DiffusionCache
-from translucent.gpu.refinement import Convergence, PhotonLight
+from translucent.gpu.refinement import Convergence, PhotonPicture
 from translucent.gpu.viewport import STRIDES, Viewport
 from translucent.planning.caustics import Caustics
 from translucent.planning.interfaces import ScreenInterfaces
@@ -395,7 +395,7 @@ class PhotonRefinement:
         How many photons there are, and how noisy their light is; or why there are none; or nothing.
     plan : RenderPlan, optional
         Plan with caustics, while photons are followed.
-    light : PhotonLight, optional
+    light : PhotonPicture, optional
     drawing : bool
         A picture is to be drawn with the light as it is.
     side : int
@@ -410,7 +410,7 @@ class PhotonRefinement:
     def _reset(self) -> None:
         self.note = ""
         self.plan: RenderPlan | None = None
-        self.light: PhotonLight | None = None
+        self.light: PhotonPicture | None = None
         self.drawing, self.side, self._on_show, self.in_media = False, 1, False, False
         self._in_texture = self._in_picture = 0  # photons
         self._scene: Scene | None = None
@@ -453,7 +453,7 @@ class PhotonRefinement:
             if not self.plan.has(PassName.CAUSTICS):
                 return False  # nothing opaque that more could land on
             if self.light is None:
-                self.light = PhotonLight(renderer.gpu, self.plan, viewport.size)
+                self.light = PhotonPicture(renderer.gpu, self.plan, viewport.size)
                 self.note = "caustics: the first photons"
                 return True
         except InputError as error:

@@ -15,7 +15,7 @@ from translucent.reference.segments import Segments
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
+class ColorLayer:
     """Layer: a color and its opacity.
 
     Attributes
@@ -40,27 +40,27 @@ class Layer:
 
 
 @np.errstate(under="ignore", over="ignore")
-def over(front: Layer, back: Layer) -> Layer:
+def over(front: ColorLayer, back: ColorLayer) -> ColorLayer:
     """Composite of two layers of associated colors: C = C_f + (1 - a_f) C_b."""
-    return Layer(front.color + front.transmittance * back.color, front.optical_depth + back.optical_depth)
+    return ColorLayer(front.color + front.transmittance * back.color, front.optical_depth + back.optical_depth)
 
 
 @np.errstate(under="ignore", over="ignore")
-def over_unassociated(front: Layer, back: Layer) -> Layer:
+def over_unassociated(front: ColorLayer, back: ColorLayer) -> ColorLayer:
     """Composite of two layers of unassociated colors: C = (a_f C_f + (1 - a_f) a_b C_b) / a."""
     both = front.opacity * front.color + front.transmittance * back.opacity * back.color
     depth = front.optical_depth + back.optical_depth
-    return Layer(_divided(both, optics.opacity(depth)), depth)
+    return ColorLayer(_divided(both, optics.opacity(depth)), depth)
 
 
 @np.errstate(under="ignore")
-def associated(layer: Layer) -> Layer:
+def associated(layer: ColorLayer) -> ColorLayer:
     """Layer with its unassociated color converted to the associated color, a C."""
-    return Layer(layer.opacity * layer.color, layer.optical_depth)
+    return ColorLayer(layer.opacity * layer.color, layer.optical_depth)
 
 
 @np.errstate(under="ignore")
-def unassociated(layer: Layer) -> Layer:
+def unassociated(layer: ColorLayer) -> ColorLayer:
     """Layer with its associated color converted to the unassociated color, C / a.
 
     Raises
@@ -72,7 +72,7 @@ def unassociated(layer: Layer) -> Layer:
         raise InputError(
             "unassociated colors", "a step that shines without being opaque at all", "use associated colors"
         )
-    return Layer(_divided(layer.color, layer.opacity), layer.optical_depth)
+    return ColorLayer(_divided(layer.color, layer.opacity), layer.optical_depth)
 
 
 def _divided(color: Array, opacity: Array) -> Array:

@@ -18,7 +18,7 @@ from translucent.planning.methods import Method, RayMarched
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.reference import compositing as blending
-from translucent.reference.compositing import Layer, _layers
+from translucent.reference.compositing import ColorLayer, _layers
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.quadrature import MarchSteps, even_steps, gauss_steps, hashed
 from translucent.reference.rays import Rays, pixel_rays
@@ -195,10 +195,10 @@ class _March:
         other = tuple(light for light in lights if not isinstance(light, PositionalLight))
         return [_Terms(True, other), *(_Terms(False, (light,), light) for light in point)]
 
-    def _composited(self, terms: _Terms) -> Layer:
+    def _composited(self, terms: _Terms) -> ColorLayer:
         """Composite of all steps of each ray as one layer with associated color, (rays, 3)."""
         shape = (len(self.rays), 3)
-        total = Layer(np.zeros(shape), np.zeros(shape))
+        total = ColorLayer(np.zeros(shape), np.zeros(shape))
         front_to_back = self.scheme.compositing == "front-to-back"
         blend = blending.over if self.scheme.associated else blending.over_unassociated
         spans = list(self._spans())
@@ -206,14 +206,14 @@ class _March:
             for part in _slices(span, self.scheme.method.steps):
                 layers = self._layers(part, terms)
                 for layer in layers if front_to_back else reversed(layers):
-                    on = ~self._stopped(Layer(total.color[part.ray], total.optical_depth[part.ray]))
-                    ray, step = part.ray[on], Layer(layer.color[on], layer.optical_depth[on])
-                    so_far = Layer(total.color[ray], total.optical_depth[ray])
+                    on = ~self._stopped(ColorLayer(total.color[part.ray], total.optical_depth[part.ray]))
+                    ray, step = part.ray[on], ColorLayer(layer.color[on], layer.optical_depth[on])
+                    so_far = ColorLayer(total.color[ray], total.optical_depth[ray])
                     blended = blend(so_far, step) if front_to_back else blend(step, so_far)
                     total.color[ray], total.optical_depth[ray] = blended.color, blended.optical_depth
         return total if self.scheme.associated else blending.associated(total)
 
-    def _stopped(self, layer: Layer) -> Mask:
+    def _stopped(self, layer: ColorLayer) -> Mask:
         """(k,): rays that end, since this layer is nearly opaque."""
         return np.asarray(layer.transmittance.max(axis=1) < self.scheme.termination)
 
@@ -228,7 +228,7 @@ class _March:
             ray = np.unique(segments.pixel)
             yield _Spans(ray, np.maximum(start[ray], 0.0), end[ray], None, 0)
 
-    def _layers(self, spans: _Spans, terms: _Terms) -> list[Layer]:
+    def _layers(self, spans: _Spans, terms: _Terms) -> list[ColorLayer]:
         """The steps of each span in order, by their own associated colors or, if so asked, unassociated ones."""
         steps = self._steps(spans, terms)
         extinction, source = self._sampled(spans, steps.at, terms)
@@ -239,7 +239,7 @@ class _March:
             else:
                 before = optics.transmittance(extinction * (steps.at - steps.begin)[..., None])
                 color = source * before * steps.weight[..., None]
-        layers = [Layer(color[:, i], depth[:, i]) for i in range(depth.shape[1])]
+        layers = [ColorLayer(color[:, i], depth[:, i]) for i in range(depth.shape[1])]
         return layers if self.scheme.associated else [blending.unassociated(layer) for layer in layers]
 
     def _steps(self, spans: _Spans, terms: _Terms) -> MarchSteps:

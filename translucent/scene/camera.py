@@ -139,10 +139,10 @@ class Camera(Frozen):
         aside, back = pose[:3, :2], pose[:3, 2:3]
         half = np.tan(np.radians(fov_y) / 2) * np.array([size[0] / size[1], 1.0]) / FRAMING_MARGIN
         # Each point asks for |x - cx| <= half (distance - z): the two sides of the picture meet where both are tight.
-        asked = np.concatenate([half * back + aside, half * back - aside, back], axis=1)
+        axes = np.concatenate([half * back + aside, half * back - aside, back], axis=1)
         middle, farthest = 0.5 * (low + high), np.full(5, -np.inf)
         for begin in range(0, len(seen), FRAMED_AT_ONCE):  # millions of points would take room
-            part = (seen[begin : begin + FRAMED_AT_ONCE] - middle) @ asked
+            part = (seen[begin : begin + FRAMED_AT_ONCE] - middle) @ axes
             farthest = np.maximum(farthest, extent(part)[1])
         upper, lower = farthest[:2], farthest[2:4]
         center, distance = (upper - lower) / 2, float(((upper + lower) / (2 * half)).max())

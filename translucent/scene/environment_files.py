@@ -48,23 +48,23 @@ def read_linear(path: Path) -> Pixels:
     """Linear values (h, w, 3) of a ``.exr`` file, or else of one of Radiance; raises as `read_environment_map`."""
     if path.suffix.lower() != ".exr":
         return read_radiance(path)
-    asked = f"picture {str(path)!r}"
-    _, channels = read_exr(path, asked)
+    what = f"picture {str(path)!r}"
+    _, channels = read_exr(path, what)
     for names in ("RGB", "YYY"):
         if set(names) <= channels.keys():
             return np.stack([channels[name] for name in names], axis=-1)
-    raise InputError(asked, f"channels {', '.join(channels)}", "give channels R, G and B")
+    raise InputError(what, f"channels {', '.join(channels)}", "give channels R, G and B")
 
 
 def _read_encoded(path: Path) -> Pixels:
-    asked = f"environment {str(path)!r}"
+    what = f"environment {str(path)!r}"
     try:
-        with open_picture(read_bytes(path, asked), asked, ("PNG", "JPEG"), per_pixel=38) as image:
+        with open_picture(read_bytes(path, what), what, ("PNG", "JPEG"), per_pixel=38) as image:
             encoded = np.asarray(image.convert("RGB"))
     except InputError:
         raise
     except Exception as error:  # each of Pillow's decoders raises its own kinds
-        raise InputError(asked, f"not an image that can be read ({shown(error)})", "check the file") from error
+        raise InputError(what, f"not an image that can be read ({shown(error)})", "check the file") from error
     return np.asarray(srgb_to_linear(np.arange(256) / 255.0).astype(np.float32)[encoded])
 
 

@@ -28,7 +28,7 @@ class EnvironmentMap(Frozen):
     ----------
     pixels : array_like (h, w, 3)
         Linear radiance, kept as float32. Numbers that are not finite or below 0 become 0, and those above 1e18 that,
-        with a `TranslucentWarning` that counts them; another one tells of a shape that is not 2:1.
+        with a `TranslucentWarning` that counts them; another one reports a shape that is not 2:1.
 
     Raises
     ------

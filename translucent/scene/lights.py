@@ -82,7 +82,7 @@ class PointLight(PositionalLight):
     position : array_like (3,)
         In metres.
     intensity : array_like (3,)
-        Radiant intensity in W/sr, linear RGB; one number stands for all channels.
+        Radiant intensity in W/sr, linear RGB; one number for all channels.
     """
 
     position: npt.ArrayLike
@@ -104,7 +104,7 @@ class SpotLight(PositionalLight):
     direction : array_like (3,)
         In which the middle of the cone shines; any length but 0.
     intensity : array_like (3,)
-        Radiant intensity within the inner cone, in W/sr, linear RGB; one number stands for all channels.
+        Radiant intensity within the inner cone, in W/sr, linear RGB; one number for all channels.
     inner_cone, outer_cone : float
         Half angles of the cones in degrees: 0 <= inner_cone < outer_cone <= 90, and outer_cone at least 0.001.
 

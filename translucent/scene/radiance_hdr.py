@@ -146,7 +146,7 @@ def _by_pixel(path: str | Path, data: Bytes, count: int) -> Bytes:
     if enough > len(words):
         raise _refused(path, f"it ends after {int(times.sum())} of {count} pixels", "copy the file again")
     times[enough - 1] -= ends[enough - 1] - count  # a damaged run may be of billions
-    # A repetition stands for the last pixel that is none.
+    # A repetition repeats the last pixel before it.
     last = np.maximum.accumulate(np.where(repeats, 0, np.arange(len(words))))
     return np.asarray(np.repeat(words[last[:enough]], times[:enough], axis=0))
 

@@ -62,8 +62,8 @@ class Object(Frozen):
         What the interface does to light. Default: polished, and nothing to be seen of it if the medium's ior is 1; an
         opaque object reflects diffusely.
     shadow_catcher : bool
-        Whether an opaque object is a ground for the others, of any size. Rendered with ``transparent`` it stands for
-        what the frame is put over, and no more is seen of it than the shadows on it.
+        Whether an opaque object is a ground for the others, of any size. Rendered with ``transparent``, no more is
+        seen of it than the shadows on it, over what the frame is put over.
     """
 
     mesh: Mesh
@@ -258,8 +258,8 @@ class Scene(Frozen):
     ambient : str or array_like (3,)
         Radiance that reaches every place inside the media alike from all around, as if nothing were in its way: a color
         as text, or linear RGB. Media scatter it into the view rays, sigma_s times ambient for each metre, whatever
-        their phase function. It stands for light that has been scattered often, or comes from the environment, which
-        by itself lights opaque objects only. Default: none.
+        their phase function. It approximates light that has been scattered often, or comes from the environment,
+        which by itself lights opaque objects only. Default: none.
     environment_shadows : int
         Directions of the environment, 0 to 256, in which objects keep its light from opaque ones: the more, the
         smoother the shadows; 32 are good to a few percent. 0: it reaches them through everything.
@@ -317,7 +317,7 @@ class Scene(Frozen):
         return found
 
     def _repr_html_(self) -> str:
-        """The same, for those that know no bundles."""
+        """The same, for front ends that know no bundles."""
         return str(self._repr_mimebundle_()[0]["text/html"])
 
     @cached_property
@@ -454,7 +454,7 @@ def _candidates(boxes: Array) -> Iterator[tuple[Indices, Indices]]:
         last = max(int(np.searchsorted(until, done + MOST_PAIRS, side="right")), first + 1)
         counts = partners[first:last]
         one = np.repeat(np.arange(first, last), counts)
-        # The partners of a box are those that come right after it in the order.
+        # The partners of a box come right after it in the order.
         other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts, counts)
         yield order[one], order[other]
         first = last

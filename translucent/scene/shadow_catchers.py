@@ -1,4 +1,4 @@
-"""Shadow catchers: grounds that stand for what a transparent frame is put over."""
+"""Shadow catchers: grounds that are left out of a transparent frame, but for their shadows."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ AnyScene = TypeVar("AnyScene", bound=Scene)
 
 
 def page_radiance(scene: Scene) -> float:
-    """Radiance of a white page that paint on all shadow catchers of a scene can show, at most 1.
+    """Largest radiance, up to 1, that diffuse shadow catchers can show all over a scene.
 
     Raises
     ------
     InputError
-        If light does not fall evenly on a shadow catcher, so that a shadow on it could not be told from that.
+        If light does not fall evenly on a shadow catcher, so that a shadow on it would look like that.
     """
     lit = [_irradiance(scene, item).min() / np.pi for item in scene.objects if item.shadow_catcher]
     return float(min(1.0, *lit)) if lit else 1.0
@@ -40,9 +40,9 @@ def before_page(scene: AnyScene, radiance: float) -> AnyScene:
 
 
 def _painted(scene: Scene, item: Object, radiance: float) -> Object:
-    paint = np.clip(radiance * np.pi / _irradiance(scene, item), 0.0, 1.0)
+    color = np.clip(radiance * np.pi / _irradiance(scene, item), 0.0, 1.0)
     one_sided = item.surface is not None and not item.surface.double_sided
-    return dataclasses.replace(item, surface=Surface(color=paint, ior=1.0, roughness=1.0, double_sided=not one_sided))
+    return dataclasses.replace(item, surface=Surface(color=color, ior=1.0, roughness=1.0, double_sided=not one_sided))
 
 
 def _irradiance(scene: Scene, item: Object) -> Array:

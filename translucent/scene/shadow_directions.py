@@ -1,4 +1,4 @@
-"""Directions that stand for the light of an environment where things throw shadows."""
+"""Sampled directions of the light of an environment, for shadows."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ KEPT = 8
 
 
 def shadow_directions(environment: Environment, count: int) -> tuple[Array, Array]:
-    """Directions towards the light of an environment, and how much light each stands for.
+    """Directions towards the light of an environment, and how much light comes from each.
 
     The directions are the centers of a Voronoi diagram of the sphere (Lloyd 1982), from Sobol points that fall by
-    luminance and, a quarter of them, evenly; each stands for the light of its cell, so that all of it is counted. Of
+    luminance and, a quarter of them, evenly; each has the light of its cell, so that all of it is counted. Of
     the light that reaches a surface with normal n where T_i of each direction gets through, the share is ::
 
         sum_i w_i max(n . l_i, 0) T_i  /  sum_i w_i max(n . l_i, 0)

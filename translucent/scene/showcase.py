@@ -164,12 +164,12 @@ def with_roughness(scene: AnyScene, roughness: float | None, among: Sequence[Obj
         return scene
     chosen = set(map(id, scene.objects if among is None else among))
 
-    def finish(item: Object) -> Object:
+    def surfaced(item: Object) -> Object:
         if item.medium is None or item.covers or id(item) not in chosen:
             return item
         return dataclasses.replace(item, surface=dataclasses.replace(item.surface or Surface(), roughness=roughness))
 
-    return dataclasses.replace(scene, objects=[finish(item) for item in scene.objects])
+    return dataclasses.replace(scene, objects=[surfaced(item) for item in scene.objects])
 
 
 def filled(scene: AnyScene, medium: Medium, among: Sequence[Object] | None = None) -> AnyScene:
@@ -211,7 +211,7 @@ def objects_named(scene: Scene, name: str) -> tuple[Object, ...]:
 
 
 def fillable(scene: Scene) -> tuple[Object, ...]:
-    """Objects to fill with a medium if none is named: those that light enters, or else all.
+    """Objects to fill with a medium if none is named: all that light enters, or else all.
 
     Layers that cover a share of what is behind them are among them only where there is nothing else.
     """

@@ -53,14 +53,14 @@ class Stage:
     Attributes
     ----------
     ground : Surface
-        Finish of the ground, which is level and has no end.
+        Surface of the ground, which is level and has no end.
     environment : callable
         Makes what lights the model and is mirrored in it; -Z of it is ahead of the camera.
     keys : tuple of KeyLight
     height : float
         Of the default camera over the model, in degrees.
     far : float
-        Share of its paint that the ground has far away.
+        Fraction of its base color that the ground has far away.
     """
 
     ground: Surface
@@ -135,7 +135,7 @@ def stage_named(name: str) -> Stage | None:
     return STAGES[name]
 
 
-#: Air between model and ground, as a share of the model's diagonal: rays tell surfaces apart that are so far apart.
+#: Air between model and ground, as a share of the model's diagonal: rays resolve surfaces that are so far apart.
 GAP = 1e-3
 
 #: How far the ground reaches, in diagonals of the model.
@@ -193,7 +193,7 @@ def staged(
         do = 'make it without one, as by tl.showcase(mesh, medium, stage="none")'
         raise InputError("a stage for a scene", "it has a ground that catches shadows", do)
     axes = view_axes(scene.camera) @ _about_y(turn).T
-    ground = Object(ground_mesh(scene, axes), surface=_finish(chosen), shadow_catcher=True)
+    ground = Object(ground_mesh(scene, axes), surface=_ground_surface(chosen), shadow_catcher=True)
     lights = scene.lights or (() if environment else tuple(_light(key, axes) for key in chosen.keys))
     azimuth = float(np.degrees(np.arctan2(axes[2, 0], -axes[2, 2])))
     made = environment or dataclasses.replace(chosen.environment(), rotation=-azimuth)
@@ -240,8 +240,8 @@ def with_shadows(points: Array, lights: Sequence[Light]) -> Array:
     return np.concatenate([points, *shadows])
 
 
-def _finish(stage: Stage) -> Surface:
-    """Finish of the ground: its paint is darker far away, as if the lights stood near the model."""
+def _ground_surface(stage: Stage) -> Surface:
+    """Surface of the ground: its base color is darker far away, as if the lights stood near the model."""
     if stage.far == 1.0:
         return dataclasses.replace(stage.ground, double_sided=False)
     return dataclasses.replace(stage.ground, double_sided=False, color_texture=_falloff(stage.far))
@@ -249,7 +249,7 @@ def _finish(stage: Stage) -> Surface:
 
 @lru_cache(maxsize=8)
 def _falloff(far: float) -> Falloff:
-    """Share of the paint over the texture coordinates of `ground_mesh`: 1 in the middle, `far` at the edges."""
+    """Fraction of the base color over the texture coordinates of `ground_mesh`: 1 in the middle, `far` at the edges."""
     return Falloff.around(0.5 * BRIGHT / DARK, far)
 
 
@@ -271,7 +271,7 @@ def ground_mesh(scene: Scene, axes: Array) -> Mesh:
 
 
 def world_vertices(item: Object) -> Array:
-    """(n, 3): vertices of an object in the world, without those that no face uses."""
+    """(n, 3): vertices of an object in the world that faces use."""
     return np.asarray(item.mesh.vertices[used_vertices(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3])
 
 

@@ -14,7 +14,7 @@ from translucent.media.medium import MAX_IOR
 from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.texture import Texture
 
-#: Thickest film in metres: the colors of one that is thicker than a tenth of it can no more be told apart.
+#: Thickest film in metres: the colors of one that is thicker than a tenth of it look alike.
 MAX_FILM = 1e-4
 
 #: Largest dispersion, 20 / Abbe number: beyond it the index of red would fall below 1 for any glass.
@@ -55,24 +55,24 @@ TEXTURE_FIELDS = (
 class Surface(Frozen):
     """Interface between a medium and the air around it, or the surface of an opaque object.
 
-    What does not pass the interface by refraction (``1 - transmission``) is reflected and transmitted diffusely, as by
-    paint. Names and meanings are glTF's (2.0, section 3.9.2; KHR_materials_transmission, _diffuse_transmission,
+    What does not pass the interface by refraction (``1 - transmission``) is reflected and transmitted diffusely, by a
+    diffuse base. Names and meanings are glTF's (2.0, section 3.9.2; KHR_materials_transmission, _diffuse_transmission,
     _dispersion, _iridescence and _clearcoat).
 
-    An opaque object is a metal, or a coat with `ior` over paint, or between the two (glTF 2.0, Appendix B). The index
-    of refraction of a body is its medium's, and what is said to be of opaque objects has no effect on it.
+    An opaque object is a metal, or a coat with `ior` over a diffuse base, or between the two (glTF 2.0, Appendix B). A
+    body has the index of refraction of its medium, and what is said to be of opaque objects has no effect on it.
 
     Parameters
     ----------
     roughness : float
         0 (polished) to 1; the width of the GGX microfacet distribution is its square.
     color : str or array_like (3,)
-        Tints what passes the surface, once for each body, and is the albedo of paint: 0 to 1, a color as text or
+        Tints what passes the surface, once for each body; albedo of the diffuse base: 0 to 1, a color as text or
         linear RGB.
     transmission : float
-        Share of the light that enters by refraction, 0 to 1; the rest meets paint.
+        Share of the light that enters by refraction, 0 to 1; the rest meets the diffuse base.
     diffuse_transmission : float
-        Share of the light on paint that passes to the other side, 0 to 1.
+        Fraction of the light on the diffuse base that passes to the other side, 0 to 1.
     diffuse_transmission_color : str or array_like (3,)
         Tints that light.
     dispersion : float
@@ -95,7 +95,7 @@ class Surface(Frozen):
         sheet has a hole. A solid has none: what is inside would be open.
     opacity : float, optional
         Makes of a thin sheet a layer that covers this share of what is behind it, 0 to 1, whatever the angle, times the
-        opacity of `color_texture` and of the vertices. It shows what an opaque object with this surface would, painted
+        opacity of `color_texture` and of the vertices. It shows what an opaque object with this surface would,
         over what is behind (Porter and Duff's ``over``). Its medium should be clear, and its interfaces bend nothing.
     double_sided : bool
         Whether an opaque object is seen from the inside, too.

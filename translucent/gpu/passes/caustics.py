@@ -32,7 +32,7 @@ BATCH = PHOTON_WIDTH * 512
 
 
 @dataclass(frozen=True, eq=False)
-class Tracer:
+class PhotonTracer:
     """Means to follow the photons of a scene: where they aim, where a batch has landed, program and textures."""
 
     aims: list[PhotonAim]
@@ -69,15 +69,15 @@ class CausticsPass:
         self.draw_base(job, spec.objects)
         return self.shade(job, job.targets.view("opaque", 1))
 
-    def begin(self, stack: ExitStack, job: FrameJob) -> Tracer:
-        """Get ready to follow photons in the scene of a job, and forget those that have landed."""
+    def begin(self, stack: ExitStack, job: FrameJob) -> PhotonTracer:
+        """Get ready to follow photons in the scene of a job, and clear what has landed."""
         require_interfaces(job.gl.info)
         assert job.plan.caustics is not None
         job.targets["photons"].clear()
         aims = photon_aims(job.scene, media_center(job.scene), job.plan.caustics.photons)
-        return Tracer(aims, self._landed(stack), *self._tracer(stack, job))
+        return PhotonTracer(aims, self._landed(stack), *self._tracer(stack, job))
 
-    def follow(self, job: FrameJob, tracer: Tracer, number: int, begin: int, end: int) -> None:
+    def follow(self, job: FrameJob, tracer: PhotonTracer, number: int, begin: int, end: int) -> None:
         """Follow photons of the aim of this number, and add up where the picture shows that they have landed."""
         self._aim(tracer.program, tracer.aims[number], number, job)
         for first in range(begin, end, BATCH):

@@ -165,7 +165,7 @@ class PathTracer:
                 looked = time.perf_counter()
                 share = self._share(into, size, begun, last)
             yield share
-        self._finish(job, source, corner, size)
+        self._end_tile(job, source, corner, size)
 
     def _start(
         self, job: FrameJob, state: moderngl.Framebuffer, corner: tuple[int, int], size: tuple[int, int]
@@ -178,7 +178,7 @@ class PathTracer:
         self._begin.draw_fullscreen(program)
         state.scissor = None
 
-    def _finish(
+    def _end_tile(
         self, job: FrameJob, state: moderngl.Framebuffer, corner: tuple[int, int], size: tuple[int, int]
     ) -> None:
         into = job.targets["paths"]

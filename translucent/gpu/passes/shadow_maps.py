@@ -124,7 +124,7 @@ class ShadowMapsPass:
         atlas, scene, count = job.resources.shadows, job.scene, job.scene.environment_shadows
         # Of several samples of a pixel, each looks into its share of the directions.
         first, step = job.sample % job.samples, job.samples
-        if job.bending:  # few of them may stand for all
+        if job.bending:  # few of them may represent all
             step = min(step, _FEW_SHARES)
             first %= step
         most = job.plan.shadows.directions
@@ -291,7 +291,7 @@ _STEPS: dict[PassName, type[SignedDepthPass | ThinLayerPass | FragmentListsPass 
 
 
 def _slots(scene: Scene) -> tuple[tuple[int, ...], list[Medium | None]]:
-    """Slots of all objects by the extinction of those that throw shadows, -1 of others and of clear ones; and the
+    """Slots of all objects by the extinction of occluders, -1 of others and of clear ones; and the
     medium of each slot, two at least.
     """
     throwing, found = set(map(id, occluding_bodies(scene))), dict[bytes, Medium | None]()

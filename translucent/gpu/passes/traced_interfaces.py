@@ -194,7 +194,7 @@ class TracedInterfacesPass:
 
 
 def _footprint(job: FrameJob) -> dict[str, float]:
-    """Pixels that a sample stands for, where rays see more than a pixel of a picture of all directions."""
+    """Width of a sample in pixels, for footprints of rays in a picture of all directions."""
     return {"pixel_step": FOOTPRINT_STEP * job.samples**-0.5} if job.scene.environment.kind == "image" else {}
 
 

@@ -252,8 +252,8 @@ def _plain(value: Any) -> Any:
 
 
 def _es(text: str) -> tuple[str, tuple[str, ...]]:
-    """A preprocessed stage, lifted for WebGL2, with fewer textures, as WebGL2 promises 16 in a shader; and those that
-    are now parts of others.
+    """A preprocessed stage, lifted for WebGL2, with fewer textures, as WebGL2 promises 16 in a shader; and the textures
+    that are now parts of others.
     """
     named = _NAMED.search(text)
     assert named is not None
@@ -263,7 +263,7 @@ def _es(text: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _merged(text: str, defines: Mapping[str, int]) -> tuple[str, tuple[str, ...]]:
-    """A shader whose textures of one kind are put together, and the names of those that follow others.
+    """A shader whose textures of one kind are put together, and the names of samplers that follow others.
 
     Triangles follow the nodes of hierarchies; and an environment that is seen is the one that lights, where it is.
     """

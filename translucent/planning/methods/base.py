@@ -41,7 +41,7 @@ class Method:
     samples_lights : bool
         Follows lights into media that scatter.
     finds_exits : bool
-        Tells where each ray first leaves all bodies.
+        Finds where each ray first leaves all bodies.
     peels : bool
         Draws the geometry again for every layer or two.
     marches : bool
@@ -90,7 +90,7 @@ class Method:
         """Raise `InputError` if the method cannot find the thickness of this scene."""
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
-        """Passes of the method, each with its reason; `why` tells why this method was chosen."""
+        """Passes of the method, each with its reason; `why` says why this method was chosen."""
         raise NotImplementedError
 
     def limits(self, scene: Scene) -> list[Note]:

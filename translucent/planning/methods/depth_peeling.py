@@ -24,7 +24,7 @@ _GUESSED_LAYERS = 8
 class DepthPeeling(Method):
     """Ordered intervals from a pass over the geometry for every layer or two (Everitt 2001), with OpenGL 3.3.
 
-    Coplanar faces survive, since a layer is told from the next by distance, medium and side, and those alike are
+    Coplanar faces survive, since a layer differs from the next by distance, medium and side, and those alike are
     counted.
 
     Parameters

@@ -24,7 +24,7 @@ class PathTraced(Method):
     The estimator of `translucent.reference.path_trace` on the GPU, in float32: Fresnel and Snell by chance at
     interfaces, walks among the microfacets of rough ones (Heitz et al. 2016), free flights in media that scatter, with
     the balance heuristic over the channels (Wilkie et al. 2014). It takes the place of `interfaces` and `scattering`,
-    which choose approximations. `Frame.standard_error` tells the noise; thickness, optical depth and transmittance are
+    which choose approximations. `Frame.standard_error` is the noise; thickness, optical depth and transmittance are
     those of the planner's own choice of method, and exact.
 
     Light of point, spot and directional lights that polished interfaces bend is found by no path.
@@ -63,21 +63,21 @@ class PathTraced(Method):
     def check(self, scene: Scene) -> None:
         """Refuse open bodies, layers, densities that vary, and sheets that scatter or are rough."""
         if scene.scatters_ambient:
-            found = "it stands for what paths find by themselves: light of the environment, and light scattered often"
+            found = "it represents what paths find by themselves: light of the environment, and light scattered often"
             raise InputError("PathTraced with ambient radiance", found, "leave ambient out")
         for bodies, found, do in _refusals(scene):
             if bodies:
                 raise InputError(f"PathTraced of {object_names(bodies)}", found, do)
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
-        """The pass that follows the paths; those that find thickness are the planner's."""
+        """The pass that follows the paths; the planner adds passes that find thickness."""
         reason = f"{why}: {self.paths} random paths for each pixel, scattered, reflected and refracted without limit"
         bodies = indices(scene, lambda body: body.medium is not None)
         return (PassSpec(PassName.PATH_TRACE, reason, bodies, cost=self.cost * self.paths),)
 
     def limits(self, scene: Scene) -> list[Note]:
         """Note that radiance has noise."""
-        text = f"radiance is a mean over {self.paths} random paths: it has noise, of which standard_error tells"
+        text = f"radiance is a mean over {self.paths} random paths: it has noise, given by standard_error"
         return [Note(NoteKind.NOISE, text)]
 
     def unmodelled(self, scene: Scene) -> tuple[Note, ...]:
@@ -85,7 +85,9 @@ class PathTraced(Method):
         notes = []
         bending = [body for body in scene.bodies if _bends(body)]
         if scene.lights and bending:
-            text = "light of lamps and directional lights that polished interfaces bend: in media, and as caustics"
+            text = (
+                "light of point, spot and directional lights that polished interfaces bend: in media, and as caustics"
+            )
             notes.append(Note(NoteKind.LIGHTS_LEFT_OUT, text))
         surfaces = [(body, body.surface) for body in scene.bodies if body.surface is not None]
         if dispersive := [body for body, surface in surfaces if surface.dispersion > 0.0]:
@@ -105,8 +107,8 @@ class PathTraced(Method):
         if textured:
             text = f"textures and vertex colors of interfaces: {object_names(textured)} are the same all over"
             notes.append(Note(NoteKind.TEXTURES, text))
-        if glowing := [body for body, surface in surfaces if surface.glows]:
-            notes.append(Note(NoteKind.GLOW, f"light of surfaces that glow: {object_names(glowing)}"))
+        if emitting := [body for body, surface in surfaces if surface.glows]:
+            notes.append(Note(NoteKind.GLOW, f"light of surfaces that emit: {object_names(emitting)}"))
         if scene.opaque:
             text = (
                 "mirror images of things in opaque objects; shadows of the environment on them unless it has directions"
