@@ -89,7 +89,7 @@ def test_explain_says_how_light_scattered_many_times_is_shown(run: Run, cube: Pa
     milk = ("explain", cube, "--scattering-color", "white", "--mean-free-path", "1cm", "--json")
     told = {name: strict_json(run(*milk, "--scattering", name).out)["plan"] for name in SCATTERINGS}
     assert told["diffusion"]["given_back"] == "diffuses (Diffusion(resolution=32)) in 1 body"
-    assert told["layer"]["given_back"] == "is given back as by layers in 1 body"
+    assert told["layer"]["given_back"] == "leaves as from layers in 1 body"
     assert told["single"]["given_back"] is None
     assert strict_json(run(*milk).out)["plan"] == told["diffusion"]
 

@@ -262,7 +262,7 @@ class TestRendering:
                 radiance[name] = arrays["radiance"][2, 4]
         assert "light scattered many times diffuses (Diffusion(resolution=32)) in 1 body" in told[None]
         assert "Diffusion(resolution=16)" in told["diffusion"]
-        assert "is given back as by layers in 1 body" in told["layer"]
+        assert "leaves as from layers in 1 body" in told["layer"]
         assert "many times" not in told["single"].replace("scattered more than once", "")
         np.testing.assert_allclose(radiance["diffusion"], radiance[None], rtol=0.1)
         for name in ("diffusion", "layer"):

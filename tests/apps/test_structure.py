@@ -45,9 +45,6 @@ def imported(path: Path) -> set[str]:
 MODULES = {".".join(("translucent", *path.relative_to(PACKAGE).with_suffix("").parts)): path for path in FILES}
 MODULES = {module.removesuffix(".__init__"): path for module, path in MODULES.items()}
 
-# Names that several classes still share. A class that gets a name of its own leaves this list; nothing joins it.
-SHARED: set[str] = set()
-
 
 def test_no_module_imports_itself_through_others() -> None:
     """Imports for types and those within functions counted; the front door apart, which everybody may come through."""
@@ -64,7 +61,7 @@ def test_a_module_says_what_it_is_for() -> None:
 def test_a_class_has_a_name_of_its_own() -> None:
     """Each name stands for one class, in whichever module; by text, for parsing all files takes long."""
     classes = Counter(found for path in FILES for found in CLASS.findall(path.read_text(encoding="utf-8")))
-    assert {one for one, count in classes.items() if count > 1} == SHARED
+    assert [one for one, count in classes.items() if count > 1] == []
 
 
 def test_a_public_name_exists_and_is_documented() -> None:
