@@ -1,10 +1,10 @@
 """
-A candle: a medium that glows, and a lamp in it
-===============================================
+A candle: a medium that emits, and a point light in it
+======================================================
 
 Three kinds of objects: wax that scatters, a flame that emits, and a wick without a medium, which is opaque. A point
 light in the flame lights the wax from above; a directional one lights it from behind. What enters the wax at the top
-spreads downwards in it, which makes the candle glow below its rim.
+spreads downwards in it, which makes the candle bright below its rim.
 """
 
 import os
