@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests.solids import Box, Ellipsoid, Sphere
 from translucent.bake.measure import Measure
 from translucent.bake.rays import PreparedMesh
 from translucent.bake.settings import BakeSettings
-from translucent.geometry.solids import Box, Ellipsoid, Sphere
 
 
 def test_vertices_of_a_sphere() -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests.solids import Box, Sphere
 from translucent.bake.atlas import Atlas, pad, unwrap
 from translucent.bake.rays import PreparedMesh
-from translucent.geometry.solids import Box, Sphere
 
 SQUARE = [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]]]
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests.solids import Box, Sphere, Torus
 from translucent.assets import mesh_path
-from translucent.geometry.solids import Box, Sphere, Torus
 
 RADIUS, SEGMENTS = 0.03, 96
 SPHERE = Sphere(radius=RADIUS)

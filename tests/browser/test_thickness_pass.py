@@ -10,8 +10,8 @@ import pytest
 import translucent as tl
 from tests.browser.pages import WebPage, decoded
 from tests.browser.thickness import Errors, Measured, Truth, described, described_camera, framing, measure, rounded
+from tests.solids import Box, Sphere
 from translucent.assets import mesh_path
-from translucent.geometry.solids import Box, Sphere
 
 SIZE = (256, 256)
 KNOT = rounded(tl.load_mesh(mesh_path("knot")))

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests.solids import Box, Solid, Sphere, Torus
 from tools.cpu_throughput import throughput
 from translucent.cpu import hits, ray_tree, shading
 from translucent.cpu import shading as light_paths
@@ -21,7 +22,6 @@ from translucent.cpu import threads as pool
 from translucent.cpu.renderer import CpuRenderer
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import ARRAYS
-from translucent.geometry.solids import Box, Solid, Sphere, Torus
 from translucent.planning.assembly import FALLBACK_SHEET
 from translucent.planning.plan import plan_scene
 from translucent.planning.request import RenderRequest

@@ -9,8 +9,8 @@ import pytest
 
 import translucent as tl
 from tests.scans import scan
+from tests.solids import Box
 from translucent.frames.metrics import interior
-from translucent.geometry.solids import Box
 
 SIZE = (256, 256)
 ABSORBING = tl.Medium(absorption=1.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.geometry.solids import Box, Sphere, Torus
+from tests.solids import Box, Sphere, Torus
 
 SIZE = (96, 64)
 CAMERA = tl.Camera.look_at((0.6, 0.8, 3.5), (0.0, 0.0, 0.0), fov_y=50)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.geometry.solids import Box, Ellipsoid, Frustum, Solid, Sphere, SphericalShell, Torus, TwoSpheres
+from tests.solids import Box, Ellipsoid, Frustum, Solid, Sphere, SphericalShell, Torus, TwoSpheres
 
 SIZE = (120, 90)
 SEGMENTS = 96

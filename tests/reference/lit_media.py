@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import quad
 
+from tests.solids import Box, Solid
 from translucent.formulas.phase import henyey_greenstein
-from translucent.geometry.solids import Box, Solid
 from translucent.media.density import Density
 from translucent.media.medium import Medium
 from translucent.reference import render

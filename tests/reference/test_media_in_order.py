@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from tests.solids import Box, Sphere, SphericalShell
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.solids import Box, Sphere, SphericalShell
 from translucent.media.medium import Medium
 from translucent.reference import render
 from translucent.scene.camera import Camera

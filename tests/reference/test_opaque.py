@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from tests.solids import Box, Sphere
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.solids import Box, Sphere
 from translucent.media.medium import Medium
 from translucent.planning.limits import SHEET_ON_OPAQUE
 from translucent.planning.methods import ThinLayer

@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from tests.solids import Box, Solid, Sphere, SphericalShell, Torus, TwoSpheres
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.frames.frame import ARRAYS
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.solids import Box, Solid, Sphere, SphericalShell, Torus, TwoSpheres
 from translucent.media.medium import Medium
 from translucent.planning.methods import BackFaceDepth
 from translucent.reference import hit_counts, line_hits, pixel_rays, render, shade_hits

@@ -21,11 +21,11 @@ from tests.reference.lit_media import (
     single_scatter,
     slab,
 )
+from tests.solids import Box, Solid, Sphere, SphericalShell, TwoSpheres
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.formulas.phase import henyey_greenstein
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.solids import Box, Solid, Sphere, SphericalShell, TwoSpheres
 from translucent.media.medium import Medium
 from translucent.reference import render
 from translucent.scene.camera import Camera

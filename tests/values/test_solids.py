@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from translucent.errors import InputError
-from translucent.geometry.solids import (
+from tests.solids import (
     Box,
     Ellipsoid,
     Frustum,
@@ -22,6 +21,7 @@ from translucent.geometry.solids import (
     TwoSpheres,
     revolve,
 )
+from translucent.errors import InputError
 
 Array = npt.NDArray[np.float64]
 Inside = Callable[[Array], npt.NDArray[np.bool_]]

@@ -13,9 +13,9 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
+from tests.solids import Box, Sphere, Torus
 from translucent.bench.shapes import joined
 from translucent.diffusion.grid import LINES, Voxels, body_grid, voxels
-from translucent.geometry.solids import Box, Sphere, Torus
 
 Array = npt.NDArray[np.float64]
 
