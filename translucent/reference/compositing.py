@@ -11,7 +11,7 @@ import numpy.typing as npt
 from translucent.arrays import Array, Integers
 from translucent.errors import InputError
 from translucent.formulas import optics
-from translucent.reference.segments import Segments
+from translucent.reference.volume import Segments
 
 
 @dataclass(frozen=True, eq=False)

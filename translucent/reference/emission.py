@@ -10,8 +10,7 @@ from translucent.arrays import Array, Integers
 from translucent.formulas import optics
 from translucent.reference.quadrature import integrate
 from translucent.reference.rays import Rays
-from translucent.reference.segments import Segments
-from translucent.reference.volume import Volume, points_on
+from translucent.reference.volume import Segments, Volume, points_on
 
 #: Relative error of the emission of each segment: far below that of anything to compare with.
 TOLERANCE = 1e-12

@@ -25,11 +25,10 @@ from translucent.reference.opaque import OpaqueHits, nearest_opaque
 from translucent.reference.phase import scattered_directions
 from translucent.reference.rays import Rays
 from translucent.reference.refracted import RayEnds
-from translucent.reference.segments import Segments
 from translucent.reference.sheets import scene_crossings
 from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.tracer import Lines
-from translucent.reference.volume import Volume, _weights, points_on, volume_segments
+from translucent.reference.volume import Segments, Volume, multiplicities, points_on, volume_segments
 
 #: Share of light below which paths end by Russian roulette, or go on with this share.
 ROULETTE = 0.1
@@ -157,7 +156,7 @@ class InterfacePaths:
 
     def _filling(self, inside: Inside) -> Array:
         filling, solids = np.zeros(inside.windings.shape), np.array(self.own.solids, dtype=np.int64)
-        filling[:, solids] = _weights(self.scene, solids, inside.windings[:, solids].T).T
+        filling[:, solids] = multiplicities(self.scene, solids, inside.windings[:, solids].T).T
         return filling
 
     def _through_media(self, live: LiveRays, flight: _Flight) -> tuple[LiveRays, Array, Array]:

@@ -31,10 +31,9 @@ from translucent.reference.opaque import OpaqueHits, nearest_opaque, reflected_r
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.refraction import BOUNCES, PATHS, bends, refracted_light
 from translucent.reference.scattering import scattered_once
-from translucent.reference.segments import Segments
 from translucent.reference.sheets import scene_crossings, sheet_hits, sheet_thicknesses
 from translucent.reference.surface_light import SurfaceLight
-from translucent.reference.volume import Volume, volume_segments
+from translucent.reference.volume import Segments, Volume, volume_segments
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene, check_scene
 

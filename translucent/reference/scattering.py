@@ -17,9 +17,8 @@ from translucent.reference.compositing import _layers
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.quadrature import equiangular, integrate
 from translucent.reference.rays import Rays
-from translucent.reference.segments import Segments
 from translucent.reference.shadow_edges import cone_edges, outline_edges, shadow_edges
-from translucent.reference.volume import points_on
+from translucent.reference.volume import Segments, points_on
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light
 

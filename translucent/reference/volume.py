@@ -1,8 +1,8 @@
-"""Media at each point of a scene: their indices, multiplicities and densities."""
+"""Media at each point of a scene, and segments of rays, each with one mixture of media."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,6 @@ from translucent.geometry.ray_caster import point_from
 from translucent.reference.intervals import Intervals
 from translucent.reference.phase import phase_value
 from translucent.reference.rays import Rays
-from translucent.reference.segments import Segments, _pieces, scene_segments
 from translucent.reference.sheets import Crossings
 from translucent.scene.scene import Scene
 
@@ -126,6 +125,35 @@ def points_on(rays: Rays, chosen: Integers, distance: Array) -> Array:
         return np.asarray(rays.origins[chosen] + distance[:, None] * rays.directions[chosen])
 
 
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Segments of rays between neighboring surfaces: flat arrays, in order along each ray, without overlap.
+
+    Attributes
+    ----------
+    pixel : (k,) int64
+        Number of the ray; ascending.
+    t_enter, t_exit : (k,) float64
+        Distances in metres from the ray's origin; equal for a sheet.
+    length : (k,) float64
+        Metres of the media: t_exit - t_enter, or the path through a sheet.
+    extinction : (k, 3) float64
+        Of all media there, in 1/m.
+    emission : (k, 3) float64
+        Of all media there, in radiance per metre.
+    count : (k,) int64
+        How often thickness counts the length.
+    """
+
+    pixel: Integers
+    t_enter: Array
+    t_exit: Array
+    length: Array
+    extinction: Array
+    emission: Array
+    count: Integers
+
+
 def volume_segments(
     scene: Scene, volume: Volume, rays: Rays, intervals: Intervals, crossings: Crossings
 ) -> tuple[Segments, Array]:
@@ -137,11 +165,14 @@ def volume_segments(
     Parameters
     ----------
     scene : Scene
+        `Scene.overlap` decides what fills a point in several bodies. A sheet adds to what it stands in.
     volume : Volume
         Of the scene.
     rays : Rays
-    intervals, crossings
-        As for `scene_segments`.
+    intervals : Intervals
+        Of solids; bodies are indices into `Scene.objects`.
+    crossings : Crossings
+        Of sheets; each cuts the piece in which it stands.
 
     Returns
     -------
@@ -149,45 +180,58 @@ def volume_segments(
     filling : (k, n) float64
         `Volume` explains it.
     """
-    segments = scene_segments(scene, intervals, crossings)
-    filling = _filling(scene, intervals, crossings)
-    ends = (points_on(rays, segments.pixel, t) for t in (segments.t_enter, segments.t_exit))
-    weights = volume.between(filling, *ends)
+    pixel, t_enter, t_exit, bodies, windings = _pieces(intervals, crossings)
+    solid, sheet = np.zeros((len(pixel), len(scene.objects))), np.zeros((len(crossings.body), len(scene.objects)))
+    solid[:, bodies] = multiplicities(scene, bodies, windings).T
+    sheet[np.arange(len(sheet)), crossings.body] = 1.0
+    inside = np.maximum(windings, 0) if scene.overlap == "add" else (windings > 0).any(axis=0, keepdims=True)
+    at = crossings.distance
+    columns = [
+        np.concatenate(pair)
+        for pair in (
+            (pixel, crossings.pixel),
+            (t_enter, at),
+            (t_exit, at),
+            (t_exit - t_enter, crossings.path),
+            (inside.sum(axis=0, dtype=np.int64), np.ones(len(sheet), dtype=np.int64)),
+            (solid, sheet),
+        )
+    ]
+    # Of two pieces that begin at one point, the sheet goes first: it ends there, too.
+    order = np.lexsort((columns[2], columns[1], columns[0]))
+    pixel, t_enter, t_exit, length, count, filling = (column[order] for column in columns)
+    weights = volume.between(filling, *(points_on(rays, pixel, t) for t in (t_enter, t_exit)))
     extinction, emission = weights @ volume.extinction, weights @ volume.emission
     if (crossings.covered > 0).any():
-        _add_layers(extinction, emission, filling, intervals, crossings)
-    return replace(segments, extinction=extinction, emission=emission), filling
+        row = np.flatnonzero(order >= len(solid))
+        source = order[row] - len(solid)
+        covered = (crossings.covered[source] / crossings.path[source])[:, None]
+        extinction[row] += covered
+        emission[row] += covered * crossings.shown[source]
+    return Segments(pixel, t_enter, t_exit, length, extinction, emission, count), filling
 
 
-def _add_layers(extinction: Array, emission: Array, filling: Array, intervals: Intervals, crossings: Crossings) -> None:
-    """Add the coefficients (k, 3) of layers among the crossings."""
-    pieces = len(filling) - len(crossings.body)
-    source = _order(intervals, crossings) - pieces
-    row = np.flatnonzero(source >= 0)
-    covered = crossings.covered[source[row]] / crossings.path[source[row]]
-    extinction[row] += covered[:, None]
-    emission[row] += covered[:, None] * crossings.shown[source[row]]
+def _pieces(
+    intervals: Intervals, crossings: Crossings
+) -> tuple[Integers, Array, Array, Integers, npt.NDArray[np.int32]]:
+    """Pixel, t_enter and t_exit (k,) of the pieces in any body; the bodies (b,), and their windings there (b, k)."""
+    bodies, row = np.unique(intervals.body, return_inverse=True)
+    pixel = np.concatenate([intervals.pixel, intervals.pixel, crossings.pixel])
+    t = np.concatenate([intervals.t_enter, intervals.t_exit, crossings.distance])
+    order = np.lexsort((t, pixel))
+    pixel, t = pixel[order], t[order]
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    enters, exits = rank[: len(row)], rank[len(row) : 2 * len(row)]
+    windings = np.zeros((len(bodies), len(order)), dtype=np.int32)
+    windings[row, enters], windings[row, exits] = intervals.winding, -intervals.winding
+    # Each interval ends on its ray, so the sums are back to 0 where the next ray begins.
+    windings = np.cumsum(windings, axis=1, dtype=np.int32)
+    keep = np.flatnonzero((windings[:, :-1] != 0).any(axis=0) & (t[1:] > t[:-1]))
+    return pixel[keep], t[keep], t[keep + 1], bodies, windings[:, keep]
 
 
-def _order(intervals: Intervals, crossings: Crossings) -> Integers:
-    """Order of the segments of `scene_segments` by origin: the pieces of solids, and then the crossings."""
-    pixel, t_enter, t_exit, _, _ = _pieces(intervals, crossings)
-    at = crossings.distance
-    columns = [np.concatenate(pair) for pair in ((t_exit, at), (t_enter, at), (pixel, crossings.pixel))]
-    return np.lexsort(columns)
-
-
-def _filling(scene: Scene, intervals: Intervals, crossings: Crossings) -> Array:
-    """(k, n): weights of media in each segment of `scene_segments` for the same arguments."""
-    pixel, _, _, bodies, windings = _pieces(intervals, crossings)
-    solid = np.zeros((len(pixel), len(scene.objects)))
-    solid[:, bodies] = _weights(scene, bodies, windings).T
-    sheet = np.zeros((len(crossings.body), len(scene.objects)))
-    sheet[np.arange(len(sheet)), crossings.body] = 1.0
-    return np.concatenate([solid, sheet])[_order(intervals, crossings)]
-
-
-def _weights(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) -> Array:
+def multiplicities(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) -> Array:
     """(b, k): multiplicity of each body's medium at each point, by the overlap policy of the scene."""
     inside = windings > 0
     if scene.overlap == "add" or not len(bodies):
