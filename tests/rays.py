@@ -8,6 +8,7 @@ import numpy as np
 
 import translucent as tl
 from translucent.arrays import Array, Integers, Mask
+from translucent.geometry.bvh import BOX_COST, Hierarchy
 from translucent.geometry.ray_caster import RayCaster
 
 #: Paths that differ by no more than this share of a body's radius are the same: corners in float32 are off by 6e-8 of
@@ -95,3 +96,22 @@ def inside_points(mesh: tl.Mesh, count: int, rng: np.random.Generator) -> Array:
         if mesh.winding_number(point) > 0.5:
             points.append(point)
     return np.array(points)
+
+
+def sah_cost(hierarchy: Hierarchy) -> float:
+    """Expected box and triangle tests of a long ray that meets the root, by the surface area heuristic."""
+    size = np.asarray(hierarchy.high, np.float64) - hierarchy.low
+    area: Array = size[:, 0] * size[:, 1] + (size[:, 0] + size[:, 1]) * size[:, 2]
+    tests = BOX_COST * area[parents(hierarchy)[1:]].sum() + (area * hierarchy.count).sum()
+    return float(tests / area[0])
+
+
+def parents(hierarchy: Hierarchy) -> Integers:
+    """(n,): the node above each; the root has itself."""
+    place, count = hierarchy.orders[0].astype(np.int64), len(hierarchy.size)
+    steps = np.bincount(place + 1, minlength=count + 2) - np.bincount(place + hierarchy.size, minlength=count + 2)
+    depth = np.cumsum(steps)[place]
+    key = depth * count + place
+    order = np.argsort(key)
+    above = order[np.maximum(np.searchsorted(key[order], key - count) - 1, 0)]
+    return np.where(depth > 0, above, 0)

@@ -22,9 +22,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import translucent as tl
 from tests.ray_probe import RayProbe
-from tests.rays import agreeing, embree_nearest, inside_points, random_rays
+from tests.rays import agreeing, embree_nearest, inside_points, random_rays, sah_cost
 from translucent.assets import mesh_path
-from translucent.geometry.bvh import build_hierarchy, sah_cost
+from translucent.geometry.bvh import build_hierarchy
 from translucent.geometry.normals import drawn_normals
 from translucent.geometry.ray_caster import RayCaster
 from translucent.gpu.hierarchies import SceneHierarchies, packed_mesh

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import qmc
 
-from translucent.formulas.brdf_table import integrated_table
+from tools.brdf_quadrature import integrated_table
 from translucent.formulas.sampling import MOST_POINTS
 
 FOLDER = Path(__file__).resolve().parents[1] / "translucent" / "formulas" / "stored"

@@ -6,6 +6,7 @@ import builtins
 import itertools
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,26 @@ from hypothesis import strategies as st
 
 import translucent as tl
 from translucent.cpu import hits as picture
-from translucent.cpu.hits import Band, PictureRays, PixelTracer, TracedMesh, embree_hits
+from translucent.cpu.hits import Band, PictureRays, PixelTracer, TracedMesh, joined_hits
 from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.reference import Hits, line_hits
 
 IDENTITY = np.eye(4)
 MESHES = Path(__file__).parents[2] / "meshes"
+
+
+def embree_hits(
+    mesh: tl.Mesh, matrix: Any, camera: tl.Camera, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)
+) -> Hits:
+    """All surfaces of a mesh on the pixel rays, as `line_hits` finds them."""
+    seen = PictureRays.of(camera, size, offset)
+    tracer = PixelTracer(TracedMesh.of(mesh), tl.Object(mesh, transform=matrix), seen)
+    parts = []
+    for band in seen.bands():
+        hits = tracer.hits(band)
+        parts.append(replace(hits, pixel=hits.pixel + band.first_row * band.width))
+    return joined_hits(parts)
 
 
 def assert_same(found: Hits, expected: Hits) -> None:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
-from translucent.formulas.brdf_table import albedo
+from tools.brdf_quadrature import albedo
 from translucent.formulas.interface import ggx_distribution, ggx_visibility
 from translucent.geometry.solids import Sphere
 from translucent.scene.environment_map import EnvironmentMap

@@ -7,9 +7,10 @@ import pytest
 import trimesh
 
 import translucent as tl
+from tests.rays import parents, sah_cost
 from translucent.arrays import Array
 from translucent.geometry import bvh
-from translucent.geometry.bvh import Hierarchy, build_hierarchy, parents, sah_cost
+from translucent.geometry.bvh import Hierarchy, build_hierarchy
 from translucent.gpu.hierarchies import STEPS, packed_mesh, packed_nodes, packed_normals
 
 OCTANTS = [tuple(bool(octant >> axis & 1) for axis in range(3)) for octant in range(8)]

@@ -9,7 +9,8 @@ import warnings
 import numpy as np
 import pytest
 
-from translucent.formulas.brdf_table import TABLE_SIZE, albedo, brdf_table
+from tools.brdf_quadrature import albedo
+from translucent.formulas.brdf_table import TABLE_SIZE, brdf_table
 from translucent.formulas.sampling import MOST_POINTS, sobol_points
 
 #: Script that makes all that a picture of an own mesh on a stage is drawn from.

@@ -5,7 +5,7 @@ The hits are those of `translucent.reference.line_hits`, to the last bit."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import chain
 
@@ -358,7 +358,7 @@ class PixelTracer:
             return found
         # Where the proof fails, every face that may cover the pixel is tried.
         rest = self._seen.interact(band, self._seen.boxed_pairs(band, incomplete))
-        both = _joined([found.where(~incomplete[found.pixel]), rest])
+        both = joined_hits([found.where(~incomplete[found.pixel]), rest])
         return both.where(np.argsort(both.pixel, kind="stable"))
 
     def search(self, band: Band) -> tuple[Hits, Mask]:
@@ -386,42 +386,6 @@ class PixelTracer:
         else:
             origins, directions = self._eye + across, np.broadcast_to(self._axes[2], across.shape)
         return origins, directions / np.linalg.norm(directions, axis=1, keepdims=True)
-
-
-def embree_hits(
-    mesh: Mesh,
-    matrix: npt.ArrayLike,
-    camera: Camera,
-    size: tuple[int, int],
-    offset: tuple[float, float] = (0.0, 0.0),
-) -> Hits:
-    """All surfaces of a mesh on the pixel rays, ahead of their origins and behind, as `line_hits` gives them.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    matrix : array_like (4, 4)
-        Object to world.
-    camera : Camera
-    size : (width, height)
-        In pixels.
-    offset : (right, down)
-        Shift of the rays from the pixel centers, in pixels.
-
-    Raises
-    ------
-    InputError
-        If the mesh, the matrix or the size cannot be used.
-    RenderError
-        If embreex cannot be imported.
-    """
-    body, picture = Object(mesh, transform=matrix), PictureRays.of(camera, size, offset)
-    tracer = PixelTracer(TracedMesh.of(mesh), body, picture)
-    parts = []
-    for band in picture.bands():
-        hits = tracer.hits(band)
-        parts.append(replace(hits, pixel=hits.pixel + band.first_row * band.width))
-    return _joined(parts)
 
 
 class ExactRayCaster(SceneRayCaster):
@@ -461,5 +425,6 @@ def _sliced(pixel: Integers, face: Integers) -> Iterator[tuple[Integers, Integer
         yield pixel[begin : begin + PAIRS], face[begin : begin + PAIRS]
 
 
-def _joined(parts: list[Hits]) -> Hits:
+def joined_hits(parts: list[Hits]) -> Hits:
+    """Concatenate hits."""
     return Hits(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Hits)))

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Integers
 
 Floats = npt.NDArray[np.float32]
 
@@ -316,22 +316,3 @@ def _depth_first(
         orders[:, left] = place + np.where(swap, nodes[right], 0)
         orders[:, right] = place + np.where(swap, 0, nodes[left])
     return orders
-
-
-def sah_cost(hierarchy: Hierarchy) -> float:
-    """Expected box and triangle tests of a long ray that meets the root, by the surface area heuristic."""
-    size = np.asarray(hierarchy.high, np.float64) - hierarchy.low
-    area: Array = size[:, 0] * size[:, 1] + (size[:, 0] + size[:, 1]) * size[:, 2]
-    tests = BOX_COST * area[parents(hierarchy)[1:]].sum() + (area * hierarchy.count).sum()
-    return float(tests / area[0])
-
-
-def parents(hierarchy: Hierarchy) -> Integers:
-    """(n,): the node above each; the root has itself."""
-    place, count = hierarchy.orders[0].astype(np.int64), len(hierarchy.size)
-    steps = np.bincount(place + 1, minlength=count + 2) - np.bincount(place + hierarchy.size, minlength=count + 2)
-    depth = np.cumsum(steps)[place]
-    key = depth * count + place
-    order = np.argsort(key)
-    above = order[np.maximum(np.searchsorted(key[order], key - count) - 1, 0)]
-    return np.where(depth > 0, above, 0)

@@ -253,11 +253,6 @@ def shared_edges(faces: npt.NDArray[np.integer]) -> Groups:
     return _groups(sides.number, sides.edge[1:] != sides.edge[:-1])
 
 
-def side_ends(faces: npt.NDArray[np.integer]) -> tuple[Integers, Integers]:
-    """(3 m,): vertices where the sides of faces (m, 3) start and end."""
-    return faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
-
-
 def used_vertices(faces: npt.NDArray[np.integer]) -> Integers:
     """Numbers of the vertices that faces use, in order."""
     return np.flatnonzero(use_mask(faces, int(faces.max(initial=-1)) + 1))

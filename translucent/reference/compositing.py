@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 from translucent.errors import InputError
@@ -78,17 +77,6 @@ def unassociated(layer: ColorLayer) -> ColorLayer:
 def _divided(color: Array, opacity: Array) -> Array:
     """Quotient color / opacity; 0 where there is no opacity."""
     return np.asarray(np.where(opacity > 0, color / np.where(opacity > 0, opacity, 1.0), 0.0))
-
-
-def color_for_step(color: npt.ArrayLike, opacity: npt.ArrayLike, step_ratio: npt.ArrayLike) -> Array:
-    """Associated color of a step that is `step_ratio` times the reference step; opacity as `optics.opacity_for_step`.
-
-    In a homogeneous step the color is in proportion to the opacity: C' = C a' / a; without opacity, to the length.
-    """
-    alpha = np.asarray(opacity, dtype=np.float64)
-    some = alpha > 0
-    corrected = optics.opacity_for_step(alpha, step_ratio) / np.where(some, alpha, 1.0)
-    return np.asarray(np.asarray(color, dtype=np.float64) * np.where(some, corrected, step_ratio))
 
 
 @np.errstate(over="ignore", under="ignore")
