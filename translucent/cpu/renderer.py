@@ -16,7 +16,7 @@ from translucent.arrays import Integers
 from translucent.cpu.hits import Band, ExactRayCaster, PictureRays, PixelTracer, TracedMesh
 from translucent.cpu.interactions import MicrofacetSamples
 from translucent.cpu.ray_tree import DiffusionFields, RayTree
-from translucent.cpu.shading import Arrays, Shader, on_rays
+from translucent.cpu.shading import Arrays, Shader
 from translucent.cpu.threads import in_threads, processors
 from translucent.diffusion.cache import FieldCache
 from translucent.errors import RenderError
@@ -87,7 +87,7 @@ class TracedRadiance:
         first: int,
         spread: MicrofacetSamples | None,
     ) -> None:
-        own = [on_rays(line, some, len(rays)) for line in hits]
+        own = [line.on_rays(some, len(rays)) for line in hits]
         light = self.tree.see(rays.where(some), own, some + first, spread)
         shaded["radiance"][some], shaded["valid"][some] = light.radiance, light.valid
 

@@ -282,23 +282,15 @@ class Shader:
         parts = []
         for some in slices(surfaces * len(hits), SURFACES):
             chosen = np.arange(some.start, some.stop)
-            parts.append(self._shade(rays.where(some), [on_rays(line, chosen, len(rays)) for line in hits]))
+            parts.append(self._shade(rays.where(some), [line.on_rays(chosen, len(rays)) for line in hits]))
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def _shade(self, rays: Rays, hits: Sequence[Hits]) -> Arrays:
         shaded = shade_hits(self.scene, rays, hits, self.sheets, self.light)
         invalid = np.flatnonzero(~shaded["valid"])
         if self.fallback is not None and invalid.size:
-            lines = [on_rays(line, invalid, len(rays)) for line in hits]
+            lines = [line.on_rays(invalid, len(rays)) for line in hits]
             again = shade_hits(self.scene, rays.where(invalid), lines, self.fallback, self.light)
             for name in SHOWN:
                 shaded[name][invalid] = again[name]
         return shaded
-
-
-def on_rays(hits: Hits, chosen: Integers, rays: int) -> Hits:
-    """Hits on the `chosen` rays, with the rays renumbered."""
-    number = np.full(rays, -1)
-    number[chosen] = np.arange(len(chosen))
-    kept = hits.where(number[hits.pixel] >= 0)
-    return replace(kept, pixel=number[kept.pixel])

@@ -23,6 +23,9 @@ from translucent.arrays import Integers
 
 Floats = npt.NDArray[np.float32]
 
+#: Coordinates of any precision.
+Reals = npt.NDArray[np.floating]
+
 #: Neighbors on either side among which a cluster looks for its partner.
 REACH = 8
 
@@ -128,21 +131,21 @@ def _joined(parts: list[Hierarchy]) -> Hierarchy:
     )
 
 
-def curve_order(low: Floats, high: Floats) -> Integers:
-    """Order of the centers of boxes along a Morton curve through their bounds."""
+def curve_order(low: Reals, high: Reals) -> Integers:
+    """Order of the centers of boxes (n, 3) along a Morton curve through their bounds (Morton 1966)."""
     chunks = [slice(begin, begin + _CHUNK) for begin in range(0, len(low), _CHUNK)]
     ends = [(found.min(axis=0), found.max(axis=0)) for found in (_centers(low[part], high[part]) for part in chunks)]
     start = np.min([least for least, _ in ends], axis=0)
     extent = np.maximum(np.max([most for _, most in ends], axis=0) - start, np.finfo(np.float32).tiny)
     keys = np.empty(len(low), np.uint64)
     for part in chunks:
-        cells = (_centers(low[part], high[part]) - start) / extent * np.float32((1 << _CURVE_BITS) - 1)
+        cells = (_centers(low[part], high[part]) - start) / extent * low.dtype.type((1 << _CURVE_BITS) - 1)
         x, y, z = (_spread(cell) for cell in cells.astype(np.uint64).T)
         keys[part] = x | y << np.uint64(1) | z << np.uint64(2)
     return np.argsort(keys)
 
 
-def _centers(low: Floats, high: Floats) -> Floats:
+def _centers(low: Reals, high: Reals) -> Reals:
     """(n, 3): centers of boxes."""
     return 0.5 * low + 0.5 * high
 

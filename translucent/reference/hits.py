@@ -9,7 +9,7 @@ whatever vertices and edges it passes through.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -53,6 +53,13 @@ class Hits:
     def where(self, keep: npt.NDArray[np.bool_] | Integers | slice) -> Hits:
         """Selection of hits by a mask (k,), indices or a slice."""
         return Hits(self.pixel[keep], self.distance[keep], self.sign[keep], self.face[keep], self.barycentric[keep])
+
+    def on_rays(self, chosen: Integers, rays: int) -> Hits:
+        """Hits on the `chosen` of so many rays, with these renumbered from 0."""
+        number = np.full(rays, -1)
+        number[chosen] = np.arange(len(chosen))
+        kept = self.where(number[self.pixel] >= 0)
+        return replace(kept, pixel=number[kept.pixel])
 
     def before(self, end: Array) -> Hits:
         """Hits ahead of the origins, up to the distance `end` (pixels,) where each ray stops."""

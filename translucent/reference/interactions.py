@@ -81,22 +81,13 @@ class LiveRays:
 
 def joined(parts: Sequence[LiveRays]) -> LiveRays:
     """Concatenate ray segments; at least one part."""
-    rays = Rays(
-        np.concatenate([part.rays.origins for part in parts]),
-        np.concatenate([part.rays.directions for part in parts]),
-        np.concatenate([part.rays.backdrop for part in parts]),
+    windings, since = (np.concatenate([getattr(part.inside, name) for part in parts]) for name in ("windings", "since"))
+    own = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("owner", "throughput", "bent", "reflected")
     )
-    inside = Inside(
-        np.concatenate([part.inside.windings for part in parts]), np.concatenate([part.inside.since for part in parts])
-    )
-    return LiveRays(
-        rays,
-        np.concatenate([part.owner for part in parts]),
-        np.concatenate([part.throughput for part in parts]),
-        inside,
-        np.concatenate([part.bent for part in parts]),
-        np.concatenate([part.reflected for part in parts]),
-    )
+    owner, throughput, bent, reflected = own
+    rays = Rays.joined([part.rays for part in parts])
+    return LiveRays(rays, owner, throughput, Inside(windings, since), bent, reflected)
 
 
 #: Number of passages through a rough sheet after which light counts as lost.

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arguments import checked_but
+from translucent.arrays import slices
 from translucent.errors import InputError
 from translucent.files.reading import require_memory
 from translucent.formulas import optics
@@ -125,8 +125,10 @@ def render(
     light_paths = LightPaths(scene, sheets)
     light = SurfaceLight(light_paths)
     found = []
-    for part in _parts(hits, len(rays)):
-        own = rays.where(part), [_along(line, part) for line in hits]
+    surfaces = np.sum([np.bincount(line.pixel, minlength=len(rays)) for line in hits], axis=0)
+    for part in slices(surfaces * len(hits), CHUNK):
+        chosen_rays = np.arange(part.start, part.stop)
+        own = rays.where(part), [line.on_rays(chosen_rays, len(rays)) for line in hits]
         shaded = shade_hits(scene, *own, sheets, light)
         if scatters:
             _add_scattered(shaded, *own, light, tolerance)
@@ -305,19 +307,3 @@ def scene_hits(scene: Scene, size: tuple[int, int]) -> list[Hits]:
     found = f"{width * height / 1e6:.0f} million pixels"
     require_memory(f"frame size {width}x{height}", found, _PIXEL_BYTES * width * height, "give a smaller size")
     return [line_hits(body.mesh, body.matrix, scene.camera, size) for body in scene.objects]
-
-
-def _parts(hits: Sequence[Hits], pixels: int) -> Iterator[slice]:
-    """Slices of pixels, each with at most `CHUNK` surfaces times objects, or of one pixel."""
-    crossed = np.cumsum(np.sum([np.bincount(line.pixel, minlength=pixels) for line in hits], axis=0))
-    cuts = np.searchsorted(crossed, np.arange(0, crossed[-1], max(CHUNK // len(hits), 1)), side="right")
-    bounds = np.unique(np.concatenate([[0], cuts[1:], [pixels]]))
-    for begin, end in itertools.pairwise(bounds):
-        yield slice(int(begin), int(end))
-
-
-def _along(line: Hits, part: slice) -> Hits:
-    """Hits on a slice of rays, renumbered from 0."""
-    begin, end = np.searchsorted(line.pixel, [part.start, part.stop])
-    own = line.where(slice(begin, end))
-    return Hits(own.pixel - part.start, own.distance, own.sign, own.face, own.barycentric)

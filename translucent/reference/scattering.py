@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from translucent.arrays import Array, Integers, Mask
+from translucent.arrays import Array, Integers, Mask, expanded
 from translucent.formulas import optics
 from translucent.media.medium import MAX_COEFFICIENT
 from translucent.reference.compositing import _layers
@@ -244,7 +244,6 @@ def _cut(work: _InScatter) -> tuple[Integers, Array, Array]:
     with np.errstate(over="ignore"):
         depth = segments.extinction[spans.segment].max(axis=1, initial=0.0) * reach
     cuts = np.ceil(np.log2(np.clip(depth, 1.0, 2.0**MOST_CUTS))).astype(np.int64)
-    owner = np.repeat(np.arange(len(cuts)), cuts + 1)
-    number_in_span = np.arange(len(owner)) - np.repeat(np.cumsum(cuts + 1) - cuts - 1, cuts + 1)
+    owner, number_in_span = expanded(np.zeros_like(cuts), cuts + 1)
     last = np.exp2(number_in_span - cuts[owner])
     return owner, np.where(number_in_span == 0, 0.0, 0.5 * last), last

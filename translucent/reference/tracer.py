@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
+from translucent.geometry.bvh import curve_order
 from translucent.geometry.ray_caster import point_from
 from translucent.reference.hits import Hits, cross_triangles, sorted_hits
 from translucent.scene.scene import Object, Scene
@@ -78,7 +79,7 @@ class BoxTree:
     def of(cls, corners: Array) -> BoxTree:
         """Build the tree of triangles (m, 3, 3), in the order of a space-filling curve (Morton 1966)."""
         low, high = corners.min(axis=1), corners.max(axis=1)
-        order = np.argsort(_morton_codes(0.5 * (low + high)), kind="stable")
+        order = curve_order(low, high)
         low, high = low[order], high[order]
         levels = []
         while True:
@@ -135,19 +136,6 @@ def _grouped(center: Array, half: Array, nodes: int) -> Array:
     children[:, 3:] = _NOTHING
     children[: len(center)] = np.hstack([center, half])
     return np.ascontiguousarray(children.reshape(nodes, BRANCHES, 6).transpose(0, 2, 1))
-
-
-def _morton_codes(points: Array) -> npt.NDArray[np.uint64]:
-    """(n,): the bits of the three coordinates (n, 3) in turn, 21 of each."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    extent = max(float((high - low).max()), np.finfo(np.float64).tiny)
-    with np.errstate(under="ignore"):
-        cells = ((points - low) / extent * (2**21 - 1)).astype(np.uint64)
-    code = np.zeros(len(points), dtype=np.uint64)
-    for bit in range(21):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
-    return code
 
 
 #: Enlargement of the scene's bounding sphere, as a share.
