@@ -10,6 +10,11 @@ import pytest
 import translucent as tl
 from translucent.geometry.solids import Box, Sphere
 from translucent.geometry.support import Support, largest_of
+from translucent.scene import stages
+from translucent.scene.showcase import framing
+from translucent.scene.stages import ground_mesh, stage_named
+
+MEDIUM = tl.Medium(absorption=(1, 2, 3))
 
 MATRIX = np.array([[0.3, -1.1, 0.2, 4.0], [0.9, 0.4, 0.0, -2.0], [0.1, 0.2, -0.7, 1.0], [0, 0, 0, 1]])
 
@@ -66,3 +71,26 @@ def test_few_vertices_are_looked_at() -> None:
     mesh = dented(400)
     largest_of([Support(mesh, np.eye(4)), Support(Box((-3, 0, 0), (-2, 1, 1)).tessellate(), np.eye(4))], along)
     assert looked_at < 0.1 * len(mesh.vertices)
+
+
+def test_large_meshes_are_framed_as_by_all_of_their_vertices(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cameras and grounds, with and without shadows; vertices that no face uses are seen by neither."""
+    mesh, stage = tl.Mesh(dented().vertices * (1, 3, 1), dented().faces), stage_named("studio")  # with a long shadow
+    stray = tl.Mesh(np.concatenate([mesh.vertices, [(0.0, 50.0, 0.0)]]), mesh.faces)
+    placed = [tl.Object(each, MEDIUM) for each in (mesh, stray)]
+    few = [tl.Object(Box((-1, -1, -1), (1, 1, 1)).tessellate(), MEDIUM)]
+    for objects in (placed[:1], placed[1:], [*placed, *few]):
+        made = []
+        for large in (1 << 30, 0):
+            monkeypatch.setattr(stages, "LARGE", large)
+            cameras = [framing(objects, (16, 9), up=(0.1, 1, 0)), framing(objects, (9, 16), stage=stage)]
+            ground = ground_mesh(tl.Scene(objects, cameras[1]), np.eye(3))
+            made.append([cameras[0].pose, cameras[1].pose, ground.vertices])
+        for one, other in zip(*made, strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-13)
+
+
+def test_of_a_large_mesh_few_vertices_are_farthest() -> None:
+    support = Support(dented(), np.eye(4))
+    assert support.whole
+    assert len(support.farthest(np.eye(3))) < 0.5 * len(dented().vertices)

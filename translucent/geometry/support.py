@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Mask
+from translucent.geometry.grouping import use_mask
 from translucent.geometry.mesh import Mesh
 
 #: Vertices from which on a mesh is divided into clusters.
@@ -34,9 +35,13 @@ class _Clusters:
         Place in it at which each cluster begins, and its end.
     corners : (8, m, 3) float64
         Of the bounds of each.
+    whole : bool
+        Faces use every vertex.
     """
 
-    def __init__(self, vertices: Array) -> None:
+    def __init__(self, mesh: Mesh) -> None:
+        vertices = mesh.vertices
+        self.whole = bool(use_mask(mesh.faces, len(vertices)).all())
         low, high = (np.array([bound(side) for side in vertices.T]) for bound in (np.min, np.max))
         side = min(int(_CELLS * np.cbrt(len(vertices))), _MOST_CELLS)
         scale = side / np.where(high > low, high - low, 1.0)
@@ -77,7 +82,7 @@ class Support:
         self._mesh, self._matrix = mesh, matrix
         self.many = len(mesh.vertices) >= _MANY
         if self.many and mesh not in _CLUSTERS:
-            _CLUSTERS[mesh] = _Clusters(mesh.vertices)
+            _CLUSTERS[mesh] = _Clusters(mesh)
 
     @cached_property
     def points(self) -> Array:
@@ -94,6 +99,21 @@ class Support:
         """(2, 3): smallest and largest world coordinates."""
         both = self.largest(lambda points: np.concatenate([-points, points], axis=1))
         return np.stack([-both[:3], both[3:]])
+
+    @property
+    def whole(self) -> bool:
+        """True if faces use every vertex of a mesh that has clusters."""
+        return self.many and _CLUSTERS[self._mesh].whole
+
+    def farthest(self, directions: Array) -> Array:
+        """(n, 3): vertices in the world among which are those that are farthest along these directions (k, 3)."""
+        if not self.many:
+            return self.points
+        first = self._first @ directions.T
+        most = (self._corners @ directions.T).reshape(8, *first.shape).max(axis=0)
+        reaching = (most >= first.max(axis=0)).any(axis=1)
+        reaching[first.argmax(axis=0)] = True  # also where its bounds do not reach it, by rounding
+        return self._placed(self._mesh.vertices[_CLUSTERS[self._mesh].members(reaching)])
 
     def largest(self, values: Values) -> Array:
         """(k,): largest values over all vertices of functions that, on any box, are largest at one of its corners.

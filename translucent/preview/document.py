@@ -20,12 +20,12 @@ from translucent.formulas.tone import TONES
 from translucent.media.medium import MAX_COEFFICIENT, MAX_EMISSION, MAX_IOR, Medium
 from translucent.planning.methods import METHODS
 from translucent.planning.scattering import SCATTERINGS
-from translucent.scene.camera import MAX_COORDINATE, Camera
+from translucent.scene.camera import MAX_COORDINATE, Camera, framing_directions
 from translucent.scene.environment import MAX_EXPOSURE
 from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.scene import Object
 from translucent.scene.showcase import DEFAULT_COLOR, framing
-from translucent.scene.stages import NO_STAGE, STAGES, world_vertices
+from translucent.scene.stages import NO_STAGE, STAGES, farthest_vertices
 from translucent.scene.surface import MAX_DISPERSION, MAX_FILM, Surface
 from translucent.units import METRES_PER_UNIT, metres_per_unit
 
@@ -401,8 +401,9 @@ def framed(orbit: Orbit | None, objects: Sequence[Object], size: tuple[int, int]
     if orbit is None:
         camera = framing(objects, size, fov_y=side.fov_y)  # as translucent render frames it
     else:
-        corners = np.concatenate([world_vertices(item) for item in objects])
-        camera = Camera.framing(corners, size, direction=-direction_from(side.yaw, side.pitch), fov_y=side.fov_y)
+        direction = -direction_from(side.yaw, side.pitch)
+        corners = farthest_vertices(objects, framing_directions(size, direction, side.fov_y))
+        camera = Camera.framing(corners, size, direction, side.fov_y)
     center = np.mean([item.bounds.mean(axis=0) for item in objects], axis=0)
     return dataclasses.replace(orbit_of(camera, center), orthographic=side.orthographic)
 

@@ -19,6 +19,7 @@ from translucent.formulas.phase import parse_phase
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals, keep_drawn_normals
 from translucent.geometry.solids import Box
+from translucent.geometry.support import Support
 from translucent.gltf.load import SUFFIXES, load_scene
 from translucent.media.medium import Medium, color_at
 from translucent.planning.caustics import Caustics
@@ -114,11 +115,14 @@ def load_with(task: Task, pool: Pool, model: Model, allow_outside: bool = False,
         If it cannot be read.
     """
     large = LARGE_BESIDE_PICTURE if pictured else LARGE_FILE
-    if not (os.path.isfile(model.path) and os.path.getsize(model.path) > large):
-        return load(model, allow_outside)
-    loaded, normals = pool.call(task, load_with_normals, model, allow_outside, urgency=Urgency.PICTURE)
-    for mesh, made in normals:
-        keep_drawn_normals(mesh, made)
+    if os.path.isfile(model.path) and os.path.getsize(model.path) > large:
+        loaded, normals = pool.call(task, load_with_normals, model, allow_outside, urgency=Urgency.PICTURE)
+        for mesh, made in normals:
+            keep_drawn_normals(mesh, made)
+    else:
+        loaded = load(model, allow_outside)
+    for item in loaded.scene.objects:
+        Support(item.mesh, item.matrix)  # which divides large meshes into clusters here, and not in the window's loop
     return loaded
 
 

@@ -15,6 +15,9 @@ from translucent.geometry.grouping import extent
 #: Factor by which a picture is larger than the objects that it frames.
 FRAMING_MARGIN = 1.12
 
+#: Direction in which a camera that frames something looks, if none is given.
+FRAMED_FROM = (-0.45, -0.35, -1.0)
+
 #: Points that are framed at a time.
 FRAMED_AT_ONCE = 1 << 16
 
@@ -109,7 +112,7 @@ class Camera(Frozen):
         cls,
         points: npt.ArrayLike,
         size: tuple[int, int] = (1, 1),
-        direction: npt.ArrayLike = (-0.45, -0.35, -1.0),
+        direction: npt.ArrayLike = FRAMED_FROM,
         fov_y: float = 30.0,
         up: npt.ArrayLike = (0.0, 1.0, 0.0),
     ) -> Camera:
@@ -134,12 +137,7 @@ class Camera(Frozen):
         size = check_size(size)
         low, high = extent(seen)
         reach = float(np.linalg.norm(high - low)) or 1.0
-        axis = np.asarray(direction, dtype=np.float64)
-        pose = cls(_look_at(-axis, np.zeros(3), up), fov_y=fov_y).pose
-        aside, back = pose[:3, :2], pose[:3, 2:3]
-        half = np.tan(np.radians(fov_y) / 2) * np.array([size[0] / size[1], 1.0]) / FRAMING_MARGIN
-        # Each point asks for |x - cx| <= half (distance - z): the two sides of the picture meet where both are tight.
-        axes = np.concatenate([half * back + aside, half * back - aside, back], axis=1)
+        pose, half, axes = _framing_axes(size, direction, fov_y, up)
         middle, farthest = 0.5 * (low + high), np.full(5, -np.inf)
         for begin in range(0, len(seen), FRAMED_AT_ONCE):  # millions of points would take room
             part = (seen[begin : begin + FRAMED_AT_ONCE] - middle) @ axes
@@ -147,7 +145,7 @@ class Camera(Frozen):
         upper, lower = farthest[:2], farthest[2:4]
         center, distance = (upper - lower) / 2, float(((upper + lower) / (2 * half)).max())
         distance = max(distance, float(farthest[4]) + 1e-3 * reach)
-        target = middle + aside @ center
+        target = middle + pose[:3, :2] @ center
         return cls.look_at(target + pose[:3, 2] * distance, target, up, fov_y)
 
     @property
@@ -238,6 +236,30 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
     if not exact or width < 1 or height < 1:
         raise InputError(f"frame size {brief(size)}", "not two whole numbers above 0", "give for example (1280, 720)")
     return width, height
+
+
+def _framing_axes(
+    size: tuple[int, int], direction: npt.ArrayLike, fov_y: float, up: npt.ArrayLike
+) -> tuple[Array, Array, Array]:
+    """Pose at the origin, half the picture's width and height at distance 1, and axes (3, 5) along which the farthest
+    points decide where a camera has to be.
+    """
+    axis = np.asarray(direction, dtype=np.float64)
+    pose = Camera(_look_at(-axis, np.zeros(3), up), fov_y=fov_y).pose
+    aside, back = pose[:3, :2], pose[:3, 2:3]
+    half = np.tan(np.radians(fov_y) / 2) * np.array([size[0] / size[1], 1.0]) / FRAMING_MARGIN
+    # Each point asks for |x - cx| <= half (distance - z): the two sides of the picture meet where both are tight.
+    return pose, half, np.concatenate([half * back + aside, half * back - aside, back], axis=1)
+
+
+def framing_directions(
+    size: tuple[int, int],
+    direction: npt.ArrayLike = FRAMED_FROM,
+    fov_y: float = 30.0,
+    up: npt.ArrayLike = (0.0, 1.0, 0.0),
+) -> Array:
+    """Directions (11, 3) such that `Camera.framing` needs no points but those that are farthest along one of them."""
+    return np.concatenate([np.eye(3), -np.eye(3), _framing_axes(size, direction, fov_y, up)[2].T])
 
 
 def _look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike) -> Array:

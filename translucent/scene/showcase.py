@@ -15,18 +15,18 @@ from translucent.errors import InputError, close_names, did_you_mean
 from translucent.geometry.grouping import extent
 from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
-from translucent.scene.camera import Camera
+from translucent.scene.camera import FRAMED_FROM, Camera, framing_directions
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.stages import (
     DEFAULT_STAGE,
     NO_STAGE,
     Stage,
+    farthest_vertices,
     stage_lights,
     stage_named,
     staged,
     with_shadows,
-    world_vertices,
 )
 from translucent.scene.surface import Surface
 
@@ -150,10 +150,14 @@ def framing(
     stage: Stage | None = None,
 ) -> Camera:
     """Camera of `Camera.framing` that sees all of these objects, on a stage with room for their shadows."""
-    points = np.concatenate([world_vertices(item) for item in objects])
     if stage is None:
+        points = farthest_vertices(objects, framing_directions(size, FRAMED_FROM, fov_y, up))
         return Camera.framing(points, size, fov_y=fov_y, up=up)
-    points = with_shadows(points, stage_lights(stage))
+    lights, directions = stage_lights(stage), framing_directions(size, stage.view, fov_y, up)
+    # Shadows are where linear functions of points are: each of what turns unit vectors into those of its shadow.
+    turns = with_shadows(np.eye(4, 3, -1), lights).reshape(-1, 4, 3)[:, 1:]
+    points = farthest_vertices(objects, (directions @ turns.transpose(0, 2, 1)).reshape(-1, 3))
+    points = with_shadows(points, lights)
     middle = extent(points).mean(axis=0)
     return Camera.framing(middle + ROOM * (points - middle), size, stage.view, fov_y, up)
 

@@ -17,6 +17,7 @@ from translucent.arrays import Array
 from translucent.errors import InputError, close_names, did_you_mean
 from translucent.geometry.grouping import used_vertices
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.support import Support
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.falloff import Falloff
@@ -26,6 +27,9 @@ from translucent.scene.studio import dark_studio_map
 from translucent.scene.surface import Surface
 
 Color = tuple[float, float, float]
+
+#: Vertices from which on a mesh is not looked at whole to frame it: of fewer, that takes milliseconds.
+LARGE = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -261,7 +265,7 @@ def _light(key: KeyLight, axes: Array) -> DirectionalLight:
 
 def ground_mesh(scene: Scene, axes: Array) -> Mesh:
     """Square below the objects of a scene: two faces, as a ground that is known to shadow nothing costs no map."""
-    points = np.concatenate([world_vertices(item) for item in scene.objects])
+    points = farthest_vertices(scene.objects, np.concatenate([np.eye(3), -np.eye(3)]))
     low, high = points.min(axis=0), points.max(axis=0)
     unit = float(np.linalg.norm(high - low)) or 1.0
     foot = np.array([0.5 * (low[0] + high[0]), low[1] - GAP * unit, 0.5 * (low[2] + high[2])])
@@ -273,6 +277,17 @@ def ground_mesh(scene: Scene, axes: Array) -> Mesh:
 def world_vertices(item: Object) -> Array:
     """(n, 3): vertices of an object in the world that faces use."""
     return np.asarray(item.mesh.vertices[used_vertices(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3])
+
+
+def farthest_vertices(objects: Sequence[Object], directions: Array) -> Array:
+    """(n, 3): vertices of objects in the world as of `world_vertices`; of large meshes some of them, among which are
+    those that are farthest along each of these directions (k, 3).
+    """
+    found = []
+    for item in objects:
+        large = len(item.mesh.vertices) >= LARGE and (support := Support(item.mesh, item.matrix)).whole
+        found.append(support.farthest(directions) if large else world_vertices(item))
+    return np.concatenate(found)
 
 
 def upright(scene: AnyScene, up: npt.ArrayLike) -> AnyScene:
