@@ -67,10 +67,11 @@ vec3 highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float alpha)
         LightSample arriving = light_at(light, point);
         float cos_light = dot(normal, arriving.towards);
         if (cos_light <= 0.0) { continue; }
-        vec3 half_way = normalize(arriving.towards - ray);
-        vec3 reflected = reflected_by_facets(surface, max(dot(half_way, arriving.towards), 0.0))
+        vec4 from = highlight_from(arriving.towards, arriving.disc, reflected_direction(ray, normal), alpha, cos_view);
+        vec3 half_way = normalize(from.xyz - ray);
+        vec3 reflected = reflected_by_facets(surface, max(dot(half_way, from.xyz), 0.0))
             * microfacet_value(dot(half_way, normal), cos_light, cos_view, alpha);
-        reflected *= cos_light;
+        reflected *= cos_light * from.w;
         if (max(reflected.r, max(reflected.g, reflected.b)) > FAINTEST_HIGHLIGHT) { sum += reflected * irradiance_reaching(light, arriving, point, normal); }
     }
     return sum;

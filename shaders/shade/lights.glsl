@@ -4,7 +4,7 @@
 #include "lib/light.glsl"
 
 Light light_row(int number) {
-    return Light(light_position[number], light_power[number].rgb, light_cone[number]);
+    return Light(light_position[number], light_power[number].rgb, light_cone[number], light_power[number].w, light_disc[number]);
 }
 
 // Light of one of them that arrives at a point.

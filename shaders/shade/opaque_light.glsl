@@ -77,16 +77,23 @@ OpaqueBsdf opaque_bsdf(OpaqueSurface surface, float cos_view) {
     return bsdf;
 }
 
-// Evaluate it for light from the front. Directions are to the eye and to the light.
-vec3 opaque_value(OpaqueBsdf bsdf, vec3 normal, vec3 to_eye, vec3 to_light, float cos_view, float cos_light) {
-    vec3 half_way = normalize(to_light + to_eye);
-    float cos_half = dot(half_way, normal);
-    float away = pow(1.0 - clamp(dot(half_way, to_light), 0.0, 1.0), 5.0);
+// Evaluate its microfacets without Fresnel's reflectance. away: (1 - cos)^5 of the angle to those that mirror the light.
+float facets_value(LightSample arriving, vec3 normal, vec3 to_eye, float cos_view, float cos_light, float alpha, out float away) {
+    vec4 from = highlight_from(arriving.towards, arriving.disc, reflected_direction(-to_eye, normal), alpha, cos_view);
+    vec3 half_way = normalize(from.xyz + to_eye);
+    away = pow(1.0 - clamp(dot(half_way, from.xyz), 0.0, 1.0), 5.0);
+    return microfacet_value(dot(half_way, normal), cos_light, cos_view, alpha) * from.w;
+}
+
+// Evaluate it for light from the front. to_eye: unit vector to the eye.
+vec3 opaque_value(OpaqueBsdf bsdf, vec3 normal, vec3 to_eye, LightSample arriving, float cos_view, float cos_light) {
+    float away;
+    float facets = facets_value(arriving, normal, to_eye, cos_view, cos_light, bsdf.alpha, away);
     vec3 reflected = mix(layer_reflectance(bsdf.dielectric, away), layer_reflectance(bsdf.metal, away), bsdf.metallic);
-    vec3 value = reflected * microfacet_value(cos_half, cos_light, cos_view, bsdf.alpha) + bsdf.base / PI;
+    vec3 value = reflected * facets + bsdf.base / PI;
 #if CLEAR_COAT
-    value = (1.0 - bsdf.coated) * value
-        + bsdf.coat_share * layer_reflectance(bsdf.coat, away) * microfacet_value(cos_half, cos_light, cos_view, bsdf.coat_alpha);
+    facets = facets_value(arriving, normal, to_eye, cos_view, cos_light, bsdf.coat_alpha, away);
+    value = (1.0 - bsdf.coated) * value + bsdf.coat_share * layer_reflectance(bsdf.coat, away) * facets;
 #endif
     return value;
 }
@@ -117,7 +124,7 @@ vec3 opaque_radiance_of(OpaqueSurface surface, vec3 normal, vec3 ray, vec3 point
         vec3 irradiance = arriving.irradiance;
         if (cos_light > 0.0 || surface.passed_share > 0.0) { irradiance *= light_reaching(light, point, normal); }
         if (cos_light > 0.0) {
-            sum += opaque_value(bsdf, normal, -ray, arriving.towards, cos_view, cos_light) * cos_light * irradiance;
+            sum += opaque_value(bsdf, normal, -ray, arriving, cos_view, cos_light) * cos_light * irradiance;
         } else {
             sum -= (1.0 - bsdf.coated) * bsdf.passed / PI * cos_light * irradiance;
         }

@@ -3,6 +3,8 @@
 // flat, is not behind what is opaque there (receiver plane, Isidoro 2006): so no surface shadows itself, however it is inclined.
 // Needs <constants>. Points count from the center of the media; normals are unit vectors.
 
+#include <Lights>
+
 #if SHADOW_MAPS
 #include <Shadows>
 #include <SkyShadows>
@@ -56,34 +58,37 @@ vec3 texel_transmittance(ivec2 at, float end, float advance) {
 }
 
 // Transmittance of the way to a point; 1 beyond the map, where nothing is that throws a shadow. If not dimmed, the share that
-// nothing opaque blocks.
-vec3 light_through(ShadowView view, vec3 point, vec3 normal, bool dimmed) {
+// nothing opaque blocks. aside: metres by which the light is beside where the map looks from, along its right and up, for what
+// throws shadows so many metres from it.
+vec3 light_through(ShadowView view, vec3 point, vec3 normal, bool dimmed, vec2 aside, float away) {
     vec4 here = vec4(point, 1.0);
     vec3 seen = vec3(dot(view.right, here), dot(view.up, here), dot(view.ahead, here));
     float spread = view.perspective ? seen.z : 1.0;
     vec2 place = seen.xy / spread;
-    if (spread <= 0.0 || max(abs(place.x), abs(place.y)) >= 1.0) { return vec3(1.0); }
+    vec2 spans = inversesqrt(vec2(dot(view.right.xyz, view.right.xyz), dot(view.up.xyz, view.up.xyz)));
+    vec2 shift = aside == vec2(0.0) ? aside : aside / spans * max(1.0 / away - 1.0 / spread, 0.0);
+    vec2 looked_up = place + shift;
+    if (spread <= 0.0 || max(abs(looked_up.x), abs(looked_up.y)) >= 1.0) { return vec3(1.0); }
     // The plane of the surface, in these coordinates.
     vec3 plane = vec3(dot(normal, view.right.xyz) / dot(view.right.xyz, view.right.xyz),
                       dot(normal, view.up.xyz) / dot(view.up.xyz, view.up.xyz), dot(normal, view.ahead.xyz));
     float ahead = dot(view.ahead.xyz, point);
-    vec2 spans = inversesqrt(vec2(dot(view.right.xyz, view.right.xyz), dot(view.up.xyz, view.up.xyz)));
     float texel_metres = 2.0 * spread * spans.x / view.size;
-    float steepest = STEEPEST_SHADOW * texel_metres;
-    vec2 position = (0.5 * place + 0.5) * view.size - 0.5;
+    float steepest = STEEPEST_SHADOW * (texel_metres + spread * spans.x * length(shift));
+    vec2 position = (0.5 * looked_up + 0.5) * view.size - 0.5;
     vec2 corner = floor(position);
     vec2 share = position - corner;
     vec3 sum = vec3(0.0);
     for (int i = 0; i < 4; ++i) {
-        vec2 aside = vec2(i & 1, i >> 1);
-        vec2 texel = clamp(corner + aside, vec2(0.0), vec2(view.size - 1.0));
+        vec2 step = vec2(i & 1, i >> 1);
+        vec2 texel = clamp(corner + step, vec2(0.0), vec2(view.size - 1.0));
         vec2 there = (texel + 0.5) * (2.0 / view.size) - 1.0;
         float tilt = view.perspective ? dot(plane, vec3(there, 1.0)) : plane.z;
         float rise = spread * dot(plane.xy, place - there) / (abs(tilt) > 1e-6 ? tilt : 1e-6);
         ivec2 at = ivec2(view.corner + texel);
         float end = view.ends ? texelFetch(shadow_ends, at, 0).r : 0.0;
         if (view.ends && ahead + clamp(rise, -steepest, steepest) > end + SHADOW_MARGIN * texel_metres) { continue; }
-        vec2 weights = mix(1.0 - share, share, aside);
+        vec2 weights = mix(1.0 - share, share, step);
         vec3 passed = dimmed ? texel_transmittance(at, end, view.perspective ? length(vec3(there * spans, 1.0)) : 1.0) : vec3(1.0);
         sum += weights.x * weights.y * passed;
     }
@@ -99,9 +104,23 @@ ShadowView light_view(int light, vec3 point) {
     return shadow_view(first + shadow_cube_face(from_light));
 }
 
+// The mean over the disc of a light with a size: of four places on it, turned from light to light so that none fall together.
+vec3 disc_through(int light, ShadowView view, vec3 point, vec3 normal, bool dimmed) {
+    float radius = light_power[light].w;
+    if (radius == 0.0) { return light_through(view, point, normal, dimmed, vec2(0.0), 1.0); }
+    float away = shadow_lights[light].z;
+    vec3 sum = vec3(0.0);
+    vec2 aside = 0.70710678 * radius * vec2(cos(float(light)), sin(float(light)));
+    for (int i = 0; i < 4; ++i) {
+        sum += light_through(view, point, normal, dimmed, aside, away);
+        aside = vec2(-aside.y, aside.x);
+    }
+    return 0.25 * sum;
+}
+
 vec3 light_reaching(int light, vec3 point, vec3 normal) {
     if (int(shadow_lights[light].y) == 0) { return vec3(1.0); }
-    return light_through(light_view(light, point), point, normal, true);
+    return disc_through(light, light_view(light, point), point, normal, true);
 }
 
 // Share of a light that opaque objects let pass to an interface. What media keep of it transport/light_passed.glsl finds:
@@ -109,7 +128,7 @@ vec3 light_reaching(int light, vec3 point, vec3 normal) {
 float light_unblocked(int light, vec3 point, vec3 normal) {
     if (int(shadow_lights[light].y) == 0) { return 1.0; }
     ShadowView view = light_view(light, point);
-    return view.ends ? light_through(view, point, normal, false).r : 1.0;
+    return view.ends ? disc_through(light, view, point, normal, false).r : 1.0;
 }
 
 // Irradiance on a surface from one of the directions.
@@ -140,7 +159,7 @@ vec3 environment_reaching(vec3 point, vec3 normal) {
                 i += step;
             }
         }
-        if (found) { reaching += light * light_through(sky_view(i), point, normal, true); }
+        if (found) { reaching += light * light_through(sky_view(i), point, normal, true, vec2(0.0), 1.0); }
         i += step;
     }
     return mix(vec3(1.0), (alone ? 1.0 : float(step)) * reaching / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));

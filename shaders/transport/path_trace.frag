@@ -154,6 +154,15 @@ void begin_path(inout Path path, vec2 pixel, ivec2 texel) {
 #endif
 }
 
+// Light of one of them that arrives from somewhere in its sphere.
+LightSample light_drawn(int number, vec3 point, inout Draws draws) {
+    Light light = light_row(number);
+    if (light.disc.w > 0.0) {
+        light.position.xyz += light.disc.xyz + light.disc.w * sphere_point(random_shares(draws).xyz);
+    }
+    return light_sample(light, point);
+}
+
 // Turns a path where media scatter it, and adds light of one of the lights there.
 void scatter(inout Path path, Medium medium, int effective, inout Draws draws) {
     path.flags |= FLAG_BENT | FLAG_REFLECTED;
@@ -162,7 +171,7 @@ void scatter(inout Path path, Medium medium, int effective, inout Draws draws) {
 #if LIGHTS
     int number = min(int(shares.x * float(light_count)), light_count - 1);
     shares.x = fract(shares.x * float(light_count));
-    LightSample arriving = light_at(number, path.origin);
+    LightSample arriving = light_drawn(number, path.origin, draws);
     vec3 phase = phase_of(path.interior, effective, medium.scattering, dot(arriving.towards, path.direction));
     vec3 through = straight_transmittance(path.origin, 0.0, path.interior, arriving.towards, arriving.distance_m, CHANNEL);
     path.light += path.throughput * phase * through * arriving.irradiance * float(light_count);
@@ -213,9 +222,9 @@ void interact(inout Path path, SurfaceHit surface, ObjectRow body, int before, i
     vec3 emitted;
     Lobes lobes = polished_lobes(at, body, emitted);
     path.light += path.throughput * emitted;
-    LightSample arriving = LightSample(vec3(0.0), 0.0, vec3(0.0));
+    LightSample arriving = LightSample(vec3(0.0), 0.0, vec3(0.0), vec4(0.0));
 #if LIGHTS
-    if (is_rough(at)) { arriving = light_at(min(int(shares.y * float(light_count)), light_count - 1), at.point); }
+    if (is_rough(at)) { arriving = light_drawn(min(int(shares.y * float(light_count)), light_count - 1), at.point, draws); }
 #endif
     float seen;
     Branch next = sampled_branch(at, lobes, path.throughput, shares.x, arriving.towards, draws, seen);

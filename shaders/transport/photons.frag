@@ -23,6 +23,7 @@ uniform uint aim;            // its number: a light, and a rectangle
 uniform vec2 aim_shift;      // where the sequence of starts begins
 uniform vec4 light_from;     // position from the center of the media, w = 1; or direction of travel, w = 0
 uniform vec4 cone;           // in which a light shines
+uniform float light_radius;  // of the sphere that it is; 0 for a light without size
 uniform vec3 aim_middle;     // of the rectangle that is aimed at
 uniform vec3 aim_right;      // half its sides; 0: all directions from the light
 uniform vec3 aim_up;
@@ -54,9 +55,11 @@ vec2 start_of(uint number) {
 }
 
 // A photon at the light, or where it comes near the scene.
-Photon begun(uint number, out vec3 power) {
+Photon begun(uint number, inout Draws draws, out vec3 power) {
     vec2 share = start_of(number);
-    Photon photon = Photon(light_from.xyz, 0.0, light_from.xyz, vec3(1.0), light_interior, false, false);
+    vec3 light_at = light_from.xyz;
+    if (light_radius > 0.0) { light_at += light_radius * sphere_point(random_shares(draws).xyz); }
+    Photon photon = Photon(light_at, 0.0, light_from.xyz, vec3(1.0), light_interior, false, false);
     power = photon_power;
     if (aim_right == vec3(0.0)) {
         float up = 2.0 * share.x - 1.0;
@@ -68,7 +71,7 @@ Photon begun(uint number, out vec3 power) {
     vec3 target = aim_middle + (2.0 * share.x - 1.0) * aim_right + (2.0 * share.y - 1.0) * aim_up;
     float back = 2.0 * surface_reach;
     if (light_from.w == 1.0) {
-        vec3 to_target = target - light_from.xyz;
+        vec3 to_target = target - light_at;
         float distance_m = length(to_target);
         photon.direction = to_target / distance_m;
         power *= abs(dot(photon.direction, normalize(cross(aim_right, aim_up)))) / distance_m / distance_m;
@@ -138,7 +141,8 @@ void main() {
     out_normal = vec4(0.0);
     if (number >= last_photon) { return; }
     vec3 power;
-    Photon photon = begun(number, power);
+    Draws draws = Draws(number, aim, 0u);
+    Photon photon = begun(number, draws, power);
     if (power == vec3(0.0)) { return; }
 #if DISPERSION
     int channel = int(number % 3u);
@@ -146,7 +150,6 @@ void main() {
 #else
     const int channel = 1;
 #endif
-    Draws draws = Draws(number, aim, 0u);
     for (int surface = 0; surface < MOST_SURFACES; ++surface) {
         if (!follow(photon, power, channel, draws)) { return; }
     }

@@ -378,7 +378,7 @@ def test_a_layer_that_becomes_a_sheet_throws_its_shadow(renderer: tl.Renderer) -
 def test_maps_that_do_not_fit_are_smaller(renderer: tl.Renderer) -> None:
     """As for many lights in the middle of a room, each of which takes six maps."""
     cameras = [CAMERA] * 6
-    views = ShadowViews.of([(cameras, True)] * 32, [([CAMERA], True)] * 256, 8192, 16384)
+    views = ShadowViews.of([(cameras, (0,), np.zeros(3))] * 32, [([CAMERA], (0,), np.zeros(3))] * 256, 8192, 16384)
     assert views.lights[0][0].size == 256
     assert len({view.corner for group in views.lights for view in group}) == 192
     boxes = {(*view.corner, view.size) for view in views}
@@ -387,7 +387,7 @@ def test_maps_that_do_not_fit_are_smaller(renderer: tl.Renderer) -> None:
     assert max(y + size for _, y, size in boxes) <= views.extent[1]
     assert 24 * views.extent[0] * views.extent[1] <= MOST_BYTES
     with pytest.raises(tl.RenderError, match=r"shadows of 1 lights and 0 directions .* use fewer"):
-        ShadowViews.of([(cameras, True)], [], 1024, LEAST_TEXELS)
+        ShadowViews.of([(cameras, (0,), np.zeros(3))], [], 1024, LEAST_TEXELS)
     crowd = replace(scene("ball"), lights=[LAMPS["sun"]] * 64)
     with pytest.raises(tl.InputError, match="64 lights; use at most 32"):
         renderer.render(crowd, (16, 12))

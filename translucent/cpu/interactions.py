@@ -15,6 +15,7 @@ from translucent.diffusion.interfaces import InterfaceTable
 from translucent.formulas import optics
 from translucent.formulas.bsdf import Interaction, below_coat, diffuse_radiance, microfacet_normal, microfacet_value
 from translucent.formulas.interface import CLEARCOAT_IOR, reflected_direction, refracted_direction
+from translucent.formulas.light import highlight_from
 from translucent.geometry.ray_caster import SceneRayCaster, dot, unit
 from translucent.reference.rays import Rays
 from translucent.reference.surface_light import SurfaceLight
@@ -272,14 +273,23 @@ class InterfaceLight:
                 to_light = unit(np.asarray(light.position) - points)
             else:
                 to_light = np.broadcast_to(-np.asarray(light.direction), points.shape)
-            half = unit(to_eye + to_light)
+            reflected_at, peak = to_light, np.ones(len(points))
+            if isinstance(light, PositionalLight) and light.disc[3] > 0.0:
+                to_disc = np.asarray(light.position) + light.disc[:3] - points
+                away = np.maximum(np.sqrt(dot(to_disc, to_disc)), 1e-18)
+                disc = np.column_stack([to_disc / away[:, None], np.minimum(light.disc[3] / away, 0.9)])
+                cos_view = dot(to_eye, at.normal)
+                image = 2.0 * cos_view[:, None] * at.normal - to_eye
+                found = highlight_from(to_light, disc, image, alpha, np.maximum(cos_view, 1e-3))
+                reflected_at, peak = found[:, :3], found[:, 3]
+            half = unit(to_eye + reflected_at)
             cos_half, cos_light = (np.clip(dot(at.normal, way), 0.0, 1.0) for way in (half, to_light))
             cos_facet = at.cosine(half)
             if below is None:
                 share = (at.coat * optics.fresnel_dielectric(cos_facet, CLEARCOAT_IOR))[:, None] * np.ones(3)
             else:
                 share = below * at.lobes(optics.fresnel_dielectric(cos_facet, at.ior), cos_facet)[0].reflection
-            value = microfacet_value(cos_half, cos_light, at.cosine(at.normal), alpha)
+            value = microfacet_value(cos_half, cos_light, at.cosine(at.normal), alpha) * peak
             with np.errstate(under="ignore"):
                 reflected = share * value[:, None] * light.irradiance_on(points, at.normal)
                 lit = np.flatnonzero(reflected.any(axis=1))

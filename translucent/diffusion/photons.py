@@ -18,7 +18,7 @@ from translucent.diffusion.grid import plane_points
 from translucent.diffusion.interfaces import AIR, InterfaceTable
 from translucent.formulas import optics
 from translucent.formulas.bsdf import Interaction, Lobes, below_coat, microfacet_normal, sampled_branches
-from translucent.formulas.light import cone_attenuation
+from translucent.formulas.light import cone_attenuation, sphere_point
 from translucent.geometry.ray_caster import SceneRayCaster, dot
 from translucent.media.medium import Medium
 from translucent.planning.bodies import same_medium
@@ -150,24 +150,27 @@ class _PhotonTracer:
     def begun(self, aim: PhotonAim, starts: Array) -> _Photons:
         """Photons at the light, or where they come near the scene."""
         scene, count, objects = self.scene, len(starts), len(self.scene.objects)
+        lights = np.tile(aim.light[:3], (count, 1))
+        if aim.light_radius > 0.0:
+            lights += aim.light_radius * sphere_point(self.rng.random((count, 3)))
         if aim.right.any():
             power = np.tile(aim.flux / aim.photons, (count, 1))
             target = aim.middle + (2.0 * starts - 1.0) @ np.stack([aim.right, aim.up])
-            directions = np.tile(aim.light[:3], (count, 1))
+            directions = lights
             origins = target - 2.0 * scene.diagonal * directions
             if aim.light[3]:
-                to_target = target - aim.light[:3]
+                to_target = target - lights
                 distance = np.linalg.norm(to_target, axis=1)
                 directions = to_target / distance[:, None]
                 across = np.cross(aim.right, aim.up)
                 cosine = np.abs(directions @ (across / np.linalg.norm(across)))
                 power *= (cosine / distance**2 * cone_attenuation(directions, aim.cone))[:, None]
-                origins = np.tile(aim.light[:3], (count, 1))
+                origins = lights
         else:
             up, angle = 2.0 * starts[:, 0] - 1.0, 2.0 * np.pi * starts[:, 1]
             level = np.sqrt(np.maximum((1.0 - up) * (1.0 + up), 0.0))
             directions = np.stack([level * np.cos(angle), level * np.sin(angle), up], axis=1)
-            origins = np.tile(aim.light[:3], (count, 1))
+            origins = lights
             power = cone_attenuation(directions, aim.cone)[:, None] * aim.flux / aim.photons
         channel = np.full(count, 1)
         if self._table.dispersed:

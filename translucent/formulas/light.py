@@ -39,3 +39,78 @@ def cone_attenuation(travel: npt.ArrayLike, cone: npt.ArrayLike) -> Array:
         apart = np.linalg.norm(axis, axis=-1, keepdims=True) * np.asarray(travel, dtype=np.float64) - axis
         level = np.clip(cone[..., 3] - (apart**2).sum(axis=-1), 0.0, 1.0)
         return np.asarray(level * level)
+
+
+def sphere_point(shares: npt.ArrayLike) -> Array:
+    """Points (..., 3) in a sphere of radius 1 that look like an even disc from everywhere, given numbers (..., 3).
+
+    They are the projection of points that cover the sphere in four dimensions evenly, if the numbers are random.
+    """
+    shares = np.asarray(shares, np.float64)
+    across, turn, other = np.sqrt(shares[..., 0]), 2.0 * np.pi * shares[..., 1], 2.0 * np.pi * shares[..., 2]
+    along = np.sqrt(1.0 - shares[..., 0]) * np.cos(other)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), along], axis=-1)
+
+
+def nearest_on_disc(disc: npt.ArrayLike, direction: npt.ArrayLike) -> Array:
+    """Unit vectors (..., 3) to where discs are nearest to directions, from which highlights come (Karis 2013).
+
+    Parameters
+    ----------
+    disc : array_like (..., 4)
+        Unit vector to its middle, and its radius over its distance, below 1.
+    direction : array_like (..., 3)
+        Unit vectors.
+    """
+    disc, direction = np.asarray(disc, np.float64), np.asarray(direction, np.float64)
+    middle = disc[..., :3]
+    with np.errstate(under="ignore"):
+        aside = np.maximum((middle * direction).sum(axis=-1, keepdims=True), 0.0) * direction - middle
+        length = np.maximum(np.linalg.norm(aside, axis=-1, keepdims=True), 1e-9)
+        found = middle + aside * np.minimum(disc[..., 3:] / length, 1.0)
+        return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+
+
+def disc_peak(alpha: npt.ArrayLike, radius: npt.ArrayLike, cos_view: npt.ArrayLike) -> Array:
+    """Fraction (...) of a highlight's peak that is left when it is spread over a disc of a radius over its distance.
+
+    The distribution of microfacets (GGX) keeps its integral around the half vectors that mirror the disc.
+    """
+    alpha = np.asarray(alpha, np.float64)
+    half_way = 0.5 * np.asarray(radius, np.float64) / np.sqrt(np.asarray(cos_view, np.float64))
+    with np.errstate(under="ignore"):
+        return np.asarray(alpha * alpha / (alpha * alpha + half_way * (0.5 * np.pi * alpha + half_way)))
+
+
+def highlight_from(
+    towards: npt.ArrayLike,
+    disc: npt.ArrayLike,
+    mirrored: npt.ArrayLike,
+    alpha: npt.ArrayLike,
+    cos_view: npt.ArrayLike,
+) -> Array:
+    """(..., 4): direction from which microfacets mirror a light, and by what their value is multiplied.
+
+    Polished ones show a disc; for rough ones it is where the light is, one of several in the disc.
+
+    Parameters
+    ----------
+    towards : array_like (..., 3)
+        Unit vectors to the light.
+    disc : array_like (..., 4)
+        Unit vectors to the middle of the disc, and its radius over its distance, below 1; 0 for none.
+    mirrored : array_like (..., 3)
+        Mirror images of the directions to the eye.
+    alpha, cos_view : array_like (...)
+        Of the microfacets; cosines between the directions to the eye and the normals, above 0.
+    """
+    towards, disc, alpha = (np.asarray(value, np.float64) for value in (towards, disc, alpha))
+    radius = disc[..., 3]
+    with np.errstate(all="ignore"):
+        rough = np.where(radius > 0.0, np.clip(8.0 * alpha / radius - 1.0, 0.0, 1.0), 1.0)[..., None]
+        middle = (1.0 - rough) * disc[..., :3] + rough * towards
+        middle /= np.linalg.norm(middle, axis=-1, keepdims=True)
+        shown = np.concatenate([middle, (1.0 - rough) * radius[..., None]], axis=-1)
+        peak = np.where(radius > 0.0, disc_peak(alpha, shown[..., 3], cos_view), 1.0)
+        found = np.where(radius[..., None] > 0.0, nearest_on_disc(shown, mirrored), towards)
+    return np.concatenate([found, np.broadcast_to(peak[..., None], (*found.shape[:-1], 1))], axis=-1)

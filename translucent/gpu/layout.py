@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.planning.bodies import MAX_SLOTS
-from translucent.planning.limits import MAX_SCATTER_LIGHTS
+from translucent.planning.limits import MAX_LIGHTS, MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
 
 #: GLSL type, size and alignment in bytes (std140) of a NumPy field. Other shapes are not used: std140 pads them oddly.
@@ -152,9 +152,6 @@ def _is_array(shape: tuple[int, ...]) -> bool:
     return len(shape) == 2 and shape[0] > 4
 
 
-#: Largest number of lights that shine on opaque objects.
-MAX_LIGHTS = 32
-
 #: Largest number of views from lights that media scatter: one each, or the six of a cube.
 MAX_LIGHT_VIEWS = 6 * MAX_SCATTER_LIGHTS
 
@@ -288,7 +285,8 @@ LIGHTS = UniformBlock(
             "f4",
             (MAX_LIGHTS, 4),
         ),  # from the center of the media, w = 1; direction to it, w = 0
-        ("light_power", "f4", (MAX_LIGHTS, 4)),  # intensity or irradiance
+        ("light_power", "f4", (MAX_LIGHTS, 4)),  # intensity or irradiance; w: radius of its part of a sphere in metres
+        ("light_disc", "f4", (MAX_LIGHTS, 4)),  # way to the middle of the whole sphere, and its radius in metres
         ("light_cone", "f4", (MAX_LIGHTS, 4)),  # as cone_attenuation takes it
         ("light_count", "i4", ()),  # that surfaces are lit by
     ),
@@ -299,7 +297,7 @@ SHADOWS = UniformBlock(
     "Shadows",
     9,
     (
-        ("shadow_lights", "f4", (MAX_LIGHTS, 4)),  # of each light: number of its first view, and how many it has
+        ("shadow_lights", "f4", (MAX_LIGHTS, 4)),  # number of the first view, how many, metres to what throws shadows
         ("shadow_views", "f4", (4 * MAX_SHADOW_VIEWS, 4)),  # rows of right, up and ahead; corner, size, perspective
         ("shadow_extinction", "f4", (4,)),  # of the one medium, where maps hold paths
         ("shadow_second", "f4", (4,)),  # of another, with w 1, where they hold those in both

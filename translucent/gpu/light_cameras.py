@@ -251,6 +251,8 @@ class ShadowThrowers:
     ----------
     grounds : tuple of int
         Opaque objects that shadow neither themselves nor one another, large as they may be.
+    middle : (3,) float64
+        Of all but the grounds.
     in_the_way : tuple of int
         Opaque objects that may be between the light and another object, or themselves: all but grounds before which
         everything is.
@@ -267,17 +269,18 @@ class ShadowThrowers:
         shadowed = {i for i in self.grounds if not self._lights(i, everything, range(len(supports)))}
         opaque = set(np.flatnonzero(~scene.filled).tolist())
         self.in_the_way = tuple(sorted(opaque - set(self.grounds) | shadowed))
+        grounds = set(self.grounds)
+        self._throwing = [support for i, support in enumerate(supports) if i not in grounds]
+        bounds = np.array([support.bounds for support in self._throwing or supports])
+        self._low, self._high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+        self.middle = 0.5 * (self._low + self._high)
 
     def cameras(self) -> list[Camera]:
         """Cameras of the light that see all but the grounds; what they do not see is lit."""
-        grounds = set(self.grounds)
-        throwing = [support for i, support in enumerate(self._supports) if i not in grounds]
-        if not throwing:
+        if not self._throwing:
             return []
-        bounds = np.array([support.bounds for support in throwing])
-        low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
-        radius = 0.5 * float(np.linalg.norm(high - low)) or self._scene.diagonal or 1.0
-        cameras = cameras_towards(throwing, self._light, 0.5 * (low + high), radius)
+        radius = 0.5 * float(np.linalg.norm(self._high - self._low)) or self._scene.diagonal or 1.0
+        cameras = cameras_towards(self._throwing, self._light, self.middle, radius)
         if not isinstance(self._light, DirectionalLight):
             return cameras
         # Grounds may be nearer to the light: they end its rays there.

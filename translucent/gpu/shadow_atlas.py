@@ -13,7 +13,8 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.layout import MAX_LIGHTS, MAX_SHADOW_VIEWS, MAX_SKY_VIEWS, SHADOWS, SKY_SHADOWS
+from translucent.gpu.layout import MAX_SHADOW_VIEWS, MAX_SKY_VIEWS, SHADOWS, SKY_SHADOWS
+from translucent.planning.limits import MAX_LIGHTS
 from translucent.scene.camera import Camera
 
 #: Bytes of a texel at most: sums in three channels and a count, the place of the first opaque surface, and depth.
@@ -42,12 +43,15 @@ class ShadowView:
         Texels along a side.
     opaque : tuple of int
         Objects that may end rays.
+    middle : (3,) float64
+        Of what throws shadows there, in the world.
     """
 
     camera: Camera
     corner: tuple[int, int]
     size: int
     opaque: tuple[int, ...]
+    middle: Array
 
     @property
     def ends(self) -> bool:
@@ -71,8 +75,8 @@ class ShadowView:
         )
 
 
-#: Cameras of a light, and the opaque objects in its way.
-SeenFrom: TypeAlias = tuple[Sequence[Camera], tuple[int, ...]]
+#: Cameras of a light, the opaque objects in its way, and the middle (3,) of what throws shadows.
+SeenFrom: TypeAlias = tuple[Sequence[Camera], tuple[int, ...], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +103,8 @@ class ShadowViews:
 
         Parameters
         ----------
-        lights, sky : sequence of (sequence of Camera, tuple of int)
-            Of each light, with the opaque objects in its way.
+        lights, sky : sequence of (sequence of Camera, tuple of int, (3,) float64)
+            Of each light, with the opaque objects in its way, and the middle of what throws shadows.
         size : int
         limit : int
             Largest width of a texture.
@@ -110,7 +114,7 @@ class ShadowViews:
         RenderError
             If not even small maps fit into a texture of `limit` texels along a side.
         """
-        count = sum(len(cameras) for cameras, _ in lights)
+        count = sum(len(cameras) for cameras, *_ in lights)
         side = size
         while side >= LEAST_TEXELS * SKY_SHARE:
             small = side // SKY_SHARE
@@ -143,6 +147,8 @@ class ShadowViews:
         rows = np.zeros((MAX_SHADOW_VIEWS, 4, 4))
         for i, views in enumerate(self.lights):
             spans[i, :2] = first, len(views)
+            if views:
+                spans[i, 2] = np.linalg.norm(views[0].middle - views[0].camera.eye)
             for view in views:
                 rows[first] = view.rows(center)
                 first += 1
@@ -178,11 +184,11 @@ def _placed(
     lights: Sequence[SeenFrom], sky: Sequence[SeenFrom], side: int, small: int, columns: int
 ) -> tuple[tuple[tuple[ShadowView, ...], ...], tuple[ShadowView, ...]]:
     across, number, groups = columns // SKY_SHARE, 0, []
-    for cameras, opaque in lights:
+    for cameras, opaque, middle in lights:
         places = [divmod(number + i, across) for i in range(len(cameras))]
         groups.append(
             tuple(
-                ShadowView(camera, (x * side, y * side), side, opaque)
+                ShadowView(camera, (x * side, y * side), side, opaque, middle)
                 for camera, (y, x) in zip(cameras, places, strict=True)
             )
         )
@@ -190,8 +196,8 @@ def _placed(
     first = -(-number // across) * SKY_SHARE * columns
     places = [divmod(first + i, columns) for i in range(len(sky))]
     return tuple(groups), tuple(
-        ShadowView(cameras[0], (x * small, y * small), small, opaque)
-        for (cameras, opaque), (y, x) in zip(sky, places, strict=True)
+        ShadowView(cameras[0], (x * small, y * small), small, opaque, middle)
+        for (cameras, opaque, middle), (y, x) in zip(sky, places, strict=True)
     )
 
 

@@ -21,7 +21,6 @@ from translucent.gpu.layout import (
     ENVIRONMENT,
     LIGHTS,
     MAX_LIGHT_VIEWS,
-    MAX_LIGHTS,
     MEDIA,
     OBJECT_ROW,
     SCATTER,
@@ -32,7 +31,7 @@ from translucent.gpu.layout import (
 from translucent.gpu.placement import NEAR_SURFACE, Balance, FaceCounts, PlacedScene, SampleView
 from translucent.media.medium import VACUUM, Medium
 from translucent.planning.bodies import MAX_SLOTS, Slot
-from translucent.planning.limits import MAX_SCATTER_LIGHTS, SHEET_ON_OPAQUE
+from translucent.planning.limits import MAX_LIGHTS, MAX_SCATTER_LIGHTS, SHEET_ON_OPAQUE
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
 from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.camera import Camera
@@ -429,16 +428,17 @@ def light_uniforms(scene: Scene, shine: bool) -> bytes:
     if shine and len(scene.lights) > MAX_LIGHTS:
         raise InputError("lighting opaque objects", f"{len(scene.lights)} lights", f"use at most {MAX_LIGHTS}")
     lights, center = scene.lights[:MAX_LIGHTS], media_center(scene)
-    position, power = np.zeros((2, MAX_LIGHTS, 4))
+    position, power, disc = np.zeros((3, MAX_LIGHTS, 4))
     cone = np.tile(ALL_AROUND, (MAX_LIGHTS, 1))
     for i, light in enumerate(lights):
         if isinstance(light, PositionalLight):
-            position[i], power[i, :3] = [*(np.asarray(light.position) - center), 1.0], light.intensity
-            cone[i] = light.cone
+            position[i] = [*(np.asarray(light.position) - center), 1.0]
+            power[i] = [*np.asarray(light.intensity), light.part_radius]
+            cone[i], disc[i] = light.cone, light.disc
         else:
             position[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
     count = len(lights) if shine else 0
-    return LIGHTS.pack(light_position=position, light_power=power, light_cone=cone, light_count=count)
+    return LIGHTS.pack(light_position=position, light_power=power, light_disc=disc, light_cone=cone, light_count=count)
 
 
 def shade_uniforms(scene: Scene, balance: Balance) -> bytes:

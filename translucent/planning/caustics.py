@@ -239,6 +239,8 @@ class PhotonAim:
         In which the light shines, as `translucent.formulas.light.cone_attenuation` takes it.
     inside : tuple of int
         Numbers of the bodies that the light is in.
+    light_radius : float
+        Of the sphere that the light is, in metres, in which photons begin anywhere; 0 for a light without size.
     photons : int
         How many leave.
     """
@@ -251,6 +253,7 @@ class PhotonAim:
     weight: float
     cone: Array = field(default_factory=lambda: np.array(ALL_AROUND))
     inside: tuple[int, ...] = ()
+    light_radius: float = 0.0
     photons: int = 0
 
 
@@ -298,34 +301,39 @@ def _aims(scene: Scene, light: Light, clouds: list[Array], center: Array) -> lis
             aims.append(PhotonAim(from_light, at, right, up, flux, float(flux.mean())))
         return aims
     assert isinstance(light, PositionalLight)
-    return _point_aims(scene, light, clouds, middle, np.asarray(light.position) - center)
+    # Photons begin anywhere in the whole sphere, and not in the part of it that one of its points is.
+    place = np.asarray(light.position) + light.disc[:3]
+    return _point_aims(scene, light, clouds, middle, place - center, place)
 
 
-def _point_aims(scene: Scene, light: PositionalLight, clouds: list[Array], middle: Array, at: Array) -> list[PhotonAim]:
+def _point_aims(
+    scene: Scene, light: PositionalLight, clouds: list[Array], middle: Array, at: Array, place: Array
+) -> list[PhotonAim]:
+    """Aims of a light at `place` in the world, `at` from the center."""
     inside = tuple(
         i
         for i, item in enumerate(scene.objects)
-        if item.medium is not None and item.sheet_thickness is None and abs(item.winding_number(light.position)) > 0.75
+        if item.medium is not None and item.sheet_thickness is None and abs(item.winding_number(place)) > 0.75
     )
     intensity, away = np.asarray(light.intensity), float(np.linalg.norm(middle - at))
     position = np.array([*at, 1.0])
-    seen = None if inside or away == 0.0 else _seen(clouds, middle, at, away)
+    seen = None if inside or away == 0.0 else _seen(clouds, middle, at, away, light.disc[3])
     if seen is None:
         flux, none = 4.0 * np.pi * intensity, np.zeros(3)
         weight = float(flux.mean()) * light.mean_share
-        return [PhotonAim(position, middle, none, none, flux, weight, light.cone, inside)]
+        return [PhotonAim(position, middle, none, none, flux, weight, light.cone, inside, light.disc[3])]
     aims, across = [], _across((middle - at) / away)
     for low, high in _apart(seen):
         aimed, right, up, area = _rectangle(low, high, middle, across)
         flux = intensity * area
         weight = float(flux.mean()) * away / float(np.linalg.norm(aimed - at)) ** 3
-        aims.append(PhotonAim(position, aimed, right, up, flux, weight, light.cone, inside))
+        aims.append(PhotonAim(position, aimed, right, up, flux, weight, light.cone, inside, light.disc[3]))
     return aims
 
 
-def _seen(clouds: list[Array], middle: Array, at: Array, away: float) -> list[Array] | None:
-    """Bounds (2, 2) of bodies, as seen from `at` on the plane across the way to their `middle`; None if they are all
-    around.
+def _seen(clouds: list[Array], middle: Array, at: Array, away: float, radius: float) -> list[Array] | None:
+    """Bounds (2, 2) of bodies, as seen from a ball around `at` on the plane across the way to their `middle`; None if
+    they are all around.
     """
     axis, across, found = (middle - at) / away, _across((middle - at) / away), []
     for corners in clouds:
@@ -335,7 +343,8 @@ def _seen(clouds: list[Array], middle: Array, at: Array, away: float) -> list[Ar
         tangents = (corners - at) @ across.T / ahead[:, None]
         if float(np.abs(tangents).max()) > _WIDEST:
             return None
-        found.append(_bounds(tangents * away))
+        aside = radius * float(np.abs(1.0 - away / ahead).max())
+        found.append(_bounds(tangents * away) + aside * np.array([[-1.0], [1.0]]))
     return found
 
 

@@ -18,6 +18,9 @@ from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.scene import Object, Scene, object_names
 from translucent.units import length_text
 
+#: Largest number of lights that shine on surfaces.
+MAX_LIGHTS = 32
+
 #: Largest number of lights that are followed into media.
 MAX_SCATTER_LIGHTS = 8
 

@@ -28,6 +28,13 @@ class PositionalLight(Frozen):
     position: npt.ArrayLike
     intensity: npt.ArrayLike
 
+    #: Radius in metres of the part of a sphere over which its shadows are filtered; 0 for a light without size.
+    part_radius = 0.0
+
+    #: Way to the middle of the whole sphere, which is mirrored and sends out photons, and its radius, in metres; 0 for
+    #: none.
+    disc: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+
     def __post_init__(self) -> None:
         position = _vector("light position", self.position, "give (x, y, z); at infinity, use a tl.DirectionalLight")
         if (farthest := float(np.abs(position).max())) > MAX_COORDINATE:
@@ -174,6 +181,10 @@ class DirectionalLight(Frozen):
                 -np.sum(vectors("normals", normals) * np.asarray(self.direction), axis=-1, keepdims=True), 0.0
             )
             return np.asarray(cosine * np.asarray(self.irradiance))
+
+
+#: Any light of a scene.
+Light = PointLight | SpotLight | DirectionalLight
 
 
 def _unit(value: npt.ArrayLike) -> Array:

@@ -20,11 +20,10 @@ from translucent.media.density import Density
 from translucent.media.medium import MAX_EMISSION, Medium
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment, parse_radiance
-from translucent.scene.lights import DirectionalLight, PointLight, SpotLight
+from translucent.scene.lights import Light as Light
 from translucent.scene.surface import Surface
 
 Overlap = Literal["add", "union", "priority"]
-Light = PointLight | SpotLight | DirectionalLight
 
 #: Default reflectance of opaque objects: a light gray, as of clay.
 OPAQUE_COLOR = (0.6, 0.6, 0.6)
@@ -248,7 +247,7 @@ class Scene(Frozen):
     objects : sequence of Object
         At least one.
     camera : Camera
-    lights : sequence of PointLight, SpotLight or DirectionalLight
+    lights : sequence of PointLight, SpotLight, DirectionalLight or another light
     environment : Environment
         Default: white from everywhere.
     overlap : {"add", "union", "priority"}
@@ -274,7 +273,7 @@ class Scene(Frozen):
     environment_shadows: int = 0
 
     def __post_init__(self) -> None:
-        for field_name, kinds in (("objects", Object), ("lights", (PointLight, SpotLight, DirectionalLight))):
+        for field_name, kinds in (("objects", Object), ("lights", get_args(Light))):
             given = getattr(self, field_name)
             items = tuple(given) if isinstance(given, Iterable) else (given,)
             for item in items:

@@ -21,7 +21,7 @@ from translucent.geometry.support import Support
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.falloff import Falloff
-from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.lights import DirectionalLight, PositionalLight, SpotLight
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.studio import dark_studio_map
 from translucent.scene.surface import Surface
@@ -320,9 +320,9 @@ def upright_turn(up: npt.ArrayLike) -> Array:
 def moved(light: Light, matrix: Array) -> Light:
     """Light moved by a rigid matrix (4, 4)."""
     changes: dict[str, Any] = {}
-    if not isinstance(light, PointLight):
+    if isinstance(light, SpotLight | DirectionalLight):
         changes["direction"] = matrix[:3, :3] @ np.asarray(light.direction)
-    if not isinstance(light, DirectionalLight):
+    if isinstance(light, PositionalLight):
         changes["position"] = matrix[:3, :3] @ np.asarray(light.position) + matrix[:3, 3]
     return dataclasses.replace(light, **changes)
 

@@ -126,6 +126,7 @@ class CausticsPass:
             "aim_shift": tuple(shift),
             "light_from": tuple(aim.light),
             "cone": tuple(aim.cone),
+            "light_radius": aim.light_radius,
             "aim_middle": tuple(aim.middle),
             "aim_right": tuple(aim.right),
             "aim_up": tuple(aim.up),

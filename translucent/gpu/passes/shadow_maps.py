@@ -209,7 +209,7 @@ class ShadowMapsPass:
                 for group in (scene.lights, _sky_lights(scene)[:: seen.step])
             )
             seen_by, seen_from_sky = (
-                [(found.cameras(), found.in_the_way if in_place else opaque) for found in group]
+                [(found.cameras(), found.in_the_way if in_place else opaque, found.middle) for found in group]
                 for group in (lights, sky)
             )
             limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
