@@ -104,6 +104,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.scene.environment import Environment as Environment
     from translucent.scene.lights import DirectionalLight as DirectionalLight
     from translucent.scene.lights import PointLight as PointLight
+    from translucent.scene.lights import SphereLight as SphereLight
     from translucent.scene.lights import SpotLight as SpotLight
     from translucent.scene.scene import Object as Object
     from translucent.scene.scene import Scene as Scene
@@ -157,7 +158,7 @@ _NAMES = {
     "scene.backdrop": "Backdrop",
     "scene.camera": "Camera",
     "scene.environment": "Environment",
-    "scene.lights": "DirectionalLight PointLight SpotLight",
+    "scene.lights": "DirectionalLight PointLight SphereLight SpotLight",
     "scene.scene": "Object Scene",
     "scene.showcase": "showcase",
     "scene.stages": "staged",

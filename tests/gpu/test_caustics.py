@@ -47,7 +47,9 @@ def ball(medium: tl.Medium = CLEAR, height: float = 2.0, mesh: tl.Mesh = BALL, *
     return tl.Object(mesh, medium, at(0, height, 0), **options)  # type: ignore[arg-type]
 
 
-def scene(*objects: tl.Object, light: tl.PointLight | tl.DirectionalLight = SUN, **options: object) -> tl.Scene:
+def scene(
+    *objects: tl.Object, light: tl.PointLight | tl.SphereLight | tl.DirectionalLight = SUN, **options: object
+) -> tl.Scene:
     given = {"camera": CAMERA, "environment": NIGHT, **options}
     return tl.Scene(objects or (ball(), GROUND), lights=[light], **given)  # type: ignore[arg-type]
 
@@ -154,6 +156,7 @@ PAIRS = {
     ),
     "rough": (scene(ball(TINTED, mesh=COARSE, surface=tl.Surface(roughness=0.4)), GROUND, light=LAMP), 0.01),
     "film and coat": (scene(ball(CLEAR, mesh=COARSE, surface=FILM_AND_COAT), GROUND, light=SUN), 0.01),
+    "sphere light": (scene(ball(CLEAR, mesh=COARSE), GROUND, light=tl.SphereLight((1.5, 6, 1), 20.0, 0.6)), 0.01),
     "dispersive": (scene(ball(CLEAR, mesh=COARSE, surface=tl.Surface(dispersion=2.0)), GROUND, light=SUN), 0.01),
 }
 

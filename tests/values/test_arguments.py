@@ -46,6 +46,7 @@ GOOD: dict[Callable[..., Any], dict[str, Any]] = {
     tl.DepthPeeling: {"max_layers": 4, "order": "both-ends"},
     tl.Diffusion: {"resolution": 32},
     tl.DirectionalLight: {"direction": (0, -1, 0), "irradiance": (1, 1, 1)},
+    tl.SphereLight: {"position": (0, 0, 0), "intensity": 1.0, "radius": 0.5},
     tl.SpotLight: {"position": (0, 0, 0), "direction": (0, -1, 0), "intensity": 1.0, "inner_cone": 1.0},
     tl.Draine: {"g": 0.5, "alpha": 1.0},
     tl.HenyeyGreenstein: {"anisotropy": 0.5},

@@ -29,6 +29,7 @@ VALUES = {
     "environment": SKY,
     "picture of all directions": tl.Environment.studio(),
     "point light": tl.PointLight((1, 2, 3), 1.0),
+    "sphere light": tl.SphereLight((1, 2, 3), 1.0, 0.5),
     "spot light": tl.SpotLight((1, 2, 3), (0, 0, 1), 1.0),
     "directional light": tl.DirectionalLight((1, 2, 3), 1.0),
     "backdrop": tl.Backdrop(np.ones((2, 3, 3)), np.ones((2, 3))),

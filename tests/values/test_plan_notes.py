@@ -77,6 +77,7 @@ def test_every_pass_has_a_name_and_every_note_a_kind(kind: str) -> None:
         (scene(body(DIAMOND)), tl.ThinLayer(), Capabilities(), NoteKind.LATER_REFRACTION),
         (scene(body(), body(None)), None, Capabilities(), NoteKind.SHADOWS),
         (scene(body(tl.Medium())), None, Capabilities(), NoteKind.INVISIBLE),
+        (scene(body(MILK), lights=[tl.SphereLight((0, 0, 5), 1.0, 0.5)]), None, Capabilities(), NoteKind.SPHERE_LIGHTS),
         (scene(body(), body(x=3, priority=1)), None, Capabilities(), NoteKind.UNUSED_PRIORITIES),
     ],
     ids=lambda value: value.name if isinstance(value, NoteKind) else "",

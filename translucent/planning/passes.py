@@ -24,6 +24,7 @@ class NoteKind(StrEnum):
     SHEETS_WITHOUT_ORDER = "sheets without order"
     UNLIT = "unlit"
     NOISE = "noise"
+    SPHERE_LIGHTS = "sphere lights"
 
     # What the scene asks for and no pass renders.
     LIGHTS_LEFT_OUT = "lights left out"

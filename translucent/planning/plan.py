@@ -41,6 +41,8 @@ from translucent.planning.interfaces import (
 )
 from translucent.planning.limits import (
     AMBIENT,
+    MAX_LIGHTS,
+    MAX_SCATTER_LIGHTS,
     black_bodies,
     layers_instead,
     mesh_limits,
@@ -65,7 +67,7 @@ from translucent.planning.rendered import Treatment, darkened, occluder_scene, o
 from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Scattering, SingleScattering, Treatments, choose_treatments, rendered_scene
 from translucent.planning.shadow_maps import ShadowMaps, shadow_passes, shadows_left_out
-from translucent.scene.lights import PositionalLight, SpotLight
+from translucent.scene.lights import SPREADS, PositionalLight, SphereLight, SpotLight, without_spheres
 from translucent.scene.scene import Object, Scene, check_scene, object_names
 
 
@@ -124,12 +126,14 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
     paths = request.method if isinstance(request.method, PathTraced) else None
     if paths is None:
         treatments = _treatments(scene, request, machine)
+        scene, spheres = _with_point_lights(scene, rendered_scene(scene, treatments))
         rendered = rendered_scene(scene, treatments)
         found = _thickness(rendered, request, machine, ambient=_scatters_ambient(scene, treatments))
         notes = layers_instead(scene, treatments.refusals)
         found = replace(found, diffusion=treatments.diffusion, unmodelled=(*found.unmodelled, *notes))
     else:
         _check_paths(scene, request, paths, machine)
+        scene, spheres = _with_point_lights(scene, straight_scene(scene))
         found = _thickness(straight_scene(scene), RenderRequest(), machine, ambient=False)
         everywhere = {i: Treatment.PATHS for i, item in enumerate(scene.objects) if item.medium is not None}
         found = replace(
@@ -140,10 +144,29 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
             unmodelled=paths.unmodelled(scene),
             paths=paths,
         )
-    found = replace(found, request=request, remarks=black_bodies(scene))
+    unmodelled = (*found.unmodelled, *spheres)
+    found = replace(found, request=request, unmodelled=unmodelled, remarks=black_bodies(scene))
     if request.caustics is not None:
         found = _with_caustics(found, scene, request.caustics, machine)
     return found if found.traced else _with_shadows(found, scene, machine)
+
+
+def _with_point_lights(scene: Scene, rendered: Scene) -> tuple[Scene, tuple[Note, ...]]:
+    """The scene with points in place of spheres that shine, as many as shaders hold, and notes on it.
+
+    `rendered` is the scene with its treatments: lights that are followed into its media are fewer.
+    """
+    spheres = sum(isinstance(light, SphereLight) for light in scene.lights)
+    if not spheres:
+        return scene, ()
+    most = MAX_SCATTER_LIGHTS if scatters(rendered) else MAX_LIGHTS
+    lights = without_spheres(scene.lights, most)
+    count = (len(lights) - len(scene.lights)) // spheres + 1
+    text = f"shadows of sphere lights are those of {count} points each"
+    if count < len(SPREADS[0]):
+        where = "into media" if scatters(rendered) else "to surfaces"
+        text += f", and not of {len(SPREADS[0])}: no more than {most} lights are followed {where}"
+    return replace(scene, lights=lights), (Note(NoteKind.SPHERE_LIGHTS, text),)
 
 
 def _treatments(scene: Scene, request: RenderRequest, machine: Capabilities) -> Treatments:

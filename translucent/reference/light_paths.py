@@ -17,7 +17,7 @@ from translucent.reference.rays import Rays
 from translucent.reference.sheets import scene_crossings
 from translucent.reference.tracer import Lines, Tracer
 from translucent.reference.volume import Volume, volume_segments
-from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PositionalLight
+from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PointLight, PositionalLight, SphereLight
 from translucent.scene.scene import Light, Scene
 
 #: Distance, as a share of the scene's size, within which opaque surfaces do not shadow a light or a lit point: it lies
@@ -26,6 +26,9 @@ CONTACT = 1e-9
 
 #: Rounding errors of a point's largest coordinate that are in contact, too: the way meets its surface at an angle.
 ROUNDED = 64.0
+
+#: Shells in a sphere that shines, and points on each.
+SHELLS, ON_SHELL = 8, 32
 
 #: Number of paths that are followed at a time: the working arrays stay below 500 MB.
 PATHS = 1 << 15
@@ -64,7 +67,8 @@ class LightPaths:
     def __init__(self, scene: Scene, sheets: tuple[float | None, ...]) -> None:
         self.scene, self.sheets = scene, sheets
         self.volume = Volume(scene)
-        self.lights = tuple(_from_eye(light, scene.camera.eye) for light in scene.lights)
+        lights = [part for light in scene.lights for part in parts_of(light)]
+        self.lights = tuple(_from_eye(light, scene.camera.eye) for light in lights)
 
     @cached_property
     def tracer(self) -> Tracer:
@@ -151,6 +155,29 @@ class LightPaths:
                 between = (line.distance > near) & (line.distance < length[line.pixel] - near)
                 shadowed[without_cut_out(body, line.where(between)).pixel] = True
         return shadowed
+
+
+def parts_of(light: Light) -> tuple[Light, ...]:
+    """Point lights that a sphere light consists of; any other light itself.
+
+    They are on shells, each with as much light, in directions of a Fibonacci lattice: a ball looks like an even disc
+    from everywhere if its density is 1 / sqrt(1 - r^2), for which asin r - r sqrt(1 - r^2) is within r.
+    """
+    if not isinstance(light, SphereLight):
+        return (light,)
+    r = np.linspace(0.0, 1.0, 2049)
+    within = (np.arcsin(r) - r * np.sqrt(1.0 - r * r)) * 2.0 / np.pi
+    shells = light.radius * np.interp((np.arange(SHELLS) + 0.5) / SHELLS, within, r)
+    number = np.arange(ON_SHELL)
+    up = 1.0 - (2.0 * number + 1.0) / ON_SHELL
+    across = np.sqrt(1.0 - up * up)
+    points = []
+    for k, radius in enumerate(shells):
+        angle = 2.0 * np.pi * (0.6180339887498949 * number + k / SHELLS)
+        directions = np.stack([across * np.cos(angle), across * np.sin(angle), up], axis=1)
+        points.append(np.asarray(light.position) + radius * directions)
+    intensity = np.asarray(light.intensity) / (SHELLS * ON_SHELL)
+    return tuple(PointLight(point, intensity) for point in np.concatenate(points))
 
 
 def _from_eye(light: Light, eye: Array) -> Light:

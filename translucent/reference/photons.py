@@ -6,6 +6,7 @@ either way.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from translucent.reference.hits import world_normals
 from translucent.reference.interactions import LiveRays
 from translucent.reference.interface_paths import InterfacePaths, _Flight
 from translucent.reference.interfaces import Optics
-from translucent.reference.light_paths import LightPaths
+from translucent.reference.light_paths import LightPaths, parts_of
 from translucent.reference.path_trace import BENT_BATCH, _alike
 from translucent.reference.rays import Rays
 from translucent.reference.refracted import RayEnds
@@ -90,9 +91,11 @@ def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> Landed
     for channels in _alike(np.concatenate([light.volume.scattering, np.stack([own.iors for own in optics], axis=1)])):
         paths = PhotonPaths(surface, RayEnds(surface, 1.0), optics[channels[0]], channels, 0, rng)
         for source in scene.lights:
-            for first in range(0, photons, BENT_BATCH):
-                some = np.arange(first, min(first + BENT_BATCH, photons))
-                rays, power = _emitted(scene, source, some, photons, rng)
+            points = parts_of(source)
+            each = max(photons // len(points), 1)
+            for point, first in itertools.product(points, range(0, each, BENT_BATCH)):
+                some = np.arange(first, min(first + BENT_BATCH, each))
+                rays, power = _emitted(scene, point, some, each, rng)
                 parts.append(paths.land(rays, power))
     return _joined(parts)
 

@@ -1,9 +1,11 @@
-"""Point, spot and directional lights."""
+"""Point, spot, sphere and directional lights."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -155,6 +157,96 @@ class SpotLight(PositionalLight):
 
 @checked
 @dataclass(frozen=True, eq=False)
+class SphereLight(PositionalLight):
+    """Sphere that shines with the same radiance from all its points in all directions, and so throws soft shadows.
+
+    It is drawn as point lights that are spread in it so that they look like an even disc from everywhere. The camera
+    sees it in highlights alone, and it hides nothing.
+
+    Parameters
+    ----------
+    position : array_like (3,)
+        Of its center, in metres.
+    intensity : array_like (3,)
+        Radiant intensity in W/sr, linear RGB; one number stands for all channels.
+    radius : float
+        In metres, above 0.
+
+    Raises
+    ------
+    InputError
+        If a value is not in its range.
+    """
+
+    position: npt.ArrayLike
+    intensity: npt.ArrayLike
+    radius: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        number = isinstance(self.radius, int | float | np.number) and not isinstance(self.radius, bool)
+        if not number or not 0 < self.radius <= MAX_COORDINATE:
+            raise InputError(
+                f"light with radius {brief(self.radius)}",
+                f"not above 0 and up to {MAX_COORDINATE:g} m",
+                "give it in metres, or use a tl.PointLight",
+            )
+        object.__setattr__(self, "radius", float(self.radius))
+
+    @classmethod
+    def from_radiance(cls, position: npt.ArrayLike, radiance: npt.ArrayLike, radius: float) -> SphereLight:
+        """Sphere with a radiance (3,) in W/(m^2 sr); its intensity is pi radius^2 times that."""
+        sphere = cls(position, 0.0, radius)
+        return replace(sphere, intensity=math.pi * sphere.radius**2 * positive_triple("light radiance", radiance))
+
+    def points(self, count: int) -> tuple[PointLight, ...]:
+        """Point lights of the same intensity in all: of `SPREADS` the largest with at most `count`, 1 at least.
+
+        Each looks like a disc of its share of the area.
+        """
+        spread = next(spread for spread in SPREADS if len(spread) <= count)
+        share = 1.0 / len(spread)
+        # With what the discs add, the variance is that of the whole disc.
+        offsets = self.radius * math.sqrt(1.0 - share) * spread
+        return tuple(
+            _PointOfSphere(
+                self.position + offset,
+                share * np.asarray(self.intensity),
+                math.sqrt(share) * self.radius,
+                (*-offset, self.radius),
+            )
+            for offset in offsets
+        )
+
+
+def _projected(vertices: Array) -> Array:
+    """Projection (n, 3) of points (n, 4) along an axis that is far from those of their symmetry."""
+    axis = np.array([4.0, 5.0, 6.0, 7.0]) / math.sqrt(126.0)
+    normal = axis - np.array([0.0, 0.0, 0.0, 1.0])
+    return np.asarray((vertices - 2.0 * np.outer(vertices @ normal, normal) / (normal @ normal))[:, :3])
+
+
+#: Points in a ball that look like an even disc from everywhere, by their number. Such a disc is the projection of an
+#: evenly covered sphere in four dimensions, as of the vertices of a tesseract and of its dual: spherical designs, whose
+#: mean, variance and third moments are exact. Four are a tetrahedron in the ball.
+SPREADS = (
+    _projected(np.array(list(itertools.product((-0.5, 0.5), repeat=4)))),
+    _projected(np.concatenate([np.eye(4), -np.eye(4)])),
+    0.5 * np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]),
+    np.zeros((1, 3)),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _PointOfSphere(PointLight):
+    """Point light that looks like a disc: a part of a sphere."""
+
+    part_radius: float = 0.0
+    disc: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+
+
+@checked
+@dataclass(frozen=True, eq=False)
 class DirectionalLight(Frozen):
     """Light from infinitely far away (KHR_lights_punctual).
 
@@ -184,7 +276,16 @@ class DirectionalLight(Frozen):
 
 
 #: Any light of a scene.
-Light = PointLight | SpotLight | DirectionalLight
+Light = PointLight | SpotLight | SphereLight | DirectionalLight
+
+
+def without_spheres(lights: Sequence[Light], most: int) -> tuple[Light, ...]:
+    """The lights with points in place of each sphere: as many as there are, or fewer to have at most `most` in all."""
+    spheres = sum(isinstance(light, SphereLight) for light in lights)
+    count = max((most - len(lights)) // max(spheres, 1) + 1, 1)
+    return tuple(
+        part for light in lights for part in (light.points(count) if isinstance(light, SphereLight) else (light,))
+    )
 
 
 def _unit(value: npt.ArrayLike) -> Array:
