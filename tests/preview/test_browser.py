@@ -12,6 +12,7 @@ import pytest
 
 from tests.preview.waiting import wait
 from translucent.assets import shader_path
+from translucent.planning.flags import Flags
 from translucent.preview import library
 from translucent.preview.dialogs import Browser, with_recent
 from translucent.preview.document import SURFACE_FIELDS, TIPS, Display, Look, Material, Orbit, camera_of
@@ -177,7 +178,7 @@ def test_a_model_leaves_a_small_picture(state: Any, folder: Path) -> None:
 def test_every_knob_is_explained() -> None:
     silent = {"material.source", "material.preset", "material.phase"}  # set by presets and sessions
     silent |= {"orbit.target", "orbit.yaw", "orbit.pitch", "orbit.distance"}
-    sections = {"material": Material, "look": Look, "display": Display, "orbit": Orbit}
+    sections = {"material": Material, "look": Look, "display": Display, "flags": Flags, "orbit": Orbit}
     fields = {f"{section}.{one.name}" for section, kind in sections.items() for one in dataclasses.fields(kind)}
     assert set(TIPS) == (fields - silent) | {"model.unit"}
     for name in ("ior", "color", "distance", "thickness", *SURFACE_FIELDS):

@@ -41,7 +41,7 @@ class ExplainOptions:
     medium: AnyMediumOptions = group(AnyMediumOptions)
     file: FileOptions = group(FileOptions)
     stage: str | None = stage_option()
-    choices: _ExplainedChoices = group(_ExplainedChoices, without=("thickness",))
+    choices: _ExplainedChoices = group(_ExplainedChoices, without=("thickness", "adaptive"))
 
 
 @click.command(epilog="Example: translucent explain goblet")

@@ -33,6 +33,7 @@ import click
 
 from translucent.commands.console import echo
 from translucent.errors import InputError
+from translucent.planning.flags import Flags
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -131,13 +132,17 @@ def _options(kind: type, without: Collection[str] = ()) -> Iterator[Callable[[Ve
     for field in dataclasses.fields(kind):
         more = dict(field.metadata)
         if (inner := more.pop("group", None)) is not None:
-            yield from _options(inner, more["without"])
+            yield from _options(inner, {*more["without"], *without})
         elif field.name not in without:
             yield _decorator(field, hints[field.name], more)
 
 
 def _decorator(field: dataclasses.Field[Any], hint: Any, more: dict[str, Any]) -> Callable[[Verb], Verb]:
-    names, words = more.pop("names") or (f"--{field.name.replace('_', '-')}",), more.pop("help")
+    name = field.name.replace("_", "-")
+    names, words = (
+        more.pop("names") or (f"--{name}/--no-{name}" if field.default is True else f"--{name}",),
+        more.pop("help"),
+    )
     if isinstance(hint, UnionType):
         (hint,) = (one for one in get_args(hint) if one is not type(None))
     if get_origin(hint) is tuple:
@@ -443,6 +448,8 @@ class ChoiceOptions:
     )
     thickness: str | None = option(metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 
+    flags: Flags = group(Flags)
+
     def read(self) -> RenderRequest:
         """Request for a picture; None of each choice that no option makes."""
         from translucent.planning.caustics import Caustics
@@ -455,6 +462,7 @@ class ChoiceOptions:
             caustics=None if self.caustics is None else Caustics(self.caustics),
             method=self._method(),
             shadows=None if self.shadow_size is None else ShadowMaps(self.shadow_size),
+            **dataclasses.asdict(self.flags),
         )
 
     def _method(self) -> Method | None:

@@ -116,12 +116,6 @@ class RenderOptions:
     look: LookOptions = group(LookOptions)
     choices: ChoiceOptions = group(ChoiceOptions)
     samples: int = option(16, metavar="N", help="Samples per pixel, for smooth edges.")
-    adaptive: bool = option(
-        True,
-        names=("--adaptive/--no-adaptive",),
-        help="Trace rays from smooth interfaces for as many of these as change the picture, or all. Default: "
-        "--adaptive.",
-    )
     opaque_with: str | None = option(
         type=click.Choice(["pyrender"]), help="Let another renderer draw the opaque objects of a glTF file."
     )
@@ -165,9 +159,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     from translucent.scene.turntable import framed_all_around
 
     pixels = read_size(given.size)
-    request = replace(
-        given.choices.read(), samples=given.samples, transparent=given.transparent, adaptive=given.adaptive
-    )
+    request = replace(given.choices.read(), samples=given.samples, transparent=given.transparent)
     pictures = Pictures(given, given.look.tone or "none", pixels)
     _check_together(given, request, pictures)
     pictures.check()

@@ -139,7 +139,7 @@ class PageOptions:
     camera: CameraOptions = group(CameraOptions)
     stage: str | None = stage_option()
     look: LookOptions = group(LookOptions)
-    choices: ChoiceOptions = group(ChoiceOptions, without=("paths", "caustics"))
+    choices: ChoiceOptions = group(ChoiceOptions, without=("paths", "caustics", "adaptive"))
     samples: int = option(16, metavar="N", help="Samples per pixel while nothing moves.")
     title: str | None = option(metavar="TEXT", help="Of the page. Default: the name of the model.")
     poster: str = option(

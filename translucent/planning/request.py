@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from translucent.arguments import brief
 from translucent.errors import InputError
 from translucent.planning.caustics import Caustics
+from translucent.planning.flags import Flags
 from translucent.planning.interfaces import FrontInterface, InterfaceMode, ScreenInterfaces, TracedInterfaces
 from translucent.planning.methods import Method
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
@@ -29,7 +30,7 @@ _TYPES: tuple[tuple[str, type, str, tuple[object, ...]], ...] = (
 
 
 @dataclass(frozen=True)
-class RenderRequest:
+class RenderRequest(Flags):
     """Request for a picture of a scene; None leaves a choice to the planner. See `Renderer.render`.
 
     Parameters
@@ -40,9 +41,11 @@ class RenderRequest:
     scattering : Diffusion, ScatteringLayer or SingleScattering, optional
     caustics : Caustics, optional
     shadows : ShadowMaps, optional
-    transparent, adaptive : bool
+    transparent : bool
     over_backdrop : bool
         Everything opaque is a picture that is drawn elsewhere.
+    **flags : bool
+        See `Flags`.
 
     Raises
     ------
@@ -57,7 +60,6 @@ class RenderRequest:
     caustics: Caustics | None = None
     shadows: ShadowMaps | None = None
     transparent: bool = False
-    adaptive: bool = True
     over_backdrop: bool = False
 
     def __post_init__(self) -> None:

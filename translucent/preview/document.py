@@ -18,6 +18,7 @@ from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.tone import TONES
 from translucent.media.medium import MAX_COEFFICIENT, MAX_EMISSION, MAX_IOR, Medium
+from translucent.planning.flags import Flags
 from translucent.planning.methods import METHODS
 from translucent.planning.scattering import SCATTERINGS
 from translucent.scene.camera import MAX_COORDINATE, Camera, framing_directions
@@ -290,6 +291,7 @@ class Document:
     material: Material = field(default_factory=Material)
     look: Look = field(default_factory=Look)
     display: Display = field(default_factory=Display)
+    flags: Flags = field(default_factory=Flags)
     orbit: Orbit | None = None
     assigned: tuple[Assigned, ...] = ()
     hidden: tuple[int, ...] = ()
@@ -501,6 +503,7 @@ TIPS = {
     name: " ".join(text.split()).replace(" Typical:", "\nTypical:")
     for name, text in re.findall(r"^(\S+) = (.*(?:\n +.*)*)", _EXPLAINED, re.MULTILINE)
 }
+TIPS |= {f"flags.{one.name}": one.metadata["help"] for one in dataclasses.fields(Flags)}
 
 
 def triple_of(values: npt.ArrayLike) -> Triple:

@@ -23,6 +23,7 @@ from translucent.geometry.normals import keep_drawn_normals, made_normals
 from translucent.media.medium import Medium
 from translucent.media.presets import preset
 from translucent.planning.caustics import Caustics
+from translucent.planning.flags import Flags
 from translucent.planning.request import RenderRequest
 from translucent.preview.document import AUTO, Document, Material, Orbit, camera_of, direction_from, length_text
 from translucent.preview.scenes import (
@@ -302,6 +303,8 @@ def python_code(recipe: Recipe) -> str:
     request = request_of(document)
     if request.method is not None:
         choices += [f"method=tl.{request.method!r}"]
+    stated, usual = dataclasses.asdict(document.flags), dataclasses.asdict(Flags())
+    choices += [f"{name}={value}" for name, value in stated.items() if value != usual[name]]
     if request.scattering is not None:
         choices += [f"scattering=tl.{request.scattering!r}"]
     if recipe.caustics is not None:

@@ -404,4 +404,5 @@ def request_of(document: Document, caustics: Caustics | None = None) -> RenderRe
     """Request for the picture of a document."""
     display = document.display
     scattering = None if display.scattering == AUTO else SCATTERINGS[display.scattering]()
-    return RenderRequest(method_of(display.method, document.material), scattering=scattering, caustics=caustics)
+    method, flags = method_of(display.method, document.material), dataclasses.asdict(document.flags)
+    return RenderRequest(method, scattering=scattering, caustics=caustics, **flags)

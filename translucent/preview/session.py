@@ -13,6 +13,7 @@ from translucent.errors import InputError
 from translucent.extras import require_package
 from translucent.files.paths import config_folder, write_atomically
 from translucent.files.reading import read_text, toml_value
+from translucent.planning.flags import Flags
 from translucent.preview.document import AUTO, STAGE_WORDS, Assigned, Document, Material, Orbit, checked
 
 #: Version of the format, raised by changes that older readers cannot read.
@@ -21,7 +22,7 @@ VERSION = 1
 #: Keys of older sessions without a meaning now: ``display.scattering`` replaces a switch of the material.
 _FORMER = {"material": ("multiple_scattering",)}
 
-_SECTIONS = ("model", "material", "look", "display", "orbit")
+_SECTIONS = ("model", "material", "look", "display", "flags", "orbit")
 
 
 def to_table(document: Document) -> dict[str, Any]:
@@ -29,7 +30,7 @@ def to_table(document: Document) -> dict[str, Any]:
     table: dict[str, Any] = {"version": VERSION}
     for section in _SECTIONS:
         value = getattr(document, section)
-        if value is not None:
+        if value is not None and value != Flags():
             table[section] = dataclasses.asdict(value)
     if document.assigned:
         table["assigned"] = [dataclasses.asdict(one) for one in document.assigned]

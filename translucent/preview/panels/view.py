@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import partial
 from typing import get_args
 
 from imgui_bundle import imgui
 
 from translucent.formulas.tone import TONES
+from translucent.planning.flags import Flags
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import SCATTERINGS
 from translucent.preview.actions import SetField, SetOrbit
@@ -125,6 +127,8 @@ def method_panel(state: WindowState) -> None:
         ui.check(state, "smooth edges", "display.antialias")
         ui.check(state, "caustics (P)", "display.caustics")
         ui.check(state, "converge (C)", "display.converge")
+        for flag in dataclasses.fields(Flags):
+            ui.check(state, flag.name.replace("_", " "), f"flags.{flag.name}")
         imgui.end_table()
     for side, (plan, timing) in enumerate(zip(state.view.plans, state.view.timings, strict=True)):
         if plan is not None:
