@@ -14,10 +14,10 @@ from tests.preview.waiting import wait
 from translucent.assets import shader_path
 from translucent.planning.flags import Flags
 from translucent.preview import library
-from translucent.preview.dialogs import Browser, with_recent
+from translucent.preview.dialogs import Browser
 from translucent.preview.document import SURFACE_FIELDS, TIPS, Display, Look, Material, Orbit, camera_of
 from translucent.preview.library import EnvironmentFolder, draw_panorama, model_key, model_picture, panorama_key, title
-from translucent.preview.session import Preferences
+from translucent.preview.session import Preferences, put_first
 from translucent.preview.workspace import Workspace
 
 
@@ -130,9 +130,10 @@ def test_environments_of_a_folder(tmp_path: Path, state: Any) -> None:
 
 def test_folders_are_remembered(tmp_path: Path, own_config: Path) -> None:
     assert Preferences.read() == Preferences()
-    found = with_recent(["/usr"], tmp_path / "a.glb")
-    assert found == [os.path.realpath(tmp_path), "/usr"]
-    assert with_recent(found, "/usr/a.glb")[0] == os.path.realpath("/usr")
+    found = put_first(str(tmp_path), ["/usr"])
+    assert found == [str(tmp_path), "/usr"]
+    assert put_first("/usr", found) == ["/usr", str(tmp_path)]
+    assert put_first("h", list("abcdefghi")) == list("habcdefg")
     gone = str(tmp_path / "gone")
     Preferences([gone, "/usr"], [*found, gone], str(tmp_path), "night").write()
     assert Preferences.read() == Preferences(["/usr"], found, str(tmp_path), "night")

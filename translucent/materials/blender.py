@@ -86,7 +86,7 @@ def _density(value: float) -> float:
     return float(value)
 
 
-def blender_snippet(medium: Medium, roughness: float = 0.0, name: str = "translucent") -> str:
+def blender_snippet(medium: Medium, roughness: float = 0.0) -> str:
     """Python for Blender's text editor that makes a material with this surface and volume; scene unit: metre."""
     if medium.scatters or medium.emits:
         color, absorption, density = principled_node(medium)
@@ -108,7 +108,7 @@ def blender_snippet(medium: Medium, roughness: float = 0.0, name: str = "translu
         "# Blender's volume colors are no colors at a distance: sigma_a = (1 - Color) * Density, per metre.",
         "import bpy",
         "",
-        f"material = bpy.data.materials.new({name!r})",
+        "material = bpy.data.materials.new('translucent')",
         "if material.node_tree is None:",
         "    material.use_nodes = True  # before Blender 5",
         "nodes, links = material.node_tree.nodes, material.node_tree.links",

@@ -84,7 +84,6 @@ class SurfaceShader:
         self,
         medium: Medium,
         distance: float | None = None,
-        name: str = "translucent",
         unit: str = "m",
         roughness: float = 0.0,
     ) -> str:
@@ -96,21 +95,19 @@ class SurfaceShader:
             Emission is lost.
         distance : float, optional
             Where the color is stated, in metres; None: where the densest channel lets 1/e pass.
-        name : str
-            Name of the material, letters, digits and underscores.
         unit : str
             Unit of the scene's lengths, for the depth.
         roughness : float
             Of the surface, 0 to 1.
         """
         root = ElementTree.Element("materialx", version="1.39", colorspace="lin_rec709")
-        surface = ElementTree.SubElement(root, self.node, name=f"{name}_surface", type="surfaceshader")
+        surface = ElementTree.SubElement(root, self.node, name="translucent_surface", type="surfaceshader")
         for key, value in transmission_inputs(self, medium, distance, unit, roughness).items():
             scalar = isinstance(value, float)
             text = f"{value!r}" if scalar else ", ".join(repr(channel) for channel in np.asarray(value).tolist())
             ElementTree.SubElement(surface, "input", name=key, type="float" if scalar else "color3", value=text)
-        material = ElementTree.SubElement(root, "surfacematerial", name=name, type="material")
-        link = {"name": "surfaceshader", "type": "surfaceshader", "nodename": f"{name}_surface"}
+        material = ElementTree.SubElement(root, "surfacematerial", name="translucent", type="material")
+        link = {"name": "surfaceshader", "type": "surfaceshader", "nodename": "translucent_surface"}
         ElementTree.SubElement(material, "input", link)
         ElementTree.indent(root)
         return f'<?xml version="1.0"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'

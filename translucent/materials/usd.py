@@ -52,7 +52,7 @@ _TOKENS = re.compile(
 _MAX_DEPTH = 100
 
 
-def usda_text(medium: Medium, distance: float | None = None, name: str = "translucent", roughness: float = 0.0) -> str:
+def usda_text(medium: Medium, distance: float | None = None, roughness: float = 0.0) -> str:
     """Write a .usda layer with one material; the color is stated at `distance` in metres, see `color_at`."""
     lines = []
     for key, value in transmission_inputs(OPENPBR, medium, distance, roughness=roughness).items():
@@ -64,14 +64,14 @@ def usda_text(medium: Medium, distance: float | None = None, name: str = "transl
     inputs = "\n".join(lines)
     return f"""#usda 1.0
 (
-    defaultPrim = "{name}"
+    defaultPrim = "translucent"
     metersPerUnit = 1
     upAxis = "Y"
 )
 
-def Material "{name}"
+def Material "translucent"
 {{
-    token outputs:mtlx:surface.connect = </{name}/surface.outputs:out>
+    token outputs:mtlx:surface.connect = </translucent/surface.outputs:out>
 
     def Shader "surface"
     {{

@@ -135,12 +135,6 @@ class Browser:
         return sorted(found, key=lambda one: (not one.is_folder, one.name.lower(), one.name))
 
 
-def with_recent(folders: list[str], path: str | Path, most: int = 8) -> list[str]:
-    """Recent folders after a file has been used, the latest first."""
-    folder = str(Path(os.path.realpath(path)).parent)
-    return [folder, *(one for one in folders if one != folder)][:most]
-
-
 MODELS = ["Models", "*.glb *.gltf *.obj *.stl *.ply *.off", "All files", "*"]
 SESSIONS = ["Sessions", "*.toml", "All files", "*"]
 PANORAMAS = ["Pictures of all directions", "*.hdr *.exr *.png *.jpg", "All files", "*"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,9 @@ from translucent.preview.document import AUTO, STAGE_WORDS, Assigned, Document, 
 
 #: Version of the format, raised by changes that older readers cannot read.
 VERSION = 1
+
+#: Largest numbers of files and of folders that are remembered.
+MAX_RECENT = 8
 
 #: Keys of older sessions without a meaning now: ``display.scattering`` replaces a switch of the material.
 _FORMER = {"material": ("multiple_scattering",)}
@@ -129,6 +133,11 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         return toml_value(text)
     except ValueError as error:
         raise InputError(what, f"no TOML: {error}", "correct the file") from None
+
+
+def put_first(one: str, others: Sequence[str]) -> list[str]:
+    """Recent files or folders after one more has been used, the latest first."""
+    return [one, *(other for other in others if other != one)][:MAX_RECENT]
 
 
 @dataclass(frozen=True)

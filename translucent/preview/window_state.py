@@ -25,14 +25,13 @@ from translucent.preview.dialogs import (
     chosen_path,
     move_pointer,
     open_dialog,
-    with_recent,
 )
 from translucent.preview.document import Material, Model
 from translucent.preview.exports import Recipe, command_line, python_code, write_picture, write_turntable
 from translucent.preview.library import ENVIRONMENT_SUFFIXES, EnvironmentFolder, model_key, model_picture
 from translucent.preview.measuring import Crossing, first_object
 from translucent.preview.scenes import material_of, medium_of, request_of, tone_of
-from translucent.preview.session import save_session
+from translucent.preview.session import put_first, save_session
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 from translucent.scene.scene import Object, Scene
@@ -352,7 +351,7 @@ class WindowState:
     def use_file(self, kind: str, path: str) -> None:
         """Read or write a file, according to its dialog."""
         work = self.work
-        self.folders = with_recent(self.folders, path)
+        self.folders = put_first(str(Path(path).resolve().parent), self.folders)
         match kind:
             case "open":
                 work.open(Model(path, self.get("model.unit")))

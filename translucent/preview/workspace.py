@@ -42,7 +42,7 @@ from translucent.preview.scenes import (
     scene_of,
     stage_name,
 )
-from translucent.preview.session import load_session
+from translucent.preview.session import load_session, put_first
 from translucent.preview.tasks import Lane, Task, problem
 from translucent.preview.worker import Pool, Urgency
 from translucent.scene.scene import Scene
@@ -53,9 +53,6 @@ MAX_MESSAGES = 50
 
 #: Number of models that are cached for undo.
 KEPT_MODELS = 2
-
-#: Largest number of recently opened files.
-MAX_RECENT = 8
 
 #: Seconds after which a view is still.
 STILL = 0.25
@@ -392,8 +389,7 @@ class Workspace:
             self._keep(loaded)
             self._set(self.history if action is None else self.history.done(action))
             if action is not None and os.path.exists(model.path):
-                path = str(Path(model.path).resolve())
-                self.recent = [path, *(p for p in self.recent if p != path)][:MAX_RECENT]
+                self.recent = put_first(str(Path(model.path).resolve()), self.recent)
 
         self.lanes["load"].start(f"opening {Path(model.path).name}", work, take).key = model
 

@@ -84,9 +84,6 @@ UNITS = (("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254))
 #: Thickness in metres, along views, between which translucent bodies usually are.
 USUAL = (1e-5, 0.5)
 
-#: Names of viewers.
-VIEWERS = ("three.js", "Khronos sample viewer", "Filament", "Blender (Cycles)")
-
 
 @dataclass(frozen=True)
 class MaterialFinding:
