@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +16,7 @@ import translucent as tl
 from translucent.assets import mesh_path
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.light_cameras import ShadowThrowers, support_of
+from translucent.gpu.shaders import CompileBudget, PostponedError
 from translucent.gpu.shadow_atlas import LEAST_TEXELS, MOST_BYTES, ShadowViews
 from translucent.planning.mirrors import lit_side
 from translucent.scene.stages import staged
@@ -341,6 +343,38 @@ def test_maps_are_rendered_when_something_changes(renderer: tl.Renderer, monkeyp
         rendered.clear()
         renderer.render(changed, (16, 12), samples=2)
         assert len(rendered) == count
+
+
+def test_a_window_finds_what_one_light_sees_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A frame without time looks from one light, or draws one map, and the next goes on; of many vertices all of them
+    would take half a second.
+    """
+    looked = 0
+    cameras = ShadowThrowers.cameras
+
+    def looks(throwers: ShadowThrowers) -> list[tl.Camera]:
+        nonlocal looked
+        looked += 1
+        return cameras(throwers)
+
+    monkeypatch.setattr(ShadowThrowers, "cameras", looks)
+    shown = scene("ball", "sun", environment=tl.Environment.gradient(0.2, 1.0), environment_shadows=8)
+    with tl.Renderer() as own:
+        own.gpu.context.gl.extra = budget = CompileBudget()
+        own.render(shown, (16, 12))
+        plan = own.plan(replace(shown, lights=[LAMPS["lamp"]]))
+        budget.postpones, budget.elsewhere, looked = True, set(budget.needed), 0
+        frame = None
+        for _ in range(100):
+            budget.begin_frame(-1.0)
+            before = looked
+            with suppress(PostponedError):
+                frame = own.gpu.render(plan, (16, 12))
+                break
+            assert looked <= before + 1
+        assert (frame is not None, looked) == (True, 9)
+        with tl.Renderer() as new:
+            np.testing.assert_array_equal(frame.radiance, new.gpu.render(plan, (16, 12)).radiance)
 
 
 def test_maps_of_two_media_are_paths_and_stay_when_these_change(renderer: tl.Renderer) -> None:

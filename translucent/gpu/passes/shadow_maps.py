@@ -25,7 +25,7 @@ from translucent.gpu.passes.transmittance import TransmittancePass
 from translucent.gpu.placement import AxialRange, FaceCounts, PlacedScene, depth_range
 from translucent.gpu.resources import Resources
 from translucent.gpu.shaders import before_making
-from translucent.gpu.shadow_atlas import Seen, ShadowView, ShadowViews
+from translucent.gpu.shadow_atlas import Seen, SeenFrom, ShadowView, ShadowViews
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import BodyRoles, bounded_extinction, media_center
 from translucent.media.medium import Medium
@@ -113,6 +113,8 @@ class ShadowMapsPass:
         self._made: dict[PassName, Callable[[FrameJob, PassSpec], None]] = {}
         self._targets: dict[int, Targets] = {}
         self._placed: tuple[object, ShadowViews] | None = None
+        #: What the first of the lights see, where frames that follow find the rest.
+        self._looked_at: tuple[object, list[SeenFrom]] = None, []
         self._plans: dict[Hashable, RenderPlan] = {}
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
@@ -202,18 +204,18 @@ class ShadowMapsPass:
         """Places of all maps; where they are stays the same when only media change."""
         key = seen.places, seen.step, in_place
         if self._placed is None or self._placed[0] != key:
-            scene = job.scene
+            if self._looked_at[0] != key:
+                self._looked_at = key, []
+            scene, found = job.scene, self._looked_at[1]
             supports = [support_of(item) for item in scene.objects]
-            lights, sky = (
-                [ShadowThrowers(light, scene, supports) for light in group]
-                for group in (scene.lights, _sky_lights(scene)[:: seen.step])
-            )
-            seen_by, seen_from_sky = (
-                [(found.cameras(), found.in_the_way if in_place else opaque, found.middle) for found in group]
-                for group in (lights, sky)
-            )
-            limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
-            self._placed = key, ShadowViews.of(seen_by, seen_from_sky, job.plan.shadows.size, limit)
+            for light in [*scene.lights, *_sky_lights(scene)[:: seen.step]][len(found) :]:
+                if job.plan.shadows.directions is None:
+                    before_making(self._gl)
+                throwers = ShadowThrowers(light, scene, supports)
+                found.append((throwers.cameras(), throwers.in_the_way if in_place else opaque, throwers.middle))
+            limit, count = int(self._gl.info["GL_MAX_TEXTURE_SIZE"]), len(scene.lights)
+            self._placed = key, ShadowViews.of(found[:count], found[count:], job.plan.shadows.size, limit)
+            self._looked_at = None, []
         return self._placed[1]
 
     def _planned(self, maps: MapPlan, scene: Scene, opaque: tuple[int, ...]) -> tuple[Hashable, RenderPlan]:
