@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import random
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -284,14 +286,16 @@ def test_another_process_reads_models_beside_a_picture(
 ) -> None:
     path = tmp_path / "model.glb"
     path.write_bytes(bytes(size))
-    monkeypatch.setattr(scenes, "load", lambda *_: "here")
+    empty = SimpleNamespace(objects=())
+    monkeypatch.setattr(scenes, "load", lambda *_: SimpleNamespace(by="here", scene=empty))
 
     class Elsewhere:
-        def call(self, *_: object, **__: object) -> tuple[str, list[object]]:
-            return "there", []
+        def call(self, *_: object, **__: object) -> tuple[SimpleNamespace, list[object]]:
+            return SimpleNamespace(by="there", scene=empty), []
 
     task = Task("opening", lambda _: None, lambda _: None)
-    assert scenes.load_with(task, Elsewhere(), Model(str(path)), pictured=pictured) == read  # type: ignore[arg-type]
+    found: Any = scenes.load_with(task, Elsewhere(), Model(str(path)), pictured=pictured)  # type: ignore[arg-type]
+    assert found.by == read
 
 
 def test_drawing_has_less_time_where_the_rest_of_the_window_takes_long() -> None:
