@@ -82,10 +82,10 @@ def diffused(medium: tl.Medium, radius: float) -> Array:
     body = tl.Object(Sphere(radius=radius).tessellate(64), medium)
     grid = lit_body(body, None, tl.Diffusion(32).cell_size(body)).grid
     skin, sun = diffuse_interface(medium.ior), tl.DirectionalLight((0, 0, -1), (1, 1, 1))
-    beam = from_light(grid, Casters(body), sun, medium.ior, skin)
+    rays = from_light(grid, Casters(body), sun, medium.ior, skin)
     dark = np.zeros((len(grid.points), 3))
     nothing = sparse.csr_array((len(dark), len(dark)))
-    found = BodySystem(grid, medium, 0.0).solved(dark, nothing, np.zeros((grid.count, 3)), [beam])
+    found = BodySystem(grid, medium, 0.0).solved(dark, nothing, np.zeros((grid.count, 3)), [rays])
     zone = np.clip((0.5 * ZONES * (grid.points[:, 2] / radius + 1)).astype(int), 0, ZONES - 1)
     sums = [np.bincount(zone, column, ZONES) for column in (skin.exit_share * found.fluence).T]
     return np.asarray(sums / np.bincount(zone, minlength=ZONES))

@@ -17,7 +17,7 @@ HOST_ONLY = {
     "bsdf": {"below_coat", "sampled_branches"},
     "phase": {"parse_phase"},
     "color": {"to_hex"},
-    "diffusion": {"haze_shares"},
+    "diffusion": {"in_scattered_shares"},
     "light": {"light_cone"},
     "camera": {"check_size"},
     "tone": {"tone_curve"},

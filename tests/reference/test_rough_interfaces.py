@@ -28,7 +28,7 @@ def test_light_reflected_by_one_microfacet(
     count = 100_000
     direction = np.array([math.sqrt(1 - cosine**2), 0.0, -cosine])
     # The second look at the height lets light leave; nothing is met again.
-    monkeypatch.setattr(microfacets, "MOST_MEETINGS", 2)
+    monkeypatch.setattr(microfacets, "MOST_INTERACTIONS", 2)
     every = np.ones(count)
     found, passed = scattered_at_interface(
         np.tile(direction, (count, 1)), np.tile([0.0, 0.0, 1.0], (count, 1)), ior * every, alpha * every, rng
@@ -55,7 +55,7 @@ def test_light_reflected_by_one_microfacet(
 
 def test_light_passed_by_one_microfacet(rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     """Unseen from both sides as B(1 + Lambda, 1 + Lambda) says (Heitz et al. 2016): higher places are deeper beyond."""
-    monkeypatch.setattr(microfacets, "MOST_MEETINGS", 2)
+    monkeypatch.setattr(microfacets, "MOST_INTERACTIONS", 2)
     count, cosine = 100_000, 0.3
     hidden = 0.5 * (1 / cosine - 1)  # Lambda at alpha = 1
     every, way = np.ones(count), [math.sqrt(1 - cosine**2), 0.0, -cosine]

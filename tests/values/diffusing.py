@@ -11,7 +11,7 @@ from scipy import sparse
 import translucent as tl
 from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
 from translucent.diffusion.first_events import (
-    Beam,
+    EnteringRays,
 )
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
@@ -44,16 +44,16 @@ def lit(
     return BodySystem(grid, medium, 0.0).solved(flux, nothing, np.zeros((grid.count, 3)) if inside is None else inside)
 
 
-def beamed(grid: BodyGrid, medium: tl.Medium, beam: Beam) -> DiffuseSolution:
-    """Light of a body in a beam, on which none of its light falls again."""
+def lit_by_rays(grid: BodyGrid, medium: tl.Medium, rays: EnteringRays) -> DiffuseSolution:
+    """Light of a body in a rays, on which none of its light falls again."""
     dark, nothing = np.zeros((len(grid.points), 3)), sparse.csr_array((len(grid.points),) * 2)
-    return BodySystem(grid, medium, 0.0).solved(dark, nothing, np.zeros((grid.count, 3)), [beam])
+    return BodySystem(grid, medium, 0.0).solved(dark, nothing, np.zeros((grid.count, 3)), [rays])
 
 
-def entering_of(grid: BodyGrid, beam: Beam) -> Array:
-    """Flux (s, 3) that a beam brings in."""
+def entering_of(grid: BodyGrid, rays: EnteringRays) -> Array:
+    """Flux (s, 3) that a rays brings in."""
     flux = np.zeros((len(grid.points), 3))
-    flux[beam.samples] = beam.entering
+    flux[rays.samples] = rays.entering
     return flux
 
 

@@ -43,7 +43,7 @@ def test_one_density_is_a_denser_medium() -> None:
     for density in (tl.DensityGrid(np.full((2, 3, 4), 0.5)), tl.LinearDensity(1, 0.5, 0.5)):
         found = field(tl.Object(box, double, density=density))
         np.testing.assert_allclose(found.fluence, even.fluence, rtol=1e-5, atol=1e-6)
-        np.testing.assert_allclose(found.haze, even.haze, rtol=1e-9)
+        np.testing.assert_allclose(found.in_scattered, even.in_scattered, rtol=1e-9)
 
 
 def of_slab(density: Density, ior: float, side: float) -> tuple[BodyGrid, Array]:

@@ -13,10 +13,10 @@ from tests.values.diffusing import (
     WHITE,
     Array,
     ball_grid,
-    beamed,
     entering_of,
     grid_of,
     lit,
+    lit_by_rays,
     seen_field,
 )
 from translucent.bench.shapes import joined
@@ -26,7 +26,7 @@ from translucent.diffusion.first_events import (
     DEEP_EVENTS,
     EVENTS,
     FLAT,
-    diffuse_ways,
+    diffuse_paths,
     half_space_excess,
     tails,
 )
@@ -277,7 +277,7 @@ def test_the_system_is_symmetric_and_positive() -> None:
     """So light goes both ways between any two places alike, and conjugate gradients get there."""
     grid = ball_grid(10)
     dense = even_densities(grid)
-    channel = _ChannelSystem(grid, 1.4, 0.0, 0.5, 5.0, dense, diffuse_ways(grid, dense, 1.4), corrected=False)
+    channel = _ChannelSystem(grid, 1.4, 0.0, 0.5, 5.0, dense, diffuse_paths(grid, dense, 1.4), corrected=False)
     matrix = channel._cells._matrix.toarray()
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-14 * np.abs(matrix).max())
     np.linalg.cholesky(matrix)  # raises unless all is positive
@@ -351,10 +351,10 @@ def test_a_turned_body_in_turned_light_is_the_same() -> None:
         matrix[:3, :3] = turn
         body = tl.Object(mesh, medium, matrix)
         geometry = lit_body(body, None, Diffusion(20).cell_size(body))
-        beam = from_light(
+        rays = from_light(
             geometry.grid, geometry.casters, tl.DirectionalLight(turn @ light, (1, 1, 1)), 1.4, diffuse_interface(1.4)
         )
-        found.append((entering_of(geometry.grid, beam), beamed(geometry.grid, medium, beam).fluence))
+        found.append((entering_of(geometry.grid, rays), lit_by_rays(geometry.grid, medium, rays).fluence))
     np.testing.assert_allclose(found[1][0], found[0][0], atol=1e-9)
     np.testing.assert_allclose(found[1][1].mean(), found[0][1].mean(), rtol=0.02)
     # Sample by sample, of which those at edges have other cells to read; measured 5 %.

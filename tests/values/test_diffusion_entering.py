@@ -16,10 +16,10 @@ from tests.values.diffusing import (
     WHITE,
     Array,
     ball_grid,
-    beamed,
     entering_of,
     grid_of,
     lit,
+    lit_by_rays,
     seen_field,
 )
 from translucent.diffusion import entering
@@ -29,7 +29,7 @@ from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
 from translucent.diffusion.grid import other_plane_points, plane_points
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
-from translucent.formulas.diffusion import HAZE_MIRRORED, haze_shares
+from translucent.formulas.diffusion import IN_SCATTERED_REFLECTED, in_scattered_shares
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.plan import plan
 from translucent.planning.scattering import Diffusion
@@ -76,11 +76,11 @@ def test_light_of_a_sun_goes_on_as_it_falls(rng: np.random.Generator) -> None:
     medium, grid = tl.Medium(absorption=0.5, scattering=4.5), ball_grid(20)
     exact = sunlit_ball(5.0, 0.9, 12000, 6, rng)
     ball, sun = tl.Object(BALL, medium), tl.DirectionalLight((0, 0, -1), (1, 1, 1))
-    beam = from_light(grid, Casters(ball), sun, 1.0, diffuse_interface(1.0))
-    np.testing.assert_allclose(beam.directions, np.broadcast_to([0, 0, -1.0], beam.directions.shape), atol=1e-12)
+    rays = from_light(grid, Casters(ball), sun, 1.0, diffuse_interface(1.0))
+    np.testing.assert_allclose(rays.directions, np.broadcast_to([0, 0, -1.0], rays.directions.shape), atol=1e-12)
     zone = np.minimum((3 * (grid.points[:, 2] + 1)).astype(int), 5)
     off = []
-    for found in (beamed(grid, medium, beam), lit(grid, medium, entering_of(grid, beam))):
+    for found in (lit_by_rays(grid, medium, rays), lit(grid, medium, entering_of(grid, rays))):
         flux = diffuse_interface(1.0).exit_share * found.fluence[:, 0]
         rest = np.bincount(zone, flux) / np.bincount(zone) - exact
         off.append(math.sqrt(float((rest**2).mean())) / exact.mean())
@@ -242,8 +242,8 @@ def test_all_light_of_a_lamp_however_near_falls_onto_the_face_below_it(height: f
     mesh = Box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)).tessellate()
     grid, casters = grid_of(mesh, 24), Casters(tl.Object(mesh, tl.Medium(scattering=1.0)))
     for x, z in ((0.0, 0.0), (0.013, -0.11), (0.1, 0.071)):
-        beam = from_light(grid, casters, tl.PointLight((x, 0.5 + height, z), (1, 1, 1)), 1.5, diffuse_interface(1.5))
-        flux = float((beam.entering + beam.mirrored)[:, 0].sum() * grid.area)
+        rays = from_light(grid, casters, tl.PointLight((x, 0.5 + height, z), (1, 1, 1)), 1.5, diffuse_interface(1.5))
+        flux = float((rays.entering + rays.mirrored)[:, 0].sum() * grid.area)
         corners = [(0.5 + one * x, 0.5 + other * z) for one in (1, -1) for other in (1, -1)]
         angle = sum(math.atan(a * b / (height * math.hypot(a, b, height))) for a, b in corners)
         assert flux == pytest.approx(angle, rel=0.1)
@@ -281,8 +281,8 @@ def test_other_bodies_dim_lights_on_their_way_in(inside: bool) -> None:
 @pytest.mark.parametrize("passed", [1.0, 0.6, 0.0])
 def test_haze_is_mirrored_until_it_leaves(passed: float) -> None:
     """The closed form against its sum, mirror by mirror; nothing is lost where nothing is absorbed."""
-    far, near = haze_shares(0.6, passed)
-    inside, out = HAZE_MIRRORED * 0.6, [1.0 - HAZE_MIRRORED * 0.6, 0.0]
+    far, near = in_scattered_shares(0.6, passed)
+    inside, out = IN_SCATTERED_REFLECTED * 0.6, [1.0 - IN_SCATTERED_REFLECTED * 0.6, 0.0]
     for bounce in range(1, 200):
         out[bounce % 2] += inside * passed * 0.4
         inside *= passed * 0.6
@@ -313,4 +313,4 @@ def test_haze_is_mirrored_less_than_diffuse_light() -> None:
         found.append((r - (r - mirrored) / c) / r)
     assert found == sorted(found)
     assert found[0] == pytest.approx(0.28, abs=0.01)
-    assert found[0] < HAZE_MIRRORED < found[-1] < 0.6
+    assert found[0] < IN_SCATTERED_REFLECTED < found[-1] < 0.6

@@ -20,7 +20,7 @@ from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.solution import BodySystem
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
-from translucent.formulas.diffusion import haze_shares
+from translucent.formulas.diffusion import in_scattered_shares
 from translucent.formulas.two_stream import (
     mirrored_reflectance,
     mirrored_transmittance,
@@ -146,7 +146,7 @@ def _ahead(albedo: float, depth: float, anisotropy: float, ior: float) -> tuple[
     across = ahead / (1.0 - again**2)
     back, on = (float((flux * part).sum() / flux.sum()) for part in (across * again, across))
     # On the mean path of diffuse light across a slab, twice its thickness.
-    far, near = map(float, haze_shares(diffuse_interface(ior).reflected, np.exp(-2.0 * depth * (1.0 - albedo))))
+    far, near = map(float, in_scattered_shares(diffuse_interface(ior).reflected, np.exp(-2.0 * depth * (1.0 - albedo))))
     return far * back + near * on, far * on + near * back
 
 

@@ -21,12 +21,12 @@ from translucent.reference.rays import Rays
 from translucent.reference.surface_light import SurfaceLight
 from translucent.scene.lights import PositionalLight
 
-#: Interfaces of a ray that have points of their own; those behind take them again, with other offsets.
+#: Interfaces of a ray that have points of their own; later interfaces take them again, with other offsets.
 INTERFACES = 8
 
 
 class MicrofacetSamples:
-    """Points of one sample of all pixels.
+    """Random points for the microfacets of one sample of all pixels.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Interior lists of rays, which decide the medium of a segment (Schmidt & Budge 2002); branches of a ray tree."""
+"""Interior lists of rays: the bodies that each is inside (Schmidt & Budge 2002); branches of a ray tree."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class InteriorMedia:
         self._slot = np.unique(together, axis=0, return_inverse=True)[1].ravel()
 
     def effective(self, interior: InteriorList) -> Integers:
-        """(k,): body that decides what light is in, or `AIR`."""
+        """(k,): body of the effective medium, the one of highest priority, or `AIR`."""
         rows = _used(interior)
         if rows.shape[1] == 0:
             return np.full(len(interior), AIR)

@@ -2,8 +2,7 @@
 
 Nested dielectrics are those of Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images". All radiance is
 basic radiance L / n^2, which does not change where light enters a denser medium; emission counts as it would in a
-medium that is index-matched. `translucent.reference.refracted` follows all branches, and this tree those that matter
-most.
+medium that is index-matched. `translucent.reference.refracted` follows all branches, and this tree the strongest.
 """
 
 from __future__ import annotations
@@ -75,7 +74,7 @@ class SegmentMedia:
             return optics.emitted_radiance(emission, extinction, length[:, None]), passed
 
     def _varied(self, rays: Rays, interior: InteriorList, length: Array) -> tuple[Array, Array]:
-        """The same where densities vary."""
+        """Emitted radiance and transmittance (k, 3), as `along`, in media of varying density."""
         ray, entry = np.nonzero(interior != NOTHING)
         # One interval for each entry, however often a body winds around the segment.
         intervals = Intervals(
@@ -111,7 +110,7 @@ def _no_hits() -> Hits:
 
 
 class DiffusionFields:
-    """Diffused light of the bodies of a scene.
+    """Subsurface light of the bodies of a scene.
 
     Parameters
     ----------
@@ -123,26 +122,24 @@ class DiffusionFields:
         self._fields = dict(fields)
 
     def __bool__(self) -> bool:
-        """True if there is any."""
+        """True if light diffuses in any body."""
         return bool(self._fields)
 
     def leaves(self, before: Integers, after: Integers) -> Mask:
-        """(k,): whether it leaves one of two bodies where they meet, bent or not."""
+        """(k,): whether light diffuses in either of the effective media on the two sides of a surface."""
         return np.asarray(np.isin(np.stack([before, after]), list(self._fields)).any(axis=0))
 
-    def haze(self, body: Integers) -> Array:
-        """(k, 3, 3): shares of the extinction around rays in bodies (k,) by light that is scattered ahead, and of that
-        light which leave on the far side and on the near one.
-        """
+    def in_scattered(self, body: Integers) -> Array:
+        """(k, 3, 3): fraction of the extinction in bodies (k,) by forward scattering; of it, far and near exitance."""
         found = np.zeros((len(body), 3, 3))
         for number, field in self._fields.items():
-            found[body == number] = np.stack([field.ahead, *field.haze])
+            found[body == number] = np.stack([field.ahead, *field.in_scattered])
         return found
 
     def radiance(self, body: Integers, points: Array, directions: Array, normals: Array) -> Array:
         """(k, 3): basic radiance against rays that start at points (k, 3) of surfaces, inside `body` (k,).
 
-        As if all light was scattered on their ways through the body.
+        As if all light was scattered on the rest of their path through the body.
         """
         found = np.zeros(points.shape)
         cosine = np.abs(dot(directions, normals))
@@ -153,7 +150,7 @@ class DiffusionFields:
         return found
 
 
-#: Share of each color below which a branch is not followed: it sees the environment at once.
+#: Throughput below which a branch is not followed: it looks up the environment at once.
 FAINTEST = 1.0 / 1024.0
 
 #: Largest distance between surfaces in one place, in radii of the scene.
@@ -173,7 +170,7 @@ def largest(values: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class TracedLight:
-    """Radiance (n, 3) of rays, and whether (n,) all parts of them left the bodies that they entered."""
+    """Radiance (n, 3) of rays, and whether (n,) all their branches left the bodies that they entered."""
 
     radiance: Array
     valid: Mask
@@ -183,7 +180,7 @@ class RayTree:
     """Tracer of the camera's rays through the interfaces of a scene.
 
     At an interface that reflects and refracts, the stronger branch is followed. The weaker one is followed, too, where
-    the path has forks left, of which it uses up one; else it sees the environment in its direction, as if nothing were
+    the path has forks left, and uses up one; else it sees the environment in its direction, as if nothing were
     ahead. So do both at the last interface.
 
     Parameters
@@ -292,7 +289,7 @@ class _Growth:
         return first_footprints(self.scene.camera, directions, seen * self.tree.pixel, samples, self.caster.radius)
 
     def _records(self, hits: Sequence[Hits], count: int) -> InteriorList:
-        """Interior lists of rays at their origins, from all surfaces behind them."""
+        """Interior lists of rays at their origins, from all surfaces behind these."""
         interior = empty_interior_lists(count)
         behind = [(i, hits[i].where(hits[i].distance < 0)) for i in np.flatnonzero(self.table.is_solid).tolist()]
         pixel, distance, sign, item = (
@@ -336,7 +333,7 @@ class _Growth:
         return self._at_surfaces(replace(branches, origins=points, last=face, footprint=footprint))
 
     def _correct(self, branches: Branches, face: Integers, distance: Array) -> None:
-        """Search in float64 where hits contradict interior lists: a branch leaves a body it is not in, or stays in."""
+        """Search again in float64 where hits contradict interior lists: a branch leaves a body that it is not in."""
         place = -largest(-distance)
         doubt: Mask = np.isinf(place) & (branches.interior[:, 0] != NOTHING)
         for own, at in zip(face.T, distance.T, strict=True):
@@ -368,8 +365,8 @@ class _Growth:
         return replace(branches, throughput=throughput)
 
     def _add_diffused(self, branches: Branches, passed: Array) -> None:
-        """Add light that has diffused, and what is scattered ahead, where diffusion takes it for unscattered."""
-        ahead, far, near = np.moveaxis(self.tree.diffused.haze(self.media.effective(branches.interior)), 1, 0)
+        """Add subsurface light, and in-scattered light of forward scattering, which diffusion counts as unscattered."""
+        ahead, far, near = np.moveaxis(self.tree.diffused.in_scattered(self.media.effective(branches.interior)), 1, 0)
         with np.errstate(under="ignore"):
             self._add(branches, branches.diffused * (1.0 - passed ** (1.0 - ahead)))
         in_scattered = np.flatnonzero(ahead.any(axis=1))
@@ -436,7 +433,7 @@ class _Growth:
         return branches
 
     def _branches(self, branches: Branches, there: InteriorList, places: InterfaceHits) -> list[Branches]:
-        """Branches that are followed from interfaces; `there` are the interior lists behind these."""
+        """Reflected and refracted branches that are followed; `there` are the interior lists behind the interfaces."""
         pixel = self.pixel[branches.owner]
         found = interact(self.table, self.channel, self.caster, branches, places, pixel, self.spread)
         self._add(branches, self.light.radiance(self._rays(branches), found))
@@ -506,7 +503,7 @@ class _Growth:
         return reflected, refracted
 
     def _end(self, branches: Branches, item: Integers, column: Integers) -> None:
-        """Add what opaque surfaces reflect at which branches end, those in the `column` (n,) of `item`."""
+        """End branches at opaque objects, `item` at `column` (n,), and add what these reflect."""
         ray = np.arange(len(branches))
         number = self.caster.faces.number[branches.last[ray, column]]
         wall = OpaqueHits(np.zeros(len(branches)), item[ray, column], number)

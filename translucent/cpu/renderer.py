@@ -37,7 +37,7 @@ BATCH = 1 << 14
 
 @dataclass(frozen=True, eq=False)
 class TracedRadiance:
-    """Light along rays that bend at the interfaces of a scene.
+    """Radiance of the pixels whose rays refract or reflect at interfaces.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ _LARGEST = float(np.finfo(np.float32).max)
 
 
 class CpuRenderer:
-    """Renderer on the processors: the shading of the reference, on its exact hits, which Embree finds quickly.
+    """Renderer on the CPU: hits by Embree, decided in float64, and the shading of the reference.
 
     Where interfaces bend rays, radiance is that of `RayTree`, and all else that of the straight rays.
 
@@ -207,7 +207,7 @@ class CpuRenderer:
         return {body.mesh: self._meshes[body.mesh].embree for body in scene.objects}
 
     def _bent_light(self, shader: Shader, picture: PictureRays, plan: RenderPlan) -> TracedRadiance | None:
-        """Rays that bend in a scene, if its bodies have interfaces; the last scene's shapes are kept."""
+        """Traced radiance of a scene whose bodies have interfaces; the ray caster of the last scene is kept."""
         scene = shader.scene
         if not bends(scene) or plan.interfaces is None:
             return None
@@ -265,7 +265,7 @@ def _store(arrays: Arrays, band: Band, shaded: Arrays) -> None:
 
 
 def _average(arrays: Arrays, number: int, band: Band, shaded: Arrays) -> None:
-    """Add the sample of this number, from 1, to the means of the averaged arrays."""
+    """Add a sample to the running means of radiance and transmittance; `number` counts from 1."""
     for name in ("radiance", "transmittance"):
         mean = _part(arrays[name], band)
         # The first one takes the place of the pixel center.

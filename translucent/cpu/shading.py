@@ -122,7 +122,7 @@ BATCH = 1 << 14
 
 
 class CausticLight(SurfaceLight):
-    """Light that reaches surfaces, and that of photons on opaque ones (Jensen 1996).
+    """Light on surfaces, with caustics of photons on opaque ones (Jensen 1996).
 
     The light of each photon is spread over a disc that holds so many of its neighbors (Breiman, Meisel & Purcell 1977,
     "Variable kernel estimates"). What the nearest photons of a point carry over the area that they lie in would, added
@@ -136,7 +136,7 @@ class CausticLight(SurfaceLight):
         As `EmbreeLightPaths` takes them.
     caustics : Caustics
     bending : frozenset of int
-        Objects that no straight light of lamps passes, since photons carry it.
+        Objects that straight light of lights does not pass, since photons carry it.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class CausticLight(SurfaceLight):
         self._discs = _discs(*_landed(scene, caustics), scene)
 
     def straight(self, light: Light, points: Array, before: float) -> Array:
-        """(k, 3): as of `SurfaceLight`; to opaque objects, for which `before` is 0, past all that bends light."""
+        """(k, 3): transmittance of straight light, 0 behind bodies that refract where it goes to opaque objects."""
         return self._dark.straight(light, points, before) if before == 0.0 else super().straight(light, points, before)
 
     def on_opaque(self, points: Array, normals: Array) -> Array:

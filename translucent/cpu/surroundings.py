@@ -1,4 +1,4 @@
-"""Radiance of branches that leave a scene: of its environment in reflections, else of its background; footprints."""
+"""Radiance of rays that leave a scene, averaged over their footprints: of its environment, or of its background."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def first_footprints(camera: Camera, directions: Array, pixel: float, samples: i
 
 
 def moved_on(footprints: Array, path: Array) -> Array:
-    """Footprints after paths (k,)."""
+    """Footprints after the rays have moved on by lengths (k,)."""
     moved = footprints.copy()
     moved[:, :1] += path[:, None, None, None] * footprints[:, 1:]
     return moved
@@ -104,7 +104,7 @@ def refracted_differentials(incident: Array, turns: Array, directions: Array, no
 
 
 def bounded(directions: Array) -> Array:
-    """Differentials none of which is longer than 1, as wide as all directions to one side."""
+    """Differentials of directions, clamped to length 1: as wide as all directions to one side."""
     length = np.sqrt(np.einsum("kij,kij->ki", directions, directions))
     return np.asarray(directions / np.maximum(length, 1.0)[..., None])
 
@@ -130,7 +130,7 @@ def _outer(vectors: Array, shares: Array) -> Array:
 
 
 class Surroundings:
-    """Environment of a scene, as branches see it.
+    """Lookups of a scene's environment by branches of a ray tree.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ class Fields:
     volumes: dict[int, VolumeField]
 
     def __bool__(self) -> bool:
-        """True if there is any."""
+        """True if light diffuses in any body."""
         return bool(self.surfaces or self.volumes)
 
 
@@ -104,7 +104,7 @@ class FieldCache:
             return _kept(self._scenes, key, make, KEPT_SCENES)
 
     def keep(self, plan: RenderPlan, fields: Fields) -> None:
-        """Keep the light of a plan that another solver has found."""
+        """Store the light of a plan, found by another solver."""
         with self._lock:
             _kept(self._scenes, diffusion_key(plan), lambda: fields, KEPT_SCENES)
 
@@ -166,7 +166,7 @@ class FieldCache:
 
 @dataclass(frozen=True, eq=False)
 class _Bent:
-    """Light of photons in bodies without an interface, in others, and what stops straight light to each."""
+    """Light of photons in bodies without an interface, in other bodies, and occluders of the straight light of each."""
 
     volumes: dict[int, PhotonFluence]
     entering: dict[int, EnteringPhotons]

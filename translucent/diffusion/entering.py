@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Integers, Mask
-from translucent.diffusion.first_events import Beam
+from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, other_plane_points
 from translucent.diffusion.keys import may_dim
 from translucent.diffusion.photons import EnteringPhotons
@@ -31,7 +31,7 @@ MOST_FACES = 64
 
 
 def dimming_bodies(scene: Scene, body: int) -> list[Object]:
-    """Other bodies that take of the light on its way to one: those that may, and are closed."""
+    """Other closed bodies that absorb or scatter light on its way to a body."""
     return [item for i, item in enumerate(scene.objects) if i != body and may_dim(item) and item.mesh.diagnosis.solid]
 
 
@@ -101,15 +101,15 @@ MAP_HEIGHT = 96
 #: Start of shadow rays before the surface, as a share of a cell.
 BEFORE = 1e-4
 
-#: Least height of a lamp above the samples that it lights, in radii of the area of each, and how far to the side that
+#: Least height of a light above the samples that it lights, in radii of the area of each, and how far to the side that
 #: counts, in such heights. The first is about a cell: the samples then find its light within a tenth (sd 3 %).
 _WIDTH, _REACH = 3.0, 3.0
 #: What is more times as bright as all that a place sees of the environment, on the average, goes its own way inside:
 #: light of windows and soft boxes does, and that of a smooth sky enters as uniform light.
 BRIGHT = 2.0
 
-#: Beams of each sample that stand for such light.
-SKY_BEAMS = 4
+#: Rays of each sample that carry such light.
+SKY_RAYS = 4
 
 #: Bounds of the correction by which a quadrature over directions gives the known share of uniform light.
 _CORRECTION = (0.5, 2.0)
@@ -117,7 +117,7 @@ _CORRECTION = (0.5, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Casters:
-    """Surfaces that keep light from a body.
+    """Occluders of the light on a body.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def even_directions(count: int) -> Array:
 
 
 def environment_parts(environment: Environment, directions: Array) -> Array:
-    """(k, 3): integral of the radiance over the directions that are nearer to each one than to the others."""
+    """(k, 3): radiance of the environment, integrated over the part of the sphere nearest to each direction."""
     nearest, _ = nearest_parts(directions)
     ways, angle = _map_directions()
     radiance = angle[:, None] * np.asarray(environment.lighting(ways), np.float64)
@@ -251,8 +251,8 @@ def sky_light(
     normals: Array,
     ior: float,
     mirrored: float,
-) -> tuple[Array, list[Beam]]:
-    """Light of the environment: flux (s, 3) that enters as uniform light does, and beams of what is brighter.
+) -> tuple[Array, list[EnteringRays]]:
+    """Light of the environment: flux (s, 3) that enters as uniform light does, and rays for its brighter parts.
 
     Parameters
     ----------
@@ -274,16 +274,16 @@ def sky_light(
         most = BRIGHT * flux.sum(axis=1) / whole
         bright.append(np.maximum(flux - most[:, None] * uniform, 0.0))
         entering[:, channel] = (flux - bright[-1]).sum(axis=1, dtype=np.float64)
-    return entering, _beams(sky, bright, normals, ior, mirrored)
+    return entering, _sky_rays(sky, bright, normals, ior, mirrored)
 
 
-def _beams(
+def _sky_rays(
     sky: Sky, fluxes: Sequence[npt.NDArray[np.float32]], normals: Array, ior: float, mirrored: float
-) -> list[Beam]:
-    """Beams of each sample, of which each goes one way below it.
+) -> list[EnteringRays]:
+    """Rays for the bright parts of the sky, `SKY_RAYS` of each sample.
 
-    The directions are shared out among the beams by what enters from them, in their order on the spiral. All of a
-    beam goes on as from one of them, by chance as often as light comes from there: places next to it have others.
+    The directions are divided among the rays by the flux from them, in their order on the spiral. All light of a ray
+    comes from one of them, chosen by its flux: neighboring samples have others.
     """
     summed = np.cumsum(np.add(*fluxes[:2]) + fluxes[2], axis=1, dtype=np.float64)
     lit = np.flatnonzero(summed[:, -1] > 0.0)
@@ -291,21 +291,21 @@ def _beams(
         return []
     summed, count = summed[lit], len(lit)
     middle = summed - 0.5 * np.diff(summed, axis=1, prepend=0.0)
-    beam = np.minimum(SKY_BEAMS * middle / summed[:, -1:], SKY_BEAMS - 1).astype(np.int64)
-    place = (beam + SKY_BEAMS * np.arange(count)[:, None]).ravel()
-    size = SKY_BEAMS * count
+    number = np.minimum(SKY_RAYS * middle / summed[:, -1:], SKY_RAYS - 1).astype(np.int64)
+    place = (number + SKY_RAYS * np.arange(count)[:, None]).ravel()
+    size = SKY_RAYS * count
     entering = np.stack([np.bincount(place, flux[lit].ravel(), size).reshape(count, -1) for flux in fluxes], axis=2)
     ends = np.cumsum(entering.sum(axis=2), axis=1)
     chance = other_plane_points(len(normals))[lit, 0]
-    beams = []
-    for i in range(SKY_BEAMS):
+    rays = []
+    for i in range(SKY_RAYS):
         before = ends[:, i - 1] if i else np.zeros(count)
         wanted = np.minimum(before + chance * (ends[:, i] - before), summed[:, -1])
         chosen = sky.directions[(summed < wanted[:, None]).sum(axis=1)]
         of = np.flatnonzero((ends[:, i] > before) & ((chosen * normals[lit]).sum(axis=1) > 0.0))
         ways = refracted_direction(-chosen[of], normals[lit[of]], np.full(len(of), ior))
-        beams.append(Beam(lit[of], ways, entering[of, i], mirrored * entering[of, i]))
-    return beams
+        rays.append(EnteringRays(lit[of], ways, entering[of, i], mirrored * entering[of, i]))
+    return rays
 
 
 def from_itself(sky: Sky, shares: Array, solid_angles: Array) -> sparse.csr_array:
@@ -323,8 +323,8 @@ def from_light(
     interface: DiffuseInterface,
     dimming: Sequence[Object] = (),
     stops: RayCaster | None = None,
-) -> Beam:
-    """Light of a lamp or a sun that enters at the samples, as far as nothing is in its way, and other bodies let it.
+) -> EnteringRays:
+    """Light of a light that enters at the samples, with shadows and dimmed by other bodies.
 
     `stops` are surfaces of other bodies that none of it passes.
     """
@@ -357,15 +357,16 @@ def from_light(
     if dimming:
         flux = flux * light_passed(dimming, start, towards, distance[lit])
     ways = refracted_direction(-towards, normals, np.full(len(lit), ior))
-    return Beam(lit, ways, (1.0 - reflected) * share * flux, reflected * flux)
+    return EnteringRays(lit, ways, (1.0 - reflected) * share * flux, reflected * flux)
 
 
 def _spread(towards: Array, grid: BodyGrid) -> tuple[Array, Array]:
-    """Depth below its place at which each sample looks at a lamp, and what is made of the light there, (s,) each.
+    """Depth below its place at which each sample sees a light that is very near, and the gain of its light, (s,) each.
 
-    A lamp that is nearer to the surface than its samples are to each other shines on a spot between them. On a plane
-    the irradiance h / (r^2 + h^2)^(3/2) of a lamp at height h has the same integral 2 pi for every h: as seen from
-    samples that lie deeper, the spot is as wide as they are apart, and has the light of the narrow one within `_REACH`.
+    A light that is nearer to the surface than its samples are to each other shines on a spot between them. On a plane
+    the irradiance h / (r^2 + h^2)^(3/2) of a point light at height h has the same integral 2 pi for every h: as seen
+    from samples that lie deeper, the spot is as wide as they are apart, and has the light of the narrow one within
+    `_REACH`.
     """
     width = _WIDTH * np.sqrt(grid.area / np.pi)
     height = (towards * grid.face_normals).sum(axis=1)

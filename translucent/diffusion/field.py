@@ -1,4 +1,4 @@
-"""Light that a body gives back by diffusion, as pictures need it: two volumes around its surface."""
+"""Subsurface light of a body by diffusion, as pictures look it up: two volumes around its surface."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from translucent.diffusion.entering import (
     sky_paths,
     transfer,
 )
-from translucent.diffusion.first_events import Beam
+from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, Densities, body_grid, densities
 from translucent.diffusion.photons import EnteringPhotons
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_cosine, emergent_fluxes
-from translucent.formulas.diffusion import emergent_radiance, haze_shares
+from translucent.formulas.diffusion import emergent_radiance, in_scattered_shares
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
@@ -51,10 +51,10 @@ SPREAD = 3
 #: beside the edge of a shadow.
 FRESH = 0.8
 
-#: Samples of a surface for each at which ways through other bodies are found.
+#: Samples of a surface for each one at which paths through other bodies are found.
 SAMPLES_FOR_PATH = 4
 
-#: Least share of the ways through a body on which light counts as scattered: thinner parts have hardly any such light.
+#: Least fraction of the paths through a body on which light counts as scattered: thinner parts hardly scatter.
 LEAST_SCATTERED = 0.02
 
 #: Share of a cell that is inside from which all of it is.
@@ -70,7 +70,7 @@ class DiffusionField:
     fluence, entering : (x, y, z, 3) float32
         Of scattered light below the surface; and flux that enters there times the albedo. Spread beyond the surface.
     scattered : (x, y, z, 3) float32
-        Share of the ways through the body, from its surface, on which light is scattered; 1 deep inside.
+        Fraction of the paths through the body, from its surface, on which light is scattered; 1 deep inside.
     low : (3,) float64
         Corner of the grid in metres.
     step : float
@@ -89,8 +89,8 @@ class DiffusionField:
         Of the medium.
     ahead : (3,) float64
         Share of its extinction by light that is scattered ahead, g sigma_s / sigma_t, which counts as unscattered here.
-    haze : tuple of two (3,) float64
-        See `haze_shares`.
+    in_scattered : tuple of two (3,) float64
+        See `in_scattered_shares`.
     """
 
     fluence: Volume
@@ -107,16 +107,16 @@ class DiffusionField:
     cells: int
     ior: float
     ahead: Array
-    haze: tuple[Array, Array]
+    in_scattered: tuple[Array, Array]
 
     @cached_property
     def volumes(self) -> tuple[Volume, Volume]:
-        """Arrays (x, y, z, 3) that pictures look up: along ways on which all light is scattered."""
+        """Arrays (x, y, z, 3) that pictures look up: along paths on which all light is scattered."""
         with np.errstate(under="ignore"):
             return self.fluence / self.scattered, self.entering / self.scattered
 
     def radiance(self, points: Array, cosine: Array) -> Array:
-        """(k, 3): basic radiance L / n^2 inside the body, below points of its surface and towards it: the mean of ways.
+        """(k, 3): basic radiance L / n^2 below points of the surface, towards it: the mean over paths through the body.
 
         Parameters
         ----------
@@ -128,9 +128,9 @@ class DiffusionField:
         return self._emergent(self.fluence, self.entering, points, cosine)
 
     def scattered_radiance(self, points: Array, cosine: Array) -> Array:
-        """The same as `radiance`, along ways on which all light is scattered; on others the share that is.
+        """`radiance` as if all light was scattered on the path through the body: the twin of ``diffused_light.glsl``.
 
-        The same as ``shaders/shade/diffused_light.glsl``.
+        Its file is in ``shaders/shade``. Along a real path the fraction counts that is scattered there.
         """
         return self._emergent(*self.volumes, points, cosine)
 
@@ -170,7 +170,7 @@ class Entrance:
 
 @dataclass(frozen=True, eq=False)
 class LitBody:
-    """Geometry and densities of a body in which light diffuses; the same for all media and lights.
+    """Geometry and densities of a body in which light diffuses, for any medium and lights.
 
     Attributes
     ----------
@@ -202,7 +202,7 @@ class LitBody:
         return [found[place] for place in places]
 
     def _paths(self, body: Object) -> sparse.csr_array:
-        """Metres in another body: those of a part of the samples, of which each stands for what is nearest to it."""
+        """Metres in another body, of paths from a part of the samples; all samples take those of the nearest one."""
         points, part = self.grid.points, slice(None, None, SAMPLES_FOR_PATH)
         start = points[part] + BEFORE * self.grid.cells.step * self.grid.face_normals[part]
         nearest = cKDTree(points[part]).query(points)[1]
@@ -257,32 +257,32 @@ class DiffusingBody:
     def field(
         self, scene: Scene, body: int, photons: EnteringPhotons | None = None, stops: RayCaster | None = None
     ) -> DiffusionField:
-        """Light that the body gives back in a scene, of which it has this number, for its environment and lights.
+        """Subsurface light of the body in a scene, for its environment and lights; `body` is its number.
 
-        `photons` carry what other bodies, whose surfaces are `stops`, bend of the light of lamps; none of it goes
+        `photons` carry the light that other bodies, whose surfaces are `stops`, refract and reflect; none of it goes
         straight through these.
         """
         dimming = dimming_bodies(scene, body)
         grid = self._lit.grid
-        entering, beams = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
+        entering, rays = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
         inside = np.zeros((grid.count, 3))
         for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
-                beams.append(
+                rays.append(
                     from_light(grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops)
                 )
         if photons is not None:
             entering = entering + flux_of(photons, grid)
-        found = self._system.solved(entering, self._entrance.itself, inside, beams)
+        found = self._system.solved(entering, self._entrance.itself, inside, rays)
         return _field(self._lit, self._medium, self._roughness, found)
 
-    def _from_sky(self, parts: Array, others: list[Object]) -> tuple[Array, list[Beam]]:
+    def _from_sky(self, parts: Array, others: list[Object]) -> tuple[Array, list[EnteringRays]]:
         """Flux (s, 3) that enters of radiance over solid angles (k, 3), less what other bodies on its way absorb.
 
-        And apart from it, as beams, what is brighter than the rest. What others scatter goes on elsewhere, and as much
-        comes from there: in uniform light it is not missing.
+        And, as rays, the parts of the sky that are brighter than the rest. Light that others scatter continues
+        elsewhere, and as much comes from there: in uniform light it is not missing.
         """
         if not parts.any():
             return np.zeros((len(self._lit.grid.points), 3)), []
@@ -342,7 +342,9 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
         cells=grid.count,
         ior=medium.ior,
         ahead=ahead / np.where(extinction > 0.0, extinction, 1.0),
-        haze=haze_shares(polished.reflected, optics.transmittance(np.asarray(medium.absorption) * chord)),
+        in_scattered=in_scattered_shares(
+            polished.reflected, optics.transmittance(np.asarray(medium.absorption) * chord)
+        ),
     )
 
 

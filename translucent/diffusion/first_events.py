@@ -1,8 +1,9 @@
 """First events of light that enters a body: where it is scattered for the first time, and what that makes at once.
 
 Light of smooth environments, and of the body itself, goes on below the surface as uniform light from outside does.
-Light of lamps and suns goes one way below each sample, and that of the bright parts of an environment a few: refracted,
-so that it is scattered deeper where it enters straight, and farther along the surface where it enters at a slant.
+Light of the lights of a scene goes in one direction below each sample, and light of the bright parts of an environment
+in a few: refracted, so that it is scattered deeper where it enters straight, and farther along the surface where it
+enters at a slant.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ STRAIGHT = 1.0
 #: photons in balls of albedos 0.3 to 0.95, of indices 1.3 and 1.6, hardly any is too much at 2.7, and most of it at 5.
 FLAT = 4.0
 
-#: Reduced albedo below which what half-spaces give back is in proportion to it.
+#: Reduced albedo below which the reflectance of half-spaces is in proportion to it.
 _LEAST_ALBEDO = 1e-6
 
 #: Least cosine of a way with the normal of the surface: where smooth normals turn it more, as if it was so much.
@@ -46,8 +47,8 @@ _LEAST_COSINE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Beam:
-    """Light of a lamp, a sun or a part of the environment that enters a body at samples, in one direction at each.
+class EnteringRays:
+    """Rays of one light, or of a part of the environment, that enter a body: one at each sample that it reaches.
 
     Attributes
     ----------
@@ -56,7 +57,7 @@ class Beam:
     directions : (k, 3) float64
         Inside, unit vectors.
     entering, mirrored : (k, 3) float64
-        Flux that enters, and that the surface mirrors, in W/m^2.
+        Flux that enters, and flux that the surface reflects, in W/m^2.
     """
 
     samples: Integers
@@ -104,8 +105,8 @@ class LayerSolution:
 
 
 @dataclass(frozen=True, eq=False)
-class Ways:
-    """Ways of light below samples of a body.
+class EntryPaths:
+    """EntryPaths of light below samples of a body.
 
     Attributes
     ----------
@@ -115,9 +116,9 @@ class Ways:
     cosine : (k,) float64, or float
         With the normal, which says how deep an event is.
     diffuse : bool
-        Whether the light is uniform outside; else each way is the one.
+        Whether the light is uniform outside; else each direction is the only one.
     length : callable
-        From integrals of the density (k,), in m, along the ways, to metres (k,).
+        From integrals of the density (k,), in m, along the paths, to metres (k,).
     """
 
     samples: Integers
@@ -127,17 +128,17 @@ class Ways:
     length: Callable[[Array], Array]
 
 
-def diffuse_ways(grid: BodyGrid, dense: Densities, ior: float) -> Ways:
-    """One way below each sample, as uniform light from outside has them."""
+def diffuse_paths(grid: BodyGrid, dense: Densities, ior: float) -> EntryPaths:
+    """One path below each sample, in directions that are distributed as those of uniform light from outside."""
     directions, samples = grid.ways(ior), np.arange(len(grid.points))
-    return Ways(samples, directions, diffuse_interface(ior).mean_cosine, True, dense.lengths(samples, directions))
+    return EntryPaths(samples, directions, diffuse_interface(ior).mean_cosine, True, dense.lengths(samples, directions))
 
 
-def ways_of(beam: Beam, grid: BodyGrid, dense: Densities) -> Ways:
-    """Ways of a beam."""
-    cosine = -(beam.directions * grid.face_normals[beam.samples]).sum(axis=1)
-    lengths = dense.lengths(beam.samples, beam.directions)
-    return Ways(beam.samples, beam.directions, np.clip(cosine, _LEAST_COSINE, 1.0), False, lengths)
+def entry_paths(ray: EnteringRays, grid: BodyGrid, dense: Densities) -> EntryPaths:
+    """EntryPaths of a ray."""
+    cosine = -(ray.directions * grid.face_normals[ray.samples]).sum(axis=1)
+    lengths = dense.lengths(ray.samples, ray.directions)
+    return EntryPaths(ray.samples, ray.directions, np.clip(cosine, _LEAST_COSINE, 1.0), False, lengths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +148,8 @@ class Events:
     Attributes
     ----------
     near : (k,) float64
-        Fluence at the surface that events above the depth of reading make, less what diffusion gives back too much.
+        Fluence at the surface by events above the depth of reading, less the excess of diffusion over the exact
+        solution.
     above : (k,) float64
         Share that is scattered above that depth, as the cells receive it.
     below : list of ((k,) int, (k,) float64)
@@ -159,7 +161,7 @@ class Events:
     below: list[tuple[Integers, Array]]
 
     def matrix(self, grid: BodyGrid, read: sparse.csr_array) -> sparse.csr_array:
-        """(cells, s): power in the cells for the flux at all samples."""
+        """(cells, s): scattered power in each cell for a unit of flux that enters at each sample."""
         count = len(self.near)
         deep = sparse.csr_array((count, grid.count))
         for cell, share in self.below:
@@ -167,7 +169,7 @@ class Events:
         return sparse.csr_array((grid.area * (deep + sparse.diags_array(self.above) @ read)).T)
 
     def power_below(self, flux: Array, cells: int) -> Array:
-        """(cells,): power in the cells of events below the depth of reading, for a flux (k,)."""
+        """(cells,): power scattered in each cell below the depth of reading, for an entering flux (k,)."""
         total = np.zeros(cells)
         for cell, share in self.below:
             total += np.bincount(cell, share * flux, cells)
@@ -206,15 +208,15 @@ class FirstEvents:
         self._d = float(diffusion_coefficient(absorption, scattering))
         # In thin bodies light that is not turned back leaves on the far side.
         self._thick = float(optics.opacity(self._extinction * chord))
-        # Small bodies are curved, and give back more than half-spaces.
+        # Small bodies are curved, and reflect more than half-spaces.
         self._flat = float(optics.opacity((self._extinction * chord / FLAT) ** 3))
 
-    def of(self, ways: Ways) -> Events:
-        """Events of light that goes these ways."""
+    def of(self, ways: EntryPaths) -> Events:
+        """First events of light along these paths."""
         grid, extinction, cosine = self._grid, self._extinction, ways.cosine
         layer = replace(self._layer, depth=self._layer.depth[ways.samples])
         relative = 1.0 / layer.u(layer.depth)
-        # What of the entering light the exact half-space gives back less than diffusion would.
+        # Excess of the reflectance by diffusion over that of the exact half-space.
         asked = None if ways.diffuse else np.asarray(cosine)
         straight = straight_back(self._albedo, self._ior, self._phase, asked) * self._thick
         excess = (
@@ -236,7 +238,7 @@ class FirstEvents:
             into_cells += share * layer.u(depth)
             near += share * layer.rise(layer.depth - depth) / self._d
         deep = []
-        # Interpolation by chance: each place stands for the cell around it.
+        # Interpolation by chance: each place counts in the cell around it.
         spread, quantiles = _places(len(grid.points))
         start = grid.points[ways.samples] + grid.cells.step * spread[ways.samples]
         for quantile in quantiles[:, ways.samples] if below.max(initial=0.0) > _NOTHING else ():
@@ -261,9 +263,9 @@ def tails(samples: int) -> Array:
 
 
 def scattered_shares(grid: BodyGrid, dense: Densities, ior: float, extinction: float) -> Array:
-    """(s,): share of uniform light that is scattered before it leaves, of what enters at each sample of a body.
+    """(s,): fraction of uniform light entering at each sample of a body that is scattered before it leaves.
 
-    As much of what leaves there has been scattered: ways are the same in both directions.
+    The same fraction of what leaves there has been scattered: paths are the same in both directions.
     """
     ways, metres = grid.crossings(ior)
     shares = [optics.opacity(extinction * dense.along(way, to)) for way, to in zip(ways, metres, strict=True)]
@@ -271,18 +273,18 @@ def scattered_shares(grid: BodyGrid, dense: Densities, ior: float, extinction: f
 
 
 def half_space_excess(albedo: float, ior: float, cosine: Array | None = None) -> Array | float:
-    """Share of the light entering a half-space that diffusion gives back beyond the exact one.
+    """Reflectance of a half-space by diffusion minus the exact one.
 
-    Of light that is uniform outside, or goes on inside at cosines (k,) with the normal.
+    For light that is uniform outside, or that travels inside at cosines (k,) with the normal.
     """
     return diffused_share(albedo, ior, cosine) - _exact(round(albedo, 6), ior, ISOTROPIC, cosine)
 
 
 def straight_back(albedo: float, ior: float, phase: PhaseFunction, cosine: Array | None = None) -> Array | float:
-    """Share of the first events at the surface that do not count, as media that scatter ahead turn less light back.
+    """Fraction of first events at the surface that do not count, as forward-scattering media turn less light back.
 
-    After an optical path t it is exp(-STRAIGHT t) times as much: so much in all that a half-space gives back what the
-    exact one does.
+    After an optical path t it is exp(-STRAIGHT t) times as much: so much in all that a half-space has the exact
+    reflectance.
 
     Parameters
     ----------
@@ -291,7 +293,7 @@ def straight_back(albedo: float, ior: float, phase: PhaseFunction, cosine: Array
     ior : float
     phase : PhaseFunction
     cosine : (k,), optional
-        Of the way of the light inside, with the normal; default: of light that is uniform outside.
+        Of the direction of the light inside, with the normal; default: light that is uniform outside.
     """
     if phase == ISOTROPIC:
         return 0.0
@@ -308,9 +310,9 @@ def _exact(albedo: float, ior: float, phase: PhaseFunction, cosine: Array | None
 
 
 def diffused_share(albedo: float, ior: float, cosine: Array | None = None, dimmed: float = 0.0) -> Array | float:
-    """Share of the light entering a half-space that diffusion gives back.
+    """Reflectance of a half-space by diffusion, for the light that enters.
 
-    `dimmed`: of first events after an optical path t from the surface those count that exp(-dimmed t) leaves.
+    `dimmed`: first events after an optical path t from the surface count by exp(-dimmed t).
     """
     interface = diffuse_interface(ior)
     d, c = float(diffusion_coefficient(1.0 - albedo, albedo)), interface.conductance

@@ -155,7 +155,7 @@ LEAST_AROUND = 0.55
 #: Shortest distance between the centers of two cells, and least depth, in cells.
 LEAST_LENGTH, LEAST_DEPTH = 0.3, 0.1
 
-#: Ways below each sample on which it is measured what leaves unscattered, and their start below it, in cells.
+#: EntryPaths below each sample on which it is measured what leaves unscattered, and their start below it, in cells.
 WAYS, START = 8, 1e-4
 
 #: Samples next to each other for which something is found together.
@@ -196,7 +196,7 @@ class BodyGrid:
     points, face_normals, normals : (s, 3) float64
         Sample points on the surface, spread evenly.
     area : float
-        Of the surface, that each sample stands for, in m^2.
+        Of the surface around each sample, in m^2.
     body : Object
     """
 
@@ -216,7 +216,7 @@ class BodyGrid:
         return np.reshape(cKDTree(self.points).query(self.points, min(TOGETHER, count))[1], (count, -1))
 
     def crossings(self, ior: float) -> tuple[Array, Array]:
-        """(w, s, 3), (w, s): `ways` below each sample, and metres to where they leave the body."""
+        """(w, s, 3), (w, s): directions below each sample (see `ways`), and metres to where they leave the body."""
         if ior not in self._crossings:
             start = self.points - START * self.cells.step * self.face_normals
             into, caster = np.linalg.inv(self.body.matrix), ray_caster_of(self.body.mesh)

@@ -1,4 +1,4 @@
-"""Transfer of light through a body: what it gives back by diffusion for each spherical harmonic of the light around it.
+"""Transfer of light through a body: its subsurface light by diffusion for each spherical harmonic of the light around.
 
 Diffusion is linear in the light. A harmonic has both signs, and light has one: the body is solved for in uniform light
 and in light that is uniform plus a harmonic, and the difference is what belongs to the harmonic.
@@ -53,7 +53,7 @@ class Transfer:
     cells: int
 
     def at(self, points: Array) -> Array:
-        """(k, 9, 3): mean radiance that points (k, 3) of the surface give back for a unit of each harmonic."""
+        """(k, 9, 3): mean subsurface radiance of points (k, 3) of the surface for a unit of each harmonic."""
         flat = self.values.reshape(*self.values.shape[:3], -1)
         return _read(flat, self.low, self.step, points).reshape(-1, COUNT, 3)
 
@@ -98,7 +98,7 @@ class LitAlone:
         self._diffusing = DiffusingBody(geometry, body.medium, roughness, warm_starts=True)
 
     def field(self, environment: Environment) -> DiffusionField:
-        """Light that the body gives back."""
+        """Subsurface light of the body."""
         return self._diffusing.field(Scene([self._body], self._camera, (), environment), 0)
 
     def transfer(self) -> Transfer:

@@ -51,7 +51,7 @@ def diffusion_key(plan: RenderPlan) -> Hashable:
 
 
 def may_dim(item: Object) -> bool:
-    """True for a body of one density, neither a layer nor a sheet, that takes of light if it is closed."""
+    """True for a body of even density, neither a layer nor a sheet, that absorbs or scatters light."""
     plain = item.density is None and item.sheet_thickness is None and not item.covers
     return plain and item.medium is not None and bool(np.any(item.medium.extinction))
 
@@ -87,7 +87,7 @@ def roughness_of(item: Object) -> float:
 
 
 def _bending(scene: Scene) -> Hashable:
-    """Everything that the ways of photons depend on beside the lights."""
+    """Everything beside the lights that the paths of photons depend on."""
     objects = tuple(
         (
             place_of(item),

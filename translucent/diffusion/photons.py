@@ -350,10 +350,10 @@ def _reduced_extinction(item: Object) -> Array:
 #: Cells of the finer grid along the side of one of light that is scattered again, at most, and in all of a body.
 FINER, MOST_CELLS = 4, 1 << 20
 
-#: Largest length of a part of a way, in cells, all of which counts in one of them.
+#: Largest length of a part of a segment, in cells: a part counts in one cell.
 PART = 0.7
 
-#: Cells by which ways are followed straight on beyond the body, so that cells that its surface cuts have all light.
+#: Cells by which segments are extended beyond the body, so that cells on its surface have all light.
 BEYOND = 1.5
 
 #: Parts that are added up together.
@@ -382,7 +382,7 @@ class FineCells:
 
     @classmethod
     def of(cls, low: Array, step: float, shape: tuple[int, ...]) -> FineCells:
-        """As fine as there is room for, in a grid with cells of this side."""
+        """Finest cells that there is room for, in a grid with cells of this side."""
         room = np.cbrt(MOST_CELLS / float(np.prod(shape)))
         finer = int(min(max(room, 1.0), FINER))
         return cls(low, step / finer, (shape[0] * finer, shape[1] * finer, shape[2] * finer), finer)
@@ -403,7 +403,7 @@ class EnteringPhotons:
     points : (n, 3) float64
         In metres in the world.
     power : (n, 3) float64
-        In W, of what is not mirrored.
+        In W, without the reflected part.
     """
 
     points: Array
@@ -412,7 +412,7 @@ class EnteringPhotons:
 
 @dataclass(frozen=True, eq=False)
 class MediaPhotons:
-    """Light that interfaces have turned, as photons carry it to media.
+    """Light that photons carry into media after interfaces have refracted or reflected it.
 
     Attributes
     ----------
@@ -420,7 +420,7 @@ class MediaPhotons:
         In the cells of objects without an interface, in W/m^2. What a medium scatters ahead counts as unscattered, as
         `translucent.diffusion.volume` has it; what it scatters else is not in it.
     entering : dict of int to EnteringPhotons
-        Of other objects in which light diffuses, what had been turned before it came there.
+        Of other objects in which light diffuses: photons that had been refracted or reflected before.
     """
 
     fluence: dict[int, Array]
@@ -430,7 +430,7 @@ class MediaPhotons:
 def photons_in_media(
     scene: Scene, caustics: Caustics, grids: Mapping[int, FineCells], bodies: Sequence[int]
 ) -> MediaPhotons:
-    """Light that interfaces of a scene turn into these cells of objects, and through the interfaces of bodies."""
+    """Follow photons into these cells of objects, and through the interfaces of bodies."""
     sums = {body: np.zeros((int(np.prod(cells.shape)), 3)) for body, cells in grids.items()}
     parts: dict[int, list[PhotonSegments]] = {body: [] for body in bodies}
     rng = np.random.default_rng((caustics.seed, len(grids)))

@@ -22,13 +22,13 @@ from scipy.sparse.linalg import cg
 
 from translucent.arrays import Array
 from translucent.diffusion.first_events import (
-    Beam,
+    EnteringRays,
+    EntryPaths,
     FirstEvents,
     LayerSolution,
-    Ways,
-    diffuse_ways,
+    diffuse_paths,
+    entry_paths,
     scattered_shares,
-    ways_of,
 )
 from translucent.diffusion.grid import BodyGrid, Densities, even_densities
 from translucent.errors import RenderError
@@ -47,7 +47,7 @@ ROUNDING = 1e-13
 class KnownSolutions:
     """Span of the last solutions, for a starting point that is nearest in energy (Fischer 1998).
 
-    Diffusion is linear in the light: once environments and lamps have been solved for, mixtures of them, dimmed or
+    Diffusion is linear in the light: once environments and lights have been solved for, mixtures of them, dimmed or
     tinted, need no more steps; and as diffusion is smooth, turns of an environment need few.
 
     Parameters
@@ -65,7 +65,7 @@ class KnownSolutions:
         self._oldest = 0
 
     def nearest(self, wanted: Array) -> Array:
-        """(n,): of the span, what is nearest in energy to the solution for a right-hand side (n,)."""
+        """(n,): the mixture of known solutions nearest in energy to the one for a right-hand side (n,)."""
         mixture = np.linalg.lstsq(self._energies, self._solutions @ wanted, rcond=ROUNDING)[0]
         return np.asarray(mixture @ self._solutions)
 
@@ -112,7 +112,9 @@ class CellSystem:
         self._known = KnownSolutions(self._matrix)
 
     def solved(self, source: Array) -> tuple[Array, int]:
-        """Fluence (cells,) for powers (cells,), and iterations; none where sources of before are mixed anew.
+        """Solve for the fluence (cells,) of powers (cells,); also returns the number of iterations.
+
+        There are none where the powers are a mixture of earlier ones.
 
         Raises
         ------
@@ -192,7 +194,7 @@ class DiffuseSolution:
     inside : (cells, 3) float64
         Fluence in the cells.
     scattered : (s, 3) float64
-        Share of the ways through the body from each sample on which light is scattered, as uniform light has them.
+        Fraction of the paths through the body from each sample on which uniform light is scattered.
     steps : int
         Iterations that the solver took, in all.
     """
@@ -238,7 +240,7 @@ class BodySystem:
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         self._grid, self._dense = grid, dense or even_densities(grid)
-        ways = diffuse_ways(grid, self._dense, medium.ior)
+        ways = diffuse_paths(grid, self._dense, medium.ior)
         self._channels = {
             channel: _ChannelSystem(
                 grid,
@@ -257,7 +259,7 @@ class BodySystem:
 
     @np.errstate(under="ignore")
     def solved(
-        self, entering: Array, from_itself: sparse.csr_array, inside: Array, beams: Sequence[Beam] = ()
+        self, entering: Array, from_itself: sparse.csr_array, inside: Array, rays: Sequence[EnteringRays] = ()
     ) -> DiffuseSolution:
         """Light at the body's surface.
 
@@ -269,8 +271,7 @@ class BodySystem:
             Flux that enters for the flux that leaves each sample.
         inside : (cells, 3)
             Power of lights inside each cell, in W.
-        beams : sequence of Beam
-            Light that enters in one direction at each sample.
+        rays : sequence of EnteringRays
 
         Raises
         ------
@@ -279,10 +280,10 @@ class BodySystem:
         """
         fluence, flux, cells = np.zeros_like(entering), entering.copy(), np.zeros_like(inside)
         scattered = np.ones_like(entering)
-        steps, ways = 0, [ways_of(beam, self._grid, self._dense) for beam in beams]
+        steps, ways = 0, [entry_paths(ray, self._grid, self._dense) for ray in rays]
         for channel, system in self._channels.items():
             emission = float(self._emitted[channel])
-            straight = system.beamed(channel, beams, ways)
+            straight = system.directional(channel, rays, ways)
             if not self._warm_starts:
                 system.forget()
             found = system.solved(entering[:, channel], from_itself, inside[:, channel], emission, straight)
@@ -293,8 +294,8 @@ class BodySystem:
 
 
 @dataclass(frozen=True, eq=False)
-class _Beamed:
-    """Effects of beams in one channel: flux, mirrored flux and fluence at the samples (s,), and power in the cells."""
+class _DirectionalEffects:
+    """Effects of entering rays in one channel: flux, reflected flux and fluence at samples (s,), power in the cells."""
 
     flux: Array
     mirrored: Array
@@ -313,7 +314,7 @@ class _ChannelSystem:
         absorption: float,
         scattering: float,
         dense: Densities,
-        ways: Ways,
+        ways: EntryPaths,
         phase: PhaseFunction = ISOTROPIC,
         *,
         corrected: bool,
@@ -335,9 +336,9 @@ class _ChannelSystem:
         self._near, self._into_cells = diffuse.near, diffuse.matrix(grid, self._read)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
         # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
-        self._glow_near = layer.bend() / d * self._relative
+        self._emitted_near = layer.bend() / d * self._relative
         below = grid.area * (layer.rise(depth) + layer.condition * layer.bend()) * self._relative
-        self._glow_cells = dense.cells * grid.cores + self._read.T @ below
+        self._emitted_cells = dense.cells * grid.cores + self._read.T @ below
         lost = grid.area * d * layer.slope() * self._relative
         absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
         absorbed = absorption * dense.cells * absorbing
@@ -353,7 +354,7 @@ class _ChannelSystem:
             self._correction = 1.0 + share * (found - 1.0)
 
     def by_uniform_light(self) -> Array:
-        """(s,): factors of the fluence that make uniform light around a lossless body what it is.
+        """(s,): factors of the fluence with which a lossless body in uniform light is as invisible as it has to be.
 
         Such a body is invisible, whatever its shape: of what leaves, all has been scattered but for what comes straight
         through. Diffusion sends too much of it out of parts no thicker than a free path, and too little out
@@ -371,22 +372,29 @@ class _ChannelSystem:
         """Start the next solution from nothing; its bounces start from each other."""
         self._cells.forget()
 
-    def beamed(self, channel: int, beams: Sequence[Beam], ways: Sequence[Ways]) -> _Beamed:
-        """First events of beams, of which each goes its ways."""
+    def directional(
+        self, channel: int, rays: Sequence[EnteringRays], ways: Sequence[EntryPaths]
+    ) -> _DirectionalEffects:
+        """Effects of rays that enter: first events along each of their paths."""
         grid = self._grid
         flux, mirrored, near, above = np.zeros((4, len(grid.points)))
         below = np.zeros(grid.count)
-        for beam, way in zip(beams, ways, strict=True):
-            entering, events = beam.entering[:, channel], self._first.of(way)
-            flux[beam.samples] += entering
-            mirrored[beam.samples] += beam.mirrored[:, channel]
-            near[beam.samples] += events.near * entering
-            above[beam.samples] += events.above * entering
+        for ray, way in zip(rays, ways, strict=True):
+            entering, events = ray.entering[:, channel], self._first.of(way)
+            flux[ray.samples] += entering
+            mirrored[ray.samples] += ray.mirrored[:, channel]
+            near[ray.samples] += events.near * entering
+            above[ray.samples] += events.above * entering
             below += events.power_below(entering, grid.count)
-        return _Beamed(flux, mirrored, near, grid.area * (self._read.T @ above + below))
+        return _DirectionalEffects(flux, mirrored, near, grid.area * (self._read.T @ above + below))
 
     def solved(
-        self, entering: Array, from_itself: sparse.csr_array, power: Array, emission: float, straight: _Beamed
+        self,
+        entering: Array,
+        from_itself: sparse.csr_array,
+        power: Array,
+        emission: float,
+        straight: _DirectionalEffects,
     ) -> tuple[Array, Array, Array, int]:
         """Fluence and flux at the samples, fluence in the cells, and steps.
 
@@ -394,12 +402,12 @@ class _ChannelSystem:
         """
         flux, steps = entering, 0
         before = np.zeros_like(entering)
-        inside = self._albedo * (power + emission * self._glow_cells) + straight.power
-        glow = self._albedo * emission * self._glow_near + straight.near
+        inside = self._albedo * (power + emission * self._emitted_cells) + straight.power
+        emitted = self._albedo * emission * self._emitted_near + straight.near
         for _ in range(MOST_BOUNCES):
             cells, taken = self._cells.solved(self._into_cells @ flux + inside)
             steps += taken
-            fluence = np.maximum((self._read @ cells) * self._attenuated + self._near * flux + glow, 0.0)
+            fluence = np.maximum((self._read @ cells) * self._attenuated + self._near * flux + emitted, 0.0)
             fluence *= self._correction
             # What the surface mirrors goes on as if it was diffuse.
             leaving = self._exit_share * fluence + self._mirrored * flux + straight.mirrored

@@ -55,7 +55,7 @@ def swept(
     directions : (k, 3) float64
         Unit vectors towards where light comes from.
     solid_angles : (k,) float64
-        That each direction stands for.
+        Of the directions nearest to each.
     step : float
         Side of a cell in metres.
 
@@ -176,20 +176,20 @@ ORDINATES = 48
 #: Rounds, and the change at which they are enough.
 MOST_ROUNDS, ENOUGH = 8, 1e-2
 
-#: Rounds before the last one of which the next start is a mixture.
+#: Earlier rounds that are mixed with the last one into the start of the next.
 MIXED = 2
 
 #: Optical depth across a cell beyond which its medium counts as no denser.
 MOST_DEPTH = 2.0
 
-#: Points in each cell that light of a lamp passes.
+#: Points at which the density is read in each cell on the path of a light.
 POINTS_A_CELL = 1.5
 
 #: Cells that count as none of a way.
 _STILL = 1e-9
 
 #: Places in each cell, along each axis, at which it is looked for the light of a spot.
-_BEAM_PLACES = 4
+_SPOT_PLACES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +222,7 @@ class VolumeField:
 
 @dataclass(frozen=True, eq=False)
 class PhotonFluence:
-    """Light of lamps that bodies bend into a medium, in place of what goes straight through them.
+    """Fluence in a medium by photons: light of lights that other bodies refract or reflect into it.
 
     Attributes
     ----------
@@ -297,7 +297,7 @@ class DiffusingVolume:
     def field(self, scene: Scene, photons: PhotonFluence | None = None) -> VolumeField:
         """Light in the body in a scene, from its environment and lights and what the medium emits.
 
-        With `photons`, which carry what bodies bend of the light of lamps, none of it goes straight through these.
+        With `photons`, which carry the light that bodies refract and reflect, none of it goes straight through these.
         """
         volume, medium = self._volume, self._medium
         if not self._warm_starts:
@@ -368,8 +368,7 @@ class DiffusingVolume:
 class _Mixed:
     """Starts of rounds, mixed from those of before so that what the last one changes would be least (Anderson 1965).
 
-    Light in a hollow, of which diffusion does not know, goes to and fro many times: by itself each round follows it
-    once.
+    Light in a hollow, which diffusion ignores, goes to and fro many times: by itself each round follows it once.
     """
 
     def __init__(self) -> None:
@@ -392,7 +391,7 @@ class _Mixed:
 
 
 def _finer(values: Array, times: int) -> Array:
-    """Values (x, y, z, 3) of cells, interpolated at the centers of those that divide each of them."""
+    """Values (x, y, z, 3) of cells, interpolated at the centers of finer cells."""
     if times == 1:
         return values
     places = [np.clip((np.arange(size * times) + 0.5) / times - 0.5, 0.0, size - 1.0) for size in values.shape[:3]]
@@ -418,7 +417,7 @@ def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: flo
 def _from_lights(
     volume: VolumeGrid, density: Array, scene: Scene, medium: Medium, stops: RayCaster | None = None
 ) -> tuple[Array, Array]:
-    """(x, y, z, 3) twice: fluence of lights that nothing has turned aside, and of that what was scattered ahead.
+    """(x, y, z, 3) twice: fluence of lights without events but forward ones, and its part after forward events.
 
     `stops` are surfaces that none of it passes.
     """
@@ -430,7 +429,7 @@ def _from_lights(
     for light in scene.lights:
         if isinstance(light, PositionalLight):
             place = np.broadcast_to(np.asarray(light.position), points.shape)
-            # In a lamp's own cell the mean of 1 / r^2 is that of a ball as large, 3 / R^2.
+            # In a light's own cell the mean of 1 / r^2 is that of a ball as large, 3 / R^2.
             nearest = (3.0 / (4.0 * np.pi)) ** (1.0 / 3.0) * cells.step / np.sqrt(3.0)
             power = np.asarray(light.intensity) / np.maximum(((place - points) ** 2).sum(axis=1), nearest**2)[:, None]
             if isinstance(light, SpotLight):
@@ -464,13 +463,13 @@ def _in_the_way(stops: RayCaster, points: Array, places: Array) -> npt.NDArray[n
 
 
 def _mean_shares(light: SpotLight, points: Array, step: float) -> Array:
-    """(k,): mean share of a spot's intensity in cells about points; beams may be thinner than these."""
-    places = (np.arange(_BEAM_PLACES) + 0.5) / _BEAM_PLACES - 0.5
+    """(k,): mean share of a spot's intensity in cells about points; rays may be thinner than these."""
+    places = (np.arange(_SPOT_PLACES) + 0.5) / _SPOT_PLACES - 0.5
     total = np.zeros(len(points))
     for offset in np.stack(np.meshgrid(places, places, places), axis=-1).reshape(-1, 3) * step:
         way = points + offset - np.asarray(light.position)
         total += cone_attenuation(way / np.maximum(np.linalg.norm(way, axis=1), _STILL * step)[:, None], light.cone)
-    return np.asarray(total / _BEAM_PLACES**3)
+    return np.asarray(total / _SPOT_PLACES**3)
 
 
 def _way_inside(body: Object, points: Array, places: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Diffuse light at an interface, and the light that a half-space of scattering medium behind it gives back; float64.
+"""Diffuse light at an interface, and the reflectance of a scattering half-space behind it; float64.
 
 References
 ----------

@@ -20,7 +20,7 @@ IN_SCATTERED_ROUGHNESS = 0.8
 
 #: Share of the mirror of diffuse light at which interfaces mirror it, as it is between rays and diffuse light: for an
 #: index of 1.5 and g = 0.9 it is 0.28 where media are thin and 0.6 where hardly any light gets through.
-HAZE_MIRRORED = 0.5
+IN_SCATTERED_REFLECTED = 0.5
 
 
 @np.errstate(under="ignore")
@@ -60,7 +60,7 @@ def emergent_radiance(
     return np.asarray(w * (phi * (1.0 + 3.0 * c * mu) - 3.0 * once * mu * mu) + once)
 
 
-def haze_shares(reflected: npt.ArrayLike, passed: npt.ArrayLike) -> tuple[Array, Array]:
+def in_scattered_shares(reflected: npt.ArrayLike, passed: npt.ArrayLike) -> tuple[Array, Array]:
     """Shares of what is scattered ahead that leave on the far side, and on the near side after mirrors inside.
 
     What the far interface mirrors, as diffuse light, crosses the body again, and again after each mirror, until it
@@ -74,6 +74,6 @@ def haze_shares(reflected: npt.ArrayLike, passed: npt.ArrayLike) -> tuple[Array,
         p: share of diffuse light that absorption lets across the body.
     """
     r, p = np.asarray(reflected, np.float64), np.asarray(passed, np.float64)
-    first = HAZE_MIRRORED * r
+    first = IN_SCATTERED_REFLECTED * r
     near = first * p * (1.0 - r) / (1.0 - (r * p) ** 2)
     return np.asarray(1.0 - first + r * p * near), np.asarray(near)

@@ -1,4 +1,4 @@
-"""Light in nine real spherical harmonics, and what a body gives back of it, in float64.
+"""Light in nine real spherical harmonics, and the subsurface radiance of bodies in it, in float64.
 
 Each function has a twin of the same name in ``shaders/lib/spherical_harmonics.glsl``. Coefficient i = l (l + 1) + m of
 the bands l = 0, 1, 2; orthonormal over the sphere, without the sign (-1)^m of Condon and Shortley.
@@ -44,7 +44,7 @@ def real_harmonics(direction: npt.ArrayLike) -> Array:
 
 @np.errstate(under="ignore")
 def scattered_radiance(transfer: npt.ArrayLike, light: npt.ArrayLike) -> Array:
-    """Mean radiance (..., 3) that a point of a body gives back, sum_i T_i L_i; at least 0.
+    """Mean subsurface radiance (..., 3) of a point of a body, sum_i T_i L_i; at least 0.
 
     Parameters
     ----------
@@ -52,14 +52,14 @@ def scattered_radiance(transfer: npt.ArrayLike, light: npt.ArrayLike) -> Array:
         T: what is baked.
     light : array_like (..., 9, 3)
         L: coefficients of the radiance that arrives from each direction, in the frame of the object. An environment has
-        `Environment.harmonics`; a far lamp its irradiance times `real_harmonics` of the direction towards it.
+        `Environment.harmonics`; a distant light its irradiance times `real_harmonics` of the direction towards it.
     """
     found = (np.asarray(transfer, np.float64) * np.asarray(light, np.float64)).sum(axis=-2)
     return np.asarray(np.maximum(found, 0.0))
 
 
 def exit_lobe(cosine: npt.ArrayLike, ior: npt.ArrayLike, entering: npt.ArrayLike) -> Array:
-    """Radiance in a direction, as a share of the mean that a point gives back: (1 - F(mu)) / e.
+    """Subsurface radiance in a direction over its mean: (1 - F(mu)) / e.
 
     What leaves a lossless body in uniform light: alike in all directions inside, it passes the interface. The mean over
     directions outside, weighted by their cosines, is 1.

@@ -104,7 +104,7 @@ def _built(low: Floats, high: Floats, order: Integers, leaf_size: int) -> Hierar
 
 
 def _joined(parts: list[Hierarchy]) -> Hierarchy:
-    """Hierarchy of the boxes of several: one of these, in place of whose leaves they are."""
+    """Top-level hierarchy over the boxes of several hierarchies, with these in place of its leaves."""
     roots = np.stack([part.low[0] for part in parts]), np.stack([part.high[0] for part in parts])
     top = _built(*roots, np.arange(len(parts)), 1)
     inner, leaf = np.flatnonzero(top.count == 0), np.flatnonzero(top.count)
@@ -272,7 +272,7 @@ def _shares(tree: _BinaryTree, counts: npt.NDArray[np.int32], leaf_size: int) ->
     total = len(area)
     best = np.full((MOST_CHILDREN, total), np.inf, np.float32)
     best[0] = area
-    taken = np.zeros((MOST_CHILDREN, total), np.int8)  # of k, those that come from the left child
+    taken = np.zeros((MOST_CHILDREN, total), np.int8)  # how many of k come from the left child
     children = np.zeros(total, np.int8)  # 0 for leaves
     for begin, end in tree.rounds:
         left, right = tree.children[:, begin:end]
@@ -305,7 +305,7 @@ def _shares(tree: _BinaryTree, counts: npt.NDArray[np.int32], leaf_size: int) ->
 def _depth_first(
     tree: _BinaryTree, nodes: npt.NDArray[np.int32], shown: npt.NDArray[np.bool_]
 ) -> npt.NDArray[np.int32]:
-    """(8, n): place of each node in the order for each octant; `nodes` counts those that are shown in subtrees."""
+    """(8, n): place of each node in the order for each octant; `nodes` counts the nodes kept in each subtree."""
     center = tree.low + tree.high
     orders = np.zeros((8, len(nodes)), np.int32)
     octants = np.arange(8)

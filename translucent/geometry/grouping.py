@@ -144,7 +144,7 @@ def side_blocks(faces: npt.NDArray[np.integer], most: int = BLOCK) -> Iterator[S
 
 
 def _block(faces: npt.NDArray[np.integer], low: int, high: int, size: int, count: int) -> SortedSides:
-    """Sort the sides whose lower vertex is at least `low` and below `high`, of which there are `size`."""
+    """Sort the `size` sides whose lower vertex is at least `low` and below `high`."""
     key, side = np.empty(size, dtype=np.uint64), np.empty(size, dtype=np.uint64)
     end = 0
     for begin in range(0, len(faces), CHUNK):
@@ -230,7 +230,7 @@ def _differ(rows: npt.NDArray[Any], order: Integers, equal: Mask) -> Integers:
 
 
 def _separate(rows: npt.NDArray[Any], key: Keys, order: Integers, equal: Mask, differ: Integers) -> None:
-    """Sort rows of equal hashes among which are different ones, of which there are few, by what they hold."""
+    """Sort different rows with equal hashes, which are rare, by their values."""
     shared = np.flatnonzero(np.isin(key, key[differ]))
     mine = order[shared]
     order[shared] = mine[np.lexsort([*rows[mine].T, key[shared]])]
@@ -301,7 +301,7 @@ def _lowest_neighbors(count: int, one: Numbers, other: Numbers) -> Numbers:
 
 
 def _numbered(root: Numbers) -> Numbers:
-    """(n,): number of the tree of each node, in the order of their lowest nodes, where nodes point towards roots."""
+    """(n,): number of each node's tree in a forest of parent pointers; trees are in the order of their lowest nodes."""
     while not np.array_equal(above := root.take(root), root):
         root = above
     node = np.arange(len(root), dtype=root.dtype)

@@ -114,7 +114,7 @@ class RayCaster:
         step, last = np.full(len(start), STEP), np.full(len(start), -1)
         missing = expected.copy()
         live = np.flatnonzero(missing > 0)
-        # Twice as often as there are faces, for those that are found again; no ray may circle for ever.
+        # Twice as often as there are faces, since some are found again; no ray may go on for ever.
         for _ in range(2 * int(expected.max(initial=0)) + 8):
             face, distance = self.first_hits(origins[live] + start[live, None] * directions[live], directions[live])
             hit = face >= 0
@@ -264,7 +264,7 @@ class SceneRayCaster:
         return face, distance
 
     def _on_planes(self, face: Integers, origins: Array, directions: Array, rough: Array) -> Array:
-        """(k,): distances to the planes of faces, near those that are known roughly."""
+        """(k,): distances to the planes of faces; `rough` (k,) are those of float32."""
         normal = self.faces.outward[face]
         with np.errstate(under="ignore", divide="ignore", invalid="ignore", over="ignore"):
             exact = dot(self.faces.corner[face] - origins, normal) / np.einsum("ki,ki->k", directions, normal)

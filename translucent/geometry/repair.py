@@ -24,7 +24,7 @@ _MOST = 64
 def near_points(points: Array, distance: float) -> Integers:
     """Indices of the points that have another one within a distance, in ascending order.
 
-    Points are sorted along one direction, where each has few neighbors so close; these are told apart along a second
+    Points are sorted along one direction, where each has few neighbors so close; these are separated along a second
     one. What that leaves are hardly more than the pairs that are looked for.
 
     Parameters
@@ -193,7 +193,7 @@ def _neighbors(sides: SortedSides) -> tuple[Numbers, Numbers, Mask]:
 
 
 def _flips(count: int, one: Numbers, other: Numbers, disagree: Mask) -> tuple[Numbers, Mask]:
-    """Part of each face, and whether it must be flipped, from pairs of neighbors of which some disagree.
+    """Part of each face, and whether it must be flipped, from pairs of neighbors that agree or not.
 
     Each face is two nodes, as it is and turned. A two-face edge links the nodes that fit together; a consistent choice
     is one connected component of that graph.

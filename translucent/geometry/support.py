@@ -59,7 +59,7 @@ class _Clusters:
         self.corners = np.stack([bounds[[i & 1, i >> 1 & 1, i >> 2], :, range(3)].T for i in range(8)])
 
     def members(self, which: Mask) -> npt.NDArray[np.int32]:
-        """Numbers of the vertices of these clusters (m,), of which there is one at least."""
+        """Numbers of the vertices of these clusters (m,), m at least 1."""
         numbers = np.flatnonzero(which)
         ends = zip(self.starts[numbers].tolist(), self.starts[numbers + 1].tolist(), strict=True)
         return np.concatenate([self.order[start:end] for start, end in ends])

@@ -1,4 +1,4 @@
-"""Diagnosis of many small meshes at a time, of which each alone costs more for its calls than for its triangles."""
+"""Diagnosis of many small meshes at a time: one by one, calls would take longer than their triangles."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SMALL, FEWEST, MOST = 2000, 8, 1 << 17
 def diagnose_together(meshes: Iterable[Mesh]) -> None:
     """Find the diagnoses of all small meshes that are convex bodies without a defect; others keep theirs to be found.
 
-    They are those that each mesh would have alone, to the last bit.
+    They equal those of each mesh alone, to the last bit.
     """
     waiting = {id(mesh): mesh for mesh in meshes if "diagnosis" not in mesh.__dict__ and _is_small(mesh)}
     if len(waiting) < FEWEST:
@@ -132,7 +132,7 @@ class _Many:
         return py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
 
     def convex(self, orientation: Array) -> Mask:
-        """(meshes,): of which ones no edge of two faces bends inwards, where volumes have the sign `orientation`."""
+        """(meshes,): whether no edge of two faces bends inwards, where volumes have the sign `orientation`."""
         size = np.maximum.reduceat(self.vertices, self.vertex_starts)
         size -= np.minimum.reduceat(self.vertices, self.vertex_starts)
         mesh, sides = self._of_edge(), self.sides

@@ -78,8 +78,8 @@ class DiffusedTexture:
                 "exit_share": field.exit_share,
                 "mean_cosine": field.mean_cosine,
                 "ahead": field.ahead,
-                "in_scattered_far": field.haze[0].astype(np.float32),
-                "in_scattered_near": field.haze[1].astype(np.float32),
+                "in_scattered_far": field.in_scattered[0].astype(np.float32),
+                "in_scattered_near": field.in_scattered[1].astype(np.float32),
             }
             for number, field in self.fields.surfaces.items()
         }

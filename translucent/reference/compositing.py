@@ -65,7 +65,7 @@ def unassociated(layer: ColorLayer) -> ColorLayer:
     Raises
     ------
     InputError
-        If something without opacity has a color: no unassociated color stands for it.
+        If something without opacity has a color: it has no unassociated color.
     """
     if ((layer.opacity == 0) & (layer.color > 0)).any():
         raise InputError(

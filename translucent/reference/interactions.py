@@ -120,7 +120,7 @@ class Interactions:
         With their origins moved to the interfaces.
     interfaces : Interfaces
     light : SurfaceLight
-        On paint, and mirrored in rough interfaces.
+        On diffuse bases, and reflected in rough interfaces.
     rng : Generator, optional
         Chooses between reflection and refraction; without it both are followed.
     lights : StraightLight, optional
@@ -290,7 +290,7 @@ class Interactions:
         return [live.turned(way, share, inside, bent=True, reflected=~passed)], weight * passed[:, None]
 
     def _under_coat(self, chosen: Integers, share: Array) -> Array:
-        """(k, 3): what interfaces that reflect a `share` (k, 3) do with the clear coats on them."""
+        """(k, 3): reflectance of interfaces with their clear coats, from the reflectance (k, 3) below these."""
         return np.asarray(share + self.coated[chosen] * (1.0 - share))
 
     def _matter(self, chosen: Integers) -> tuple[Array, Array, Array]:
@@ -304,8 +304,8 @@ class Interactions:
     def _add_diffuse(self, chosen: Integers, passed: Array) -> None:
         """Add diffuse reflection of the share `passed` (k, 1 or 3) of the light."""
         share = passed * (1.0 - self.transmission[chosen])
-        painted = np.flatnonzero((share > 0.0).any(axis=1))
-        chosen, share = chosen[painted], share[painted]
+        diffuse_hits = np.flatnonzero((share > 0.0).any(axis=1))
+        chosen, share = chosen[diffuse_hits], share[diffuse_hits]
         if not chosen.size:
             return
         points, normals = self.live.rays.origins[chosen], self.normals[chosen]

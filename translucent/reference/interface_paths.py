@@ -65,7 +65,7 @@ class _Flight:
 
 
 class InterfacePaths:
-    """Tracer of random paths, for channels whose light takes the same ways.
+    """Tracer of random paths, for channels of light with the same indices of refraction and scattering.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ class InterfacePaths:
         return inside
 
     def _step(self, live: LiveRays) -> LiveRays:
-        """Follow paths to their next events, and turn them there; those that end are gone."""
+        """Follow paths to their next events, and return the paths that continue."""
         flight = self._fly(live)
         live, event, weights = self._through_media(live, flight)
         collided = np.isfinite(event)
@@ -248,7 +248,7 @@ class InterfacePaths:
         return self._roulette(live)
 
     def _one_branch(self, live: LiveRays) -> LiveRays:
-        """One leg of each path, chosen by what it carries: a polished sheet gives two."""
+        """One branch of each path, chosen by what it carries: a polished sheet has two."""
         live = live.where(np.argsort(live.owner, kind="stable"))
         carried = live.throughput.max(axis=1)
         first = np.flatnonzero(np.diff(live.owner, prepend=-1) != 0)
@@ -291,7 +291,7 @@ class InterfacePaths:
         return np.asarray(self.light.volume.phase[np.minimum(chosen, len(self.scattering) - 1)])
 
     def _roulette(self, live: LiveRays) -> LiveRays:
-        """Paths that go on, and carry more for those that do not (Arvo & Kirk 1990)."""
+        """Paths that survive Russian roulette, with the light of the others (Arvo & Kirk 1990)."""
         chance = np.minimum(live.throughput.max(axis=1) / ROULETTE, 1.0)
         chance = np.where(self.interfaces_met[live.owner] > MANY_INTERFACES, np.minimum(chance, GOES_ON), chance)
         # Without a direction light is lost.

@@ -1,8 +1,8 @@
 """Interfaces on rays: the first point on each ray at which its medium changes.
 
 Of several bodies at one point, the one of the highest priority decides what light is in; of equal ones, the one that
-the ray entered last (Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images"). A ray carries a record of
-the bodies that it is in, so that the walls of two bodies at one point are one interface.
+the ray entered last (Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images"). A ray carries an interior
+list of the bodies that it is in, so that the walls of two bodies at one point are one interface.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ AIR = -1
 
 @dataclass(frozen=True, eq=False)
 class Inside:
-    """State of rays: the bodies that they are inside.
+    """Interior lists of rays: how often each body contains their points, and since when.
 
     Attributes
     ----------
@@ -174,16 +174,16 @@ class Optics:
         return np.asarray((before != after) & changes)
 
     def outside(self, count: int) -> Inside:
-        """State of rays outside all bodies."""
+        """Interior lists of rays outside all bodies."""
         shape = (count, len(self.scene.objects))
         return Inside(np.zeros(shape, np.int32), np.zeros(shape, np.int64))
 
     def at_origins(self, hits: Sequence[Hits], count: int) -> Inside:
-        """State of rays at their origins, from all surfaces behind them."""
+        """Interior lists of rays at their origins, from all surfaces behind these."""
         return self.crossed([line.where(line.distance < 0) for line in hits], self.outside(count))
 
     def crossed(self, hits: Sequence[Hits], inside: Inside) -> Inside:
-        """State of rays that start `inside` bodies, behind surfaces."""
+        """Interior lists of rays behind all surfaces on them; `inside` are those at their origins."""
         return _InterfaceWalk(self, hits, inside).through()
 
     def first_interfaces(self, hits: Sequence[Hits], inside: Inside) -> FirstInterfaces:
@@ -231,7 +231,7 @@ class _InterfaceWalk:
         self.time = inside.since.max(axis=1, initial=0)
 
     def through(self) -> Inside:
-        """State of rays behind all surfaces."""
+        """Interior lists behind all surfaces."""
         for layer in _layers(self.crossings.pixel):
             self._cross(self.crossings.where(layer))
         return self.inside

@@ -13,9 +13,9 @@ from translucent.arrays import Array, Mask
 from translucent.formulas import optics
 from translucent.formulas.interface import ggx_distribution, reflected_direction, refracted_direction
 
-#: Number of meetings with microfacets after which light counts as lost; at a roughness of 1 one in a million gets as
-#: far.
-MOST_MEETINGS = 100
+#: Number of interactions with microfacets after which light counts as lost; at a roughness of 1 one in a million gets
+#: as far.
+MOST_INTERACTIONS = 100
 
 #: Largest slope of directions that stay at their height.
 LEVEL = 1e-6
@@ -67,7 +67,7 @@ def lit_at_interface(
     ray = np.arange(len(directions))
     way = np.einsum("kij,kj->ki", axes, directions)
     height = np.ones(len(directions))
-    for _ in range(MOST_MEETINGS):
+    for _ in range(MOST_INTERACTIONS):
         # Below the surface everything is as above it, turned upside down.
         side = np.where(above[ray], 1.0, -1.0)[:, None]
         height, leaves = _next_height(side * way, height, alpha[ray], rng)

@@ -116,11 +116,11 @@ def _lambert(body: Object, hits: OpaqueHits, rays: Rays, irradiance: Irradiance)
     normals[away] *= -1.0
     # From the eye, as the rays are, so that the way to a light keeps its digits far from the world's origin.
     points = rays.origins + hits.distance[:, None] * rays.directions
-    color, glow = np.broadcast_to(body.base_color, points.shape), np.zeros(3)
+    color, emitted = np.broadcast_to(body.base_color, points.shape), np.zeros(3)
     if hits.barycentric is not None:
         color = color * painted(body, hits.face, hits.barycentric)[:, :3]
         if body.surface is not None and body.surface.glows:
             texture = sampled(body, hits.face, hits.barycentric, body.surface.emissive_texture)
-            glow = np.asarray(body.surface.emissive) * texture[:, :3]
+            emitted = np.asarray(body.surface.emissive) * texture[:, :3]
     with np.errstate(under="ignore"):
-        return np.asarray(color / np.pi * irradiance(points, normals) + glow)
+        return np.asarray(color / np.pi * irradiance(points, normals) + emitted)

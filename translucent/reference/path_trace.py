@@ -37,16 +37,16 @@ def path_trace(
     """Path trace a scene, with multiple scattering of all lights, of the environment and of emission.
 
     Where interfaces change light (`Object.has_interface`), each path is reflected or refracted by chance: by Fresnel
-    between the media of its record (Schmidt & Budge 2002), at rough interfaces by a walk among GGX microfacets that
-    loses nothing (Heitz et al. 2016). Sheets, tints, paint, dispersion and smooth normals are what they are for
-    `render`, without a limit of bounces. Radiance is basic radiance L / n^2, as there.
+    between the media of its interior list (Schmidt & Budge 2002), at rough interfaces by a walk among GGX microfacets
+    that loses nothing (Heitz et al. 2016). Sheets, tints, diffuse bases, dispersion and smooth normals are what they
+    are for `render`, without a limit of bounces. Radiance is basic radiance L / n^2, as there.
 
     Point and directional lights are followed straight on, and through the microfacets of rough interfaces. What
     polished interfaces bend of them no path finds: caustics, and light in media behind such interfaces. The plan tells
     where this leaves out something. Light of the environment is all there.
 
-    Opaque surfaces and paint send back what they do for `render`, and a backdrop fixed to the picture lights like the
-    mean of its squares. Light inside a medium has no finite variance: there the error bars say little. Nor do they
+    Opaque surfaces and diffuse bases reflect as they do for `render`, and a backdrop fixed to the picture lights like
+    the mean of its squares. Light inside a medium has no finite variance: there the error bars say little. Nor do they
     with few paths before rare bright reflections.
 
     Parameters
@@ -151,7 +151,7 @@ def _left_out(scene: Scene) -> tuple[Note, ...]:
 
 
 def _alike(columns: Array) -> list[Integers]:
-    """Groups of channels, of the columns (n, 3), that are equal: one path stands for all of them."""
+    """Groups of channels with equal columns (n, 3): one path serves all of a group."""
     _, group = np.unique(columns, axis=1, return_inverse=True)
     return [np.flatnonzero(group.ravel() == number) for number in np.unique(group)]
 

@@ -218,7 +218,7 @@ def even_steps(variable: Variable, offset: Array) -> MarchSteps:
 def gauss_steps(start: Array, end: Array, count: int) -> MarchSteps:
     """Gauss-Legendre steps with `count` points from `start` (k,) to `end` (k,).
 
-    Each point stands for a step of the length of its weight; by the separation theorem (Szego 1939, section 3.41) these
+    Each point has a step of the length of its weight; by the separation theorem (Szego 1939, section 3.41) these
     steps, put one after the other, hold one point each.
     """
     points, weights = np.polynomial.legendre.leggauss(count)

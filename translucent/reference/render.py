@@ -71,9 +71,9 @@ def render(
 
     Where light changes at the interfaces of bodies (`Object.has_interface`), radiance is that of rays that bend and
     split there; see `translucent.reference.refracted`. All else is that of the straight rays, also then. Lights reach
-    media straight on. Of `Surface`, multiple scattering is left to `path_trace`, and bodies do not glow. Layers
-    (`Surface.opacity`) have their place in the order, and what they show is matt, as are opaque objects, which have
-    their textures and holes.
+    media straight on. Of `Surface`, multiple scattering is left to `path_trace`, and surfaces of bodies do not emit.
+    Layers (`Surface.opacity`) have their place in the order, and what they show is matt, as are opaque objects, which
+    have their textures and holes.
 
     Parameters
     ----------

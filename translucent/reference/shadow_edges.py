@@ -22,7 +22,7 @@ PAIRS = 1 << 18
 
 
 def outline_edges(traced: TracedObject, light: Light) -> Array:
-    """(e, 2, 3): edges of an object of which the light sees one face from its front and not the other."""
+    """(e, 2, 3): silhouette edges of an object as seen from a light: one face is lit, and the other is not."""
     faces, corners = traced.body.mesh.faces, traced.corners
     with np.errstate(under="ignore"):
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

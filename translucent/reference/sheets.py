@@ -49,13 +49,13 @@ def layer_radiance(body: Object, hits: Hits, rays: Rays, irradiance: Irradiance)
     normals = world_normals(body, hits.face)
     normals[np.einsum("ki,ki->k", normals, directions) > 0] *= -1.0
     points = rays.origins[hits.pixel] + hits.distance[:, None] * directions
-    glow = (
+    emitted = (
         np.asarray(body.surface.emissive)
         * sampled(body, hits.face, hits.barycentric, body.surface.emissive_texture)[:, :3]
     )
     with np.errstate(under="ignore"):
         lit = irradiance(points, normals) / np.pi
-        return np.asarray(body.base_color * painted(body, hits.face, hits.barycentric)[:, :3] * lit + glow)
+        return np.asarray(body.base_color * painted(body, hits.face, hits.barycentric)[:, :3] * lit + emitted)
 
 
 @dataclass(frozen=True, eq=False)

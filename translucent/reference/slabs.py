@@ -29,7 +29,7 @@ def cosines(ior: float) -> tuple[Array, Array]:
 
 
 def bare(albedo: float, depth: float, mu: Array, weight: Array, anisotropy: float = 0.0) -> tuple[Array, Array]:
-    """Matrices that turn incident radiance at the nodes into reflected and transmitted radiance, of a bare layer.
+    """Reflection and transmission matrices of a layer without interfaces, for radiances at the cosines of a quadrature.
 
     Parameters
     ----------

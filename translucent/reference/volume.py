@@ -78,7 +78,7 @@ class Volume:
         return weights
 
     def majorant(self, filling: Array, table: Array) -> Array:
-        """(k, ...): largest value that a coefficient, given as a `table` (n, ...), has where `filling` (k, n) is."""
+        """(k, ...): upper bound of a coefficient, `table` (n, ...) by medium, where media fill `filling` (k, n)."""
         largest = np.ones(filling.shape[1])
         for i, density in self._densities:
             largest[i] = density.maximum
