@@ -87,7 +87,7 @@ class _FilmOutput:
         self._said = self._process.stderr.read()
 
     def line(self) -> str:
-        """The first line, when the process has ended."""
+        """First line that the film encoder has printed, after it has ended."""
         self._thread.join()
         lines = self._said.decode(errors="replace").strip().splitlines()
         return lines[0][:_MOST_TOLD] if lines else ""

@@ -30,8 +30,15 @@ LOSSY = (".jpg", ".jpeg", ".webp")
 
 
 class LinearPicture(NamedTuple):
-    """Linear values (h, w, 3), the largest level of the file, such as 255, 0 of a linear one, which has none; and
-    whether the file rounds whole blocks of pixels, as JPEG does, so that noise does not spread the error of that.
+    """Photograph in linear values, with what is known of its rounding.
+
+    Attributes
+    ----------
+    linear : (h, w, 3)
+    levels : int
+        Largest level of the file, such as 255; 0 for a linear file.
+    blocks : bool
+        The file rounds whole blocks of pixels, as JPEG does, so that noise does not average the error out.
     """
 
     linear: Array

@@ -141,7 +141,7 @@ def traced_samples(job: FrameJob) -> float:
 
 
 def _central_first(samples: int) -> list[tuple[float, float]]:
-    """The shifts of the samples, that nearest to the center of the pixel first: smooth surroundings need no other."""
+    """Sub-pixel shifts of the samples, the most central first: where surroundings are smooth, it is the only one."""
     shifts = sample_shifts(samples)
     nearest = int(np.argmin(np.square(shifts).sum(axis=1)))
     shifts[[0, nearest]] = shifts[[nearest, 0]]

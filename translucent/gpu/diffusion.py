@@ -32,7 +32,7 @@ KEPT_GRIDS = 2
 
 
 class DiffusedTexture:
-    """Diffused light of the bodies of a scene.
+    """Texture of the light that diffuses in the bodies of a scene.
 
     Attributes
     ----------

@@ -112,7 +112,7 @@ def _chunks(count: int) -> Iterator[slice]:
 
 
 def frame(low: Array, high: Array) -> tuple[Array, float]:
-    """Middle of bounds, and the scale by which their longest side reaches from -1 to 1."""
+    """Center of a bounding box, and the scale that maps its longest side to -1 .. 1."""
     return 0.5 * low + 0.5 * high, 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
 
 

@@ -63,7 +63,7 @@ def check_dialect(dialect: str) -> None:
 
 
 def head_of(name: str, code: str, dialect: Dialect) -> Head:
-    """First lines for the code of a shader.
+    """Version, extensions and precision statements for the code of a shader.
 
     Parameters
     ----------

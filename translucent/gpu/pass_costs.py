@@ -85,7 +85,7 @@ class PassTimer:
         return number.value
 
     def _function(self, name: str, *arguments: type) -> Callable[..., None]:
-        """OpenGL function that writes its result to where its last argument points."""
+        """OpenGL function of this name, whose last argument is a pointer to its result."""
         if sys.platform == "win32":
             prototype = ctypes.WINFUNCTYPE
         else:
@@ -208,7 +208,7 @@ def _interfaces(features: FrameFeatures, spec: PassSpec, cleared: set[str]) -> P
 
 
 def _surfaces(features: FrameFeatures, spec: PassSpec, cleared: set[str]) -> PassTraffic:
-    """Traffic of what shades interfaces; of rays, only what they start from and end at."""
+    """Bytes of a pass that shades interfaces; of traced rays, only the targets at their two ends."""
     parts = (0, 1) if features.traced else (0, 1, 2, 3)
     read = FORMATS["result"].bytes_of(*parts) + FORMATS["entered"].bytes_of()
     if not features.one_interface:

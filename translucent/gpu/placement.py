@@ -94,7 +94,7 @@ class PlacedScene:
 
     @property
     def on_surface(self) -> Mask:
-        """(objects,): whether the eye is on the surface: rays inwards leave once more than rays outwards."""
+        """(objects,): whether the eye is on the surface of each object: some rays begin inside, and others outside."""
         return np.asarray(self.expected_counts[:, 0] != self.expected_counts[:, 1])
 
     @property

@@ -89,7 +89,7 @@ class PhotonPicture:
                 return
 
     def show(self) -> None:
-        """Bring the texture up to date."""
+        """Write the mean of all photons so far into `texture`, and estimate its error."""
         self._job.uniforms.bind()
         self._into.clear()
         self._pass.shade(self._job, self._into, self.rounds)

@@ -131,7 +131,7 @@ def _compact_arrays(job: FrameJob) -> dict[str, Any]:
 
 
 def _fixed(values: Floats) -> Floats:
-    """The values, read-only: arrays are made from them at any time."""
+    """The same values, read-only, as arrays of frames are made from them later."""
     values.setflags(write=False)
     return values
 
@@ -202,7 +202,7 @@ class GpuRenderer:
 
     @property
     def diffusion(self) -> DiffusionCache:
-        """Light that diffuses in bodies, as it is known so far."""
+        """Cache of solutions for the light that diffuses in bodies."""
         return self._resources.diffusion
 
     @property
@@ -400,7 +400,7 @@ class GpuRenderer:
         return self._passes[kind]
 
     def _average(self, job: FrameJob, samples: int) -> None:
-        """Add up `samples` shifted renderings in the target for averages."""
+        """Render `samples` times with sub-pixel shifts, and add the pictures up."""
         job.averaging = True
         if job.plan.request.adaptive and is_adaptive(job, samples):
             self._adaptive = self._adaptive or AdaptiveSampling(self.context.gl)

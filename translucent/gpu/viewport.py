@@ -31,7 +31,7 @@ STRIDES = (1, 2, 4, 8, 16)
 
 @lru_cache(maxsize=4)
 def shifts(samples: int) -> npt.NDArray[np.float64]:
-    """(samples, 2): sub-pixel shifts of a pixel's later samples."""
+    """(samples, 2): sub-pixel shifts of the samples of a pixel after the first one, in drawing order."""
     return sample_shifts(samples)
 
 
@@ -70,7 +70,7 @@ class Side:
         self.step, self.stride = 0, 1
 
     def known(self) -> list[tuple[int, ...]]:
-        """Drawn phase, of the stride x stride ones, that stands in for each phase; 0 for the rest. In fours."""
+        """Number of a drawn pixel to show in place of each of the stride x stride pixels; four numbers in a tuple."""
         order = phases(self.stride)
         found = [0] * STRIDES[-1] ** 2
         for (x, y), block in order[: max(self.step, 1)]:
@@ -256,7 +256,7 @@ class Viewport:
         self._sides.reverse()
 
     def mean_radiance(self) -> float:
-        """Mean radiance of the first side, whose pixels are all there; blocks until it is drawn."""
+        """Mean radiance of the picture on the left, once all of its pixels are drawn; blocks until then."""
         side = self._side(0, self.size)
         values = np.frombuffer(side.light.read(components=4, dtype="f4"), np.float32).reshape(-1, 4)
         with np.errstate(under="ignore"):

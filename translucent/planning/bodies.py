@@ -107,7 +107,7 @@ def _never_negative(body: Object) -> bool:
 
 
 def _fillings(scene: Scene) -> list[Hashable]:
-    """Key of each object's medium: equal for two objects where it makes no difference which of them fills a point."""
+    """Key of the medium of each object; objects with equal keys may fill a point in place of each other."""
     # Many bodies share a medium, and its key.
     media = {id(item.medium): item.medium for item in scene.objects}
     keys = {number: _medium_key(medium, bool(scene.lights)) for number, medium in media.items()}

@@ -275,7 +275,7 @@ class TracedInterfaces(InterfaceMode):
         return self.depth, self.forks
 
     def refusal(self, scene: Scene) -> tuple[str, str] | None:
-        """Reason: rays of one picture start in different media, or media vary along a ray."""
+        """Reason against traced rays: they would start in different media, or cross one that varies."""
         solids = [body for body in scene.bodies if body.sheet_thickness is None]
         if cut := [body for body in solids if picture_cuts(scene, body)]:
             return (

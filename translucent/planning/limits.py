@@ -191,7 +191,7 @@ def layers_instead(scene: Scene, refusals: Iterable[tuple[int, str]]) -> tuple[N
 
 
 def shadow_effects(scene: Scene) -> list[Note]:
-    """Notes on shadows on opaque objects that are not rendered, where there are some, or a picture of them."""
+    """Notes on missing shadows on opaque objects, or on a picture of them that is drawn elsewhere."""
     notes = []
     if not scene.environment_shadows and scene.environment.mean.any():
         text = "shadows of the environment: its light reaches opaque objects through everything"

@@ -378,7 +378,7 @@ def _traced(
 
 
 def _followed(scene: Scene, interfaces: InterfaceMode | None) -> InterfaceMode | None:
-    """The interfaces that a renderer without OpenGL follows: all, whatever is requested, as far as tracing would."""
+    """Interfaces of a renderer without OpenGL, which traces all of them; as deep as requested, or as is usual."""
     if not with_interfaces(scene):
         return None
     return interfaces if interfaces is not None and interfaces.traced else TracedInterfaces(depth=USUAL_DEPTH)

@@ -182,7 +182,7 @@ class Environment(Frozen):
 
     @cached_property
     def light_map(self) -> EnvironmentMap:
-        """Map of its light, before rotation and exposure; a checkerboard lights like its mean."""
+        """Map of the light of the environment, before rotation and exposure; that of a checkerboard is its mean."""
         if self.map is not None:
             return self.map
         if self.kind == "gradient":

@@ -280,7 +280,7 @@ Light = PointLight | SpotLight | SphereLight | DirectionalLight
 
 
 def without_spheres(lights: Sequence[Light], most: int) -> tuple[Light, ...]:
-    """The lights with points in place of each sphere: as many as there are, or fewer to have at most `most` in all."""
+    """The lights with point lights in place of each sphere light, at most `most` of them in all."""
     spheres = sum(isinstance(light, SphereLight) for light in lights)
     count = max((most - len(lights)) // max(spheres, 1) + 1, 1)
     return tuple(

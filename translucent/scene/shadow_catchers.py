@@ -33,7 +33,7 @@ def page_radiance(scene: Scene) -> float:
 
 
 def before_page(scene: AnyScene, radiance: float) -> AnyScene:
-    """Scene before a page of this radiance, which its shadow catchers show where nothing shadows them."""
+    """Scene before a background of even radiance, which unshadowed parts of its shadow catchers match."""
     page = scene.environment.with_background(Environment.constant((radiance,) * 3))
     objects = [_painted(scene, item, radiance) if item.shadow_catcher else item for item in scene.objects]
     return dataclasses.replace(scene, environment=page, objects=objects)

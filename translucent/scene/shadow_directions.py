@@ -64,7 +64,7 @@ def shadow_directions(environment: Environment, count: int) -> tuple[Array, Arra
 
 
 def _turn(turns: float) -> Array:
-    """(3, 3): of row vectors about +Y, counterclockwise as seen from above."""
+    """(3, 3): rotation of row vectors about +Y, counterclockwise as seen from above."""
     cosine, sine = np.cos(2.0 * np.pi * turns), np.sin(2.0 * np.pi * turns)
     return np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]])
 

@@ -57,7 +57,7 @@ def framed_all_around(scene: Scene, size: tuple[int, int]) -> Scene:
 
 
 def swept_points(scene: Scene) -> Array:
-    """(n, 3): points that enclose what is shown as they turn about +Y through the center of their bounds."""
+    """(n, 3): points that enclose a model while it turns on a turntable, about +Y through the center of its bounds."""
     center = scene.shown_bounds.mean(axis=0)
     offsets = np.concatenate(
         [

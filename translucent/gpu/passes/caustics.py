@@ -33,7 +33,7 @@ BATCH = PHOTON_WIDTH * 512
 
 @dataclass(frozen=True, eq=False)
 class PhotonTracer:
-    """Means to follow the photons of a scene: where they aim, where a batch has landed, program and textures."""
+    """Everything for following the photons of a scene: aims, target for the hits of a batch, program and textures."""
 
     aims: list[PhotonAim]
     landed: moderngl.Framebuffer
@@ -78,7 +78,7 @@ class CausticsPass:
         return PhotonTracer(aims, self._landed(stack), *self._tracer(stack, job))
 
     def follow(self, job: FrameJob, tracer: PhotonTracer, number: int, begin: int, end: int) -> None:
-        """Follow photons of the aim of this number, and add up where the picture shows that they have landed."""
+        """Follow some photons of one aim, and add them to the pixels of the opaque points that they land on."""
         self._aim(tracer.program, tracer.aims[number], number, job)
         for first in range(begin, end, BATCH):
             count = min(BATCH, end - first)

@@ -125,7 +125,7 @@ class DepthPeelingPass:
         walked: int,
         last: bool,
     ) -> None:
-        """Walk along the crossings of the first `walked` passes of a batch."""
+        """Add up optical depth and emission along each ray, through the crossings of the first `walked` passes."""
         framebuffer = job.targets["ordered"] if last else job.targets.peel_state(folds % 2)
         # Samplers of passes that this batch is short of must not stay with what is drawn into.
         for unit in range(PEEL_BATCH):

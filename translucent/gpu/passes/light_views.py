@@ -158,7 +158,7 @@ class LightViewsPass:
         return [LightView(job, camera, self._targets[side]) for camera in cameras]
 
     def _fill(self, job: FrameJob, spec: PassSpec, views: list[LightView]) -> bool:
-        """Build all lists; once more, with larger buffers, if they did not fit. False if none are large enough."""
+        """Build the lists of surfaces of all views, again with larger buffers if they did not fit; False if none do."""
         lists = job.resources.light_lists
         cells = sum(view.texels for view in views)
         # Where a light is inside, each of its lists begins with a crossing of its own.

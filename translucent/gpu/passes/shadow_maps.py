@@ -49,7 +49,7 @@ _GRAZING = 1e-4
 
 
 class MapJob(FrameJob):
-    """Frame that a light sees, drawn into its place in the atlas; axial depths are metres ahead of the scene's center.
+    """Map of shadows: a frame seen from a light, drawn into the atlas; depths count from the center of the scene.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class MapJob(FrameJob):
         return replace(roles, slots=np.array(_slots(self.features.scene)[0])) if self.two_media else roles
 
     def at_place(self, framebuffer: moderngl.Framebuffer) -> moderngl.Framebuffer:
-        """The framebuffer, with its viewport where the map is."""
+        """The framebuffer of the atlas, with the viewport on the part that this map takes."""
         framebuffer.viewport = (*self._view.corner, self._view.size, self._view.size)
         return framebuffer
 
@@ -94,7 +94,7 @@ class MapJob(FrameJob):
         return self.at_place(shadows.tested if self.projected_depth else shadows.sums)
 
     def bind_opaque(self, unit: int) -> None:
-        """Bind where rays end for the shader that reads texture `unit`, if there are any."""
+        """Bind the depths at which opaque objects end rays of the light, if there are any, to texture `unit`."""
         if self.features.has_opaque:
             self.resources.shadows.ends.color_attachments[0].use(unit)
 
@@ -238,7 +238,7 @@ class ShadowMapsPass:
                     self._step(step.name)(light, step)
 
     def _copy(self, light: FrameJob, view: ShadowView, center: Array) -> None:
-        """Draw one map as a frame, and copy it to its place."""
+        """Draw one map of shadows as a frame of its own, and copy it into the atlas."""
         with contextlib.ExitStack() as stack:
             stack.callback(light.release)
             for step in light.plan.passes:

@@ -128,7 +128,7 @@ class TracedInterfacesPass:
     def _draw_mirrored(
         self, job: FrameJob, mirror: Mirror, framebuffer: moderngl.Framebuffer, program: moderngl.Program
     ) -> None:
-        """Add what bodies change in the mirror image of the ground."""
+        """Add the difference that bodies make to the light that the ground mirrors."""
         surface = mirror.ground.surface
         assert surface is not None
         height = mirror.height - float(mirror.normal @ media_center(job.scene))
@@ -252,7 +252,7 @@ def ray_switches(scene: Scene) -> dict[str, bool]:
 
 
 def interior_at_eye(job: FrameJob) -> tuple[int, int, int, int]:
-    """The bodies that contain the eye, as the shader keeps them."""
+    """Interior list of rays at the eye: the bodies around it, packed in pairs of 16 bits."""
     entries = [
         number + 1
         for number in np.flatnonzero(job.placed.expected_counts[:, 1]).tolist()

@@ -1,4 +1,4 @@
-"""Context that records: it takes the calls of passes in place of OpenGL, and keeps each draw with all its state."""
+"""Stand-in for an OpenGL context that records each draw with all its state, to be replayed in a browser."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ class RecordingContext:
         return RecordedQuery(self)
 
     def number(self, key: Any, items: list[Any], item: Any) -> int:
-        """Number of an item in one of the lists, which has it once by its key."""
+        """Index of an item in one of the recorded lists; an item with a known key is not added again."""
         if key not in self._numbers:
             self._numbers[key] = len(items)
             items.append(item)

@@ -30,13 +30,13 @@ class Recorder(Protocol):
     asking: bool
 
     def note_clear(self, framebuffer: RecordedFramebuffer, color: tuple[float, ...], depth: float) -> None:
-        """Take down a clear."""
+        """Record that a framebuffer is cleared."""
 
     def note_mipmaps(self, texture: RecordedTexture) -> None:
-        """Take down that mipmaps are made."""
+        """Record that mipmaps of a texture are made."""
 
     def note_draw(self, array: RecordedArray) -> None:
-        """Take down a draw."""
+        """Record a draw with all of its state."""
 
 
 class RecordedUniform:

@@ -55,7 +55,7 @@ class DepthPeeling(Method):
         return self.max_layers
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
-        """Passes: as many draws of all solids as are expected to be needed."""
+        """One pass, with as many draws of all solids as they are expected to have layers."""
         solids = solids_of(scene)
         bodies = [scene.objects[i] for i in solids]
         expected = sum(2 if body.mesh.diagnosis.convex else _GUESSED_LAYERS for body in bodies)
