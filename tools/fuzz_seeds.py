@@ -31,7 +31,7 @@ from translucent.geometry.solids import Box
 from translucent.gltf.materials import read_materials
 from translucent.gltf.write import write_medium
 from translucent.materials import load_medium, text_block
-from translucent.media.pixel import pixel_color
+from translucent.media.colors import pixel_color
 from translucent.media.preset import read_presets
 from translucent.scene.environment_files import read_environment_map
 

@@ -30,8 +30,8 @@ from translucent.planning.scattering import Scattering
 from translucent.planning.shadow_maps import ShadowMaps
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
+from translucent.scene.grounds import before_page, page_radiance
 from translucent.scene.scene import Scene, check_scene
-from translucent.scene.shadow_catchers import before_page, page_radiance
 from translucent.version import VERSION
 
 if TYPE_CHECKING:

@@ -29,8 +29,8 @@ from translucent.gltf import file as file_module
 from translucent.gltf.write import write_medium
 from translucent.materials import load_medium
 from translucent.materials.usd import read_usda
+from translucent.media.colors import pixel_color, read_encoded
 from translucent.media.fitting import fit_wedge
-from translucent.media.pixel import pixel_color, read_encoded
 from translucent.media.preset import read_presets
 
 JADE = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02)
@@ -441,7 +441,7 @@ def test_what_pillow_logs_of_a_damaged_tiff_is_not_printed(tmp_path: Path) -> No
     script = """
 import sys
 import translucent as tl
-from translucent.media.pixel import pixel_color
+from translucent.media.colors import pixel_color
 try:
     pixel_color(sys.argv[1], 0, 0)
 except tl.InputError:

@@ -18,7 +18,7 @@ from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.light_cameras import ShadowThrowers, support_of
 from translucent.gpu.shaders import CompileBudget, PostponedError
 from translucent.gpu.shadow_atlas import LEAST_TEXELS, MOST_BYTES, ShadowViews
-from translucent.planning.mirrors import lit_side
+from translucent.scene.grounds import lit_side
 from translucent.scene.stages import staged
 
 SIZE = (96, 72)

@@ -15,7 +15,7 @@ from PIL import Image
 import translucent as tl
 from translucent.formulas.color import srgb_to_linear, to_hex
 from translucent.media import conversion
-from translucent.media.colors import parse_color
+from translucent.media.colors import html_swatches, parse_color
 from translucent.media.conversion import (
     clamp_colors,
     color_at_distance,
@@ -27,7 +27,6 @@ from translucent.media.conversion import (
     mean_free_path,
     summary,
 )
-from translucent.media.swatches import html_swatches
 
 EDGES = np.array([1.0, np.nextafter(1, 0), 1 - 1e-9, 0.5, math.exp(-1), 1e-4, 1e-30, 1e-300, 5e-324])
 

@@ -7,8 +7,7 @@ import pytest
 
 import translucent as tl
 from translucent.scene.environment import LEVEL_SIZE, LEVELS, FilteredEnvironment, equirectangular_uv, filtered
-from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, texel_directions
-from translucent.scene.lobes import irradiance_map
+from translucent.scene.environment_map import EnvironmentMap, irradiance_map, row_solid_angles, texel_directions
 
 EPS32 = float(np.finfo(np.float32).eps)
 

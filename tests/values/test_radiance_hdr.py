@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.scene.radiance_hdr import read_radiance
+from translucent.scene.environment_files import read_radiance
 
 HEAD = b"#?RADIANCE\nSOFTWARE=none\nFORMAT=32-bit_rle_rgbe\n\n"
 

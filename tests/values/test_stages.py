@@ -9,7 +9,7 @@ import pytest
 
 import translucent as tl
 from translucent.geometry.solids import Box, Sphere
-from translucent.scene.shadow_catchers import before_page, page_radiance
+from translucent.scene.grounds import before_page, page_radiance
 from translucent.scene.showcase import DEFAULT_COLOR, default_medium, framing, showcase
 from translucent.scene.stages import (
     DEFAULT_STAGE,

@@ -16,7 +16,7 @@ import click
 
 from translucent.errors import RenderError, printable
 
-#: Printable sequences: ends of lines, tabs, and swatches such as those of `translucent.media.swatches`.
+#: Printable sequences: ends of lines, tabs, and swatches such as those of `translucent.media.colors`.
 _KEPT = re.compile(r"(\n|\t|\x1b\[48;2;\d{1,3};\d{1,3};\d{1,3}m {2,8}\x1b\[0m)")
 
 

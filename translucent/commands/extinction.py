@@ -365,7 +365,7 @@ def _tell(told: dict[str, Any], medium: Medium, stated: float, given: Extinction
 
 def _report(told: dict[str, Any]) -> str:
     from translucent.formulas.color import to_hex
-    from translucent.media.swatches import terminal_strip
+    from translucent.media.colors import terminal_strip
 
     distance, colors, td = told["distance"], told["transmittance"], told["transmission_distance"]
     reached = "never" if td["distance"] is None else f"{1e3 * td['distance']:.5g} mm"

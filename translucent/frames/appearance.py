@@ -19,10 +19,9 @@ from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.formulas.color import to_hex
 from translucent.frames.frame import Frame
-from translucent.media.colors import parse_color
+from translucent.media.colors import html_swatches, parse_color
 from translucent.media.conversion import CHANNELS, CLAMP
 from translucent.media.medium import Medium
-from translucent.media.swatches import html_swatches
 
 #: Quantiles of the thickness by which a mesh is described.
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

@@ -16,9 +16,9 @@ from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.files.reading import read_text, shown, toml_value
 from translucent.formulas.color import linear_to_srgb, srgb_to_linear
+from translucent.media.colors import read_encoded
 from translucent.media.conversion import CHANNELS
 from translucent.media.fitting import PatchTransmittances, StepFit, fit_steps
-from translucent.media.pixel import read_encoded
 from translucent.scene.environment_files import read_linear
 from translucent.units import metres_per_unit, parse_length
 

@@ -27,8 +27,8 @@ from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
 from translucent.gpu.shaders import before_making
 from translucent.gpu.textures import unlike_powers
 from translucent.gpu.uniforms import Fields
-from translucent.scene.falloff import Falloff
 from translucent.scene.scene import Object, Scene
+from translucent.scene.texture import Falloff
 
 Words = npt.NDArray[np.uint32]
 

@@ -16,7 +16,7 @@ from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas import optics
-from translucent.media.swatches import html_swatches
+from translucent.media.colors import html_swatches
 from translucent.units import length_text, metres_per_unit
 
 #: Value to which a channel of 0 is clamped if that is requested: an optical depth of 9.2.

@@ -23,9 +23,8 @@ from translucent.formulas.card import reflectance_on_card
 from translucent.formulas.color import to_hex
 from translucent.formulas.diffuse_interface import diffuse_interface, half_space_reflectance
 from translucent.formulas.phase import HenyeyGreenstein, PhaseFunction, parse_phase
-from translucent.media.colors import parse_color
+from translucent.media.colors import html_card, parse_color
 from translucent.media.medium import Medium
-from translucent.media.swatches import html_card
 from translucent.units import metres_per_unit, parse_length
 
 Kind = Literal["measured", "estimated"]

@@ -11,10 +11,10 @@ from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import indices, overlapping_pair
 from translucent.planning.methods.base import check_count
-from translucent.planning.mirrors import mirror_of
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.shadow_maps import dims_interfaces
+from translucent.scene.grounds import mirror_of
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Time of drawing the interfaces where rays enter and where they leave, in depth-only draws of the same geometry, as

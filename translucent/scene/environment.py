@@ -21,9 +21,17 @@ from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.formulas.spherical_harmonics import COUNT, real_harmonics
 from translucent.media.colors import ColorLike, parse_color
-from translucent.scene.environment_map import EnvironmentMap, row_blocks, row_solid_angles, texel_directions
+from translucent.scene.environment_map import (
+    KEPT,
+    EnvironmentMap,
+    convolved,
+    irradiance_map,
+    row_blocks,
+    row_solid_angles,
+    sized,
+    texel_directions,
+)
 from translucent.scene.lights import positive_triple
-from translucent.scene.lobes import KEPT, convolved, irradiance_map, sized
 
 EnvironmentKind = Literal["constant", "gradient", "checkerboard", "image"]
 
@@ -227,7 +235,7 @@ class Environment(Frozen):
         `environment_filter.Filtered.irradiance`.
         """
         if self.map is not None:
-            from translucent.scene.lobes import irradiance_map
+            from translucent.scene.environment_map import irradiance_map
 
             return self.scale * irradiance_map(self.map).at(equirectangular_uv(normals, self.turn))
         if self.kind == "gradient":

@@ -72,7 +72,7 @@ def _turn(turns: float) -> Array:
 @lru_cache(maxsize=KEPT)
 def _shared_out(source: EnvironmentMap, count: int) -> tuple[Array, Array]:
     """Directions (count, 3), and integrals of a picture's radiance over their cells, before rotation and exposure."""
-    from translucent.scene.lobes import sized  # scenes without shadows of the environment need no SciPy
+    from translucent.scene.environment_map import sized  # scenes without shadows of the environment need no SciPy
 
     solid_angles = np.repeat(row_solid_angles(*SIZE), SIZE[1])
     ways = texel_directions(*SIZE).reshape(-1, 3)

@@ -20,11 +20,11 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.support import Support
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
-from translucent.scene.falloff import Falloff
 from translucent.scene.lights import DirectionalLight, PositionalLight, SpotLight
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.studio import dark_studio_map
 from translucent.scene.surface import Surface
+from translucent.scene.texture import Falloff
 
 Color = tuple[float, float, float]
 

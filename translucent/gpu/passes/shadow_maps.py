@@ -29,10 +29,10 @@ from translucent.gpu.shadow_atlas import Seen, SeenFrom, ShadowView, ShadowViews
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import BodyRoles, bounded_extinction, media_center
 from translucent.media.medium import Medium
-from translucent.planning.mirrors import lit_side
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import MapPlan, RenderPlan
 from translucent.planning.rendered import darkened, occluding_bodies
+from translucent.scene.grounds import lit_side
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light, Scene
 from translucent.scene.shadow_directions import shadow_directions

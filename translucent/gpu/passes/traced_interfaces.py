@@ -18,9 +18,9 @@ from translucent.gpu.passes.variants import Variants, coat_switches, seen_switch
 from translucent.gpu.placement import extents, part_of
 from translucent.gpu.shaders import set_used
 from translucent.gpu.uniforms import media_center
-from translucent.planning.mirrors import Mirror, ground_of, mirror_of
 from translucent.planning.passes import PassSpec
 from translucent.planning.rendered import Treatment, treatment_of
+from translucent.scene.grounds import Mirror, ground_of, mirror_of
 from translucent.scene.scene import Scene
 
 _SAMPLERS = (

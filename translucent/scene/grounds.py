@@ -1,0 +1,154 @@
+"""Grounds: flat objects that mirror what stands on them, or catch its shadows."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from translucent.arrays import Array
+from translucent.errors import InputError
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight
+from translucent.scene.scene import Object, Scene
+from translucent.scene.surface import Surface
+
+#: Roughness above which a coat mirrors a blur and no more.
+MOST_ROUGHNESS = 0.4
+
+#: Largest distance of a ground's vertices from its plane, as a share of its size.
+FLAT = 1e-6
+
+#: Share of the scene's size by which what stands on a ground may be below it, by rounding.
+SUNK = 1e-5
+
+
+class Mirror(NamedTuple):
+    """Flat ground.
+
+    Attributes
+    ----------
+    ground : Object
+    normal : (3,)
+        Unit vector to its outer side.
+    height : float
+        Of the ground along it, in metres from the world's origin.
+    """
+
+    ground: Object
+    normal: Array
+    height: float
+
+    @property
+    def matrix(self) -> Array:
+        """(4, 4): reflection at the plane."""
+        matrix = np.eye(4)
+        matrix[:3, :3] -= 2.0 * np.outer(self.normal, self.normal)
+        matrix[:3, 3] = 2.0 * self.height * self.normal
+        return matrix
+
+
+def mirror_of(scene: Scene) -> Mirror | None:
+    """Ground of a scene that mirrors its bodies, if it has one: the first flat shadow catcher with a smooth coat."""
+    return next((found for item in scene.objects if _is_smooth(item) and (found := _flat(item))), None)
+
+
+def ground_of(scene: Scene) -> Mirror | None:
+    """Ground of a scene, if it has one: the first flat shadow catcher that is opaque."""
+    return next((found for item in scene.opaque if item.shadow_catcher and (found := _flat(item))), None)
+
+
+def lit_side(scene: Scene) -> Array | None:
+    """Normal of all that a scene shows of opaque surfaces, where that is the upper side of a ground; None elsewhere.
+
+    Bodies stand on it, so that no ray sees it from below.
+    """
+    if len(scene.opaque) != 1 or (ground := ground_of(scene)) is None:
+        return None
+    surface, eye = ground.ground.surface, scene.camera.eye
+    if surface is not None and (surface.normal_texture is not None or surface.diffuse_transmission > 0):
+        return None
+    level = scene.camera.fov_y is None
+    above = -float(scene.camera.forward @ ground.normal) if level else float(eye @ ground.normal) - ground.height
+    low, high = scene.boxes[scene.filled][:, 0], scene.boxes[scene.filled][:, 1]
+    lowest = np.where(ground.normal > 0, low, high) @ ground.normal - ground.height
+    return ground.normal if above > 0 and (lowest >= -SUNK * scene.diagonal).all() else None
+
+
+def _is_smooth(item: Object) -> bool:
+    surface = item.surface
+    return (
+        item.shadow_catcher
+        and surface is not None
+        and surface.ior != 1.0
+        and surface.metallic == 0
+        and surface.roughness <= MOST_ROUGHNESS
+        and surface.roughness_texture is None
+        and surface.normal_texture is None
+    )
+
+
+def _flat(item: Object) -> Mirror | None:
+    """Plane of a flat object; None for others."""
+    corners = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+    normal, thickness = _plane(item, corners)
+    return None if thickness > FLAT else Mirror(item, normal, float(corners[item.mesh.faces[0, 0]] @ normal))
+
+
+def _plane(item: Object, corners: Array) -> tuple[Array, float]:
+    """Mean unit normal (3,) of an object on its outer side, and its extent along that as a fraction of its size."""
+    faces = corners[item.mesh.faces]
+    normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0]).sum(axis=0)
+    normal *= -1.0 if item.mirrored else 1.0
+    if not (length := float(np.linalg.norm(normal))) > 0:
+        return normal, np.inf
+    away = faces - faces[0, 0]
+    return normal / length, float(np.abs(away @ (normal / length)).max() / np.abs(away).max())
+
+
+AnyScene = TypeVar("AnyScene", bound=Scene)
+
+
+def page_radiance(scene: Scene) -> float:
+    """Largest radiance, up to 1, that diffuse shadow catchers can show all over a scene.
+
+    Raises
+    ------
+    InputError
+        If light does not fall evenly on a shadow catcher, so that a shadow on it would look like that.
+    """
+    lit = [_irradiance(scene, item).min() / np.pi for item in scene.objects if item.shadow_catcher]
+    return float(min(1.0, *lit)) if lit else 1.0
+
+
+def before_page(scene: AnyScene, radiance: float) -> AnyScene:
+    """Scene before a background of even radiance, which unshadowed parts of its shadow catchers match."""
+    page = scene.environment.with_background(Environment.constant((radiance,) * 3))
+    objects = [_painted(scene, item, radiance) if item.shadow_catcher else item for item in scene.objects]
+    return dataclasses.replace(scene, environment=page, objects=objects)
+
+
+def _painted(scene: Scene, item: Object, radiance: float) -> Object:
+    color = np.clip(radiance * np.pi / _irradiance(scene, item), 0.0, 1.0)
+    one_sided = item.surface is not None and not item.surface.double_sided
+    return dataclasses.replace(item, surface=Surface(color=color, ior=1.0, roughness=1.0, double_sided=not one_sided))
+
+
+def _irradiance(scene: Scene, item: Object) -> Array:
+    """(3,): irradiance on the outer side of a shadow catcher that nothing shadows."""
+    what = f"a transparent frame with the shadow catcher {item.mesh.name!r}"
+    normal, thickness = _plane(item, item.mesh.vertices @ item.matrix[:3, :3].T)
+    if not normal.any():
+        raise InputError(what, "it has no area", "give it a flat mesh")
+    if thickness > FLAT:
+        raise InputError(what, "it is not flat", "give it a flat mesh, or render without transparency")
+    if any(not isinstance(light, DirectionalLight) for light in scene.lights):
+        do = "use DirectionalLight, or render without transparency"
+        raise InputError(what, "a light falls unevenly on it", do)
+    irradiance = scene.environment.irradiance_on(normal)
+    for light in scene.lights:
+        irradiance = irradiance + light.irradiance_on(np.zeros(3), normal)
+    if not (irradiance > 0).all():
+        raise InputError(what, "no light of one of the colors falls on it", "light it from above")
+    return np.asarray(irradiance)
