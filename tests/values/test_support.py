@@ -90,7 +90,8 @@ def test_large_meshes_are_framed_as_by_all_of_their_vertices(monkeypatch: pytest
             np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-13)
 
 
-def test_of_a_large_mesh_few_vertices_are_farthest() -> None:
-    support = Support(dented(), np.eye(4))
-    assert support.whole
-    assert len(support.farthest(np.eye(3))) < 0.5 * len(dented().vertices)
+def test_farthest_vertices_are_one_for_each_direction() -> None:
+    support, points = Support(dented(), MATRIX), dented().vertices @ MATRIX[:3, :3].T + MATRIX[:3, 3]
+    directions = np.random.default_rng(6).normal(size=(40, 3))
+    found = support.farthest(directions)
+    np.testing.assert_allclose((found * directions).sum(axis=1), (points @ directions.T).max(axis=0), rtol=1e-13)

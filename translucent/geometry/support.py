@@ -106,14 +106,17 @@ class Support:
         return self.many and _CLUSTERS[self._mesh].whole
 
     def farthest(self, directions: Array) -> Array:
-        """(n, 3): vertices in the world among which are those that are farthest along these directions (k, 3)."""
+        """(n, 3): vertices in the world: those that are farthest along these directions (k, 3); of few vertices all."""
         if not self.many:
             return self.points
-        first = self._first @ directions.T
-        most = (self._corners @ directions.T).reshape(8, *first.shape).max(axis=0)
-        reaching = (most >= first.max(axis=0)).any(axis=1)
-        reaching[first.argmax(axis=0)] = True  # also where its bounds do not reach it, by rounding
-        return self._placed(self._mesh.vertices[_CLUSTERS[self._mesh].members(reaching)])
+        vertices, clusters, found = self._mesh.vertices, _CLUSTERS[self._mesh], []
+        for along in directions @ self._matrix[:3, :3]:
+            reach = (clusters.corners @ along).max(axis=0)
+            best = np.arange(len(reach)) == reach.argmax()  # it has the farthest vertex, or one that is nearly as far
+            least = (vertices[clusters.members(best)] @ along).max()
+            members = clusters.members(best | (reach > least))
+            found.append(members[(vertices[members] @ along).argmax()])
+        return self._placed(vertices[found])
 
     def largest(self, values: Values) -> Array:
         """(k,): largest values over all vertices of functions that, on any box, are largest at one of its corners.
