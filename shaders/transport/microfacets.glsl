@@ -1,6 +1,6 @@
 // Rough interfaces: a random walk of light among the microfacets of a GGX surface, which loses none (Heitz et al. 2016,
 // "Multiple-scattering microfacet BSDFs with the Smith model"). Heights are not correlated, and evenly spread from 0 to 1.
-// The float64 twin is translucent/reference/microfacets.py. Needs lib/interface.glsl and random.glsl.
+// translucent/reference/microfacets.py is the same in float64. Needs lib/interface.glsl, shade/interface_bsdf.glsl and random.glsl.
 
 const int MOST_FACETS = 100;  // that light interacts with; at a roughness of 1 one path in a million gets as far
 const float LEVEL = 1e-6;       // largest slope of directions that stay at their height
@@ -36,44 +36,66 @@ vec3 visible_facet(vec3 towards, float alpha, vec2 shares) {
     return normalize(vec3(alpha * normal.xy, max(normal.z, 0.0)));
 }
 
+// Microfacets of an interface, and the film on each.
+struct RoughInterface {
+    float alpha;
+    float ior;         // of the other side relative to this
+    float ior_before;  // of this side
+    vec3 film;         // as in filmed_reflectance
+};
+
 // Density in 1/sr with which microfacets at a height turn light towards a light, unseen by others (Walter et al. 2007,
 // eq. 13 to 17).
-float turned_to(vec3 to_light, vec3 direction, float height, float ior, float alpha) {
+vec3 turned_to(vec3 to_light, vec3 direction, float height, RoughInterface rough) {
+    float ior = rough.ior, alpha = rough.alpha;
     bool back = to_light.z > 0.0;
     float across = back ? 1.0 : ior;
     vec3 half_way = across * to_light - direction;
     float size = length(half_way);
     float area = microfacet_slope(direction.z, alpha) * direction.z;
-    if (size <= LEVEL || area <= 0.0) { return 0.0; }
+    if (size <= LEVEL || area <= 0.0) { return vec3(0.0); }
     half_way *= (half_way.z < 0.0 ? -1.0 : 1.0) / size;
     float cos_way = -dot(direction, half_way), cos_light = dot(to_light, half_way);
-    if (cos_way <= 0.0 || (cos_light > 0.0) != back) { return 0.0; }
+    if (cos_way <= 0.0 || (cos_light > 0.0) != back) { return vec3(0.0); }
     float base = dot(half_way.xy, half_way.xy) + alpha * alpha * half_way.z * half_way.z;
     float facets = alpha / base * (alpha / base) / PI;
-    float fresnel = fresnel_dielectric(min(cos_way, 1.0), ior);
+    float cosine = min(cos_way, 1.0);
+    vec3 fresnel = film_over(rough.film, fresnel_dielectric(cosine, ior), cosine, ior, rough.ior_before);
     float leaving = pow(back ? height : 1.0 - height, microfacet_slope(max(abs(to_light.z), LEVEL), alpha));
     return (back ? fresnel : 1.0 - fresnel) * cos_way * facets * across * across * abs(cos_light) / (size * size)
         * leaving / area;
 }
 
 // Direction of light that leaves a rough interface; zero where it does not after very many microfacets. Directions are in a
-// frame whose third axis is the normal, on the side that light comes from; ior is that of the other side relative to this.
-// seen: density in 1/sr with which it turns to a light.
-vec3 scattered_at_microfacets(vec3 direction, float ior, float alpha, vec3 to_light, inout Draws draws, out float seen) {
+// frame whose third axis is the normal, on the side that light comes from, which has come with a throughput. weight: factor of
+// that, as films reflect some colors more than others; seen: density in 1/sr with which it turns to a light.
+vec3 scattered_at_microfacets(vec3 direction, RoughInterface rough, vec3 throughput, vec3 to_light, inout Draws draws,
+    out vec3 weight, out vec3 seen) {
+    RoughInterface below = RoughInterface(rough.alpha, 1.0 / rough.ior, rough.ior_before * rough.ior, rough.film);
+    float alpha = rough.alpha;
     float height = 1.0;
     float side = 1.0;  // below the surface all is as above it, turned upside down
-    seen = 0.0;
+    weight = vec3(1.0);
+    seen = vec3(0.0);
     for (int facet_number = 0; facet_number < MOST_FACETS; ++facet_number) {
         vec4 shares = random_shares(draws);
         if (leaves_surface(side * direction, alpha, shares.x, height)) { return direction; }
-        float relative = side > 0.0 ? ior : 1.0 / ior;
+        RoughInterface here = below;
+        if (side > 0.0) { here = rough; }
 #if LIGHTS
-        seen += turned_to(side * to_light, side * direction, height, relative, alpha);
+        seen += weight * turned_to(side * to_light, side * direction, height, here);
 #endif
         vec3 facet = side * visible_facet(-side * direction, alpha, shares.yz);
         float cosine = clamp(-dot(direction, facet), 0.0, 1.0);
-        bool passes = shares.w >= fresnel_dielectric(cosine, relative);
-        direction = normalize(passes ? refracted_direction(direction, facet, relative) : reflected_direction(direction, facet));
+        float chance = fresnel_dielectric(cosine, here.ior);
+        vec3 reflected = film_over(here.film, chance, cosine, here.ior, here.ior_before);
+        if (here.film.x > 0.0) {
+            vec3 light = throughput * weight;
+            chance = dot(light, reflected) / max(dot(light, vec3(1.0)), 1e-30);
+        }
+        bool passes = shares.w >= chance;
+        if (here.film.x > 0.0) { weight *= passes ? (1.0 - reflected) / max(1.0 - chance, 1e-30) : reflected / max(chance, 1e-30); }
+        direction = normalize(passes ? refracted_direction(direction, facet, here.ior) : reflected_direction(direction, facet));
         if (passes) {
             side = -side;
             height = 1.0 - height;  // heights count upwards on either side

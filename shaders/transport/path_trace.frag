@@ -188,12 +188,12 @@ void scatter(inout Path path, Medium medium, int effective, inout Draws draws) {
 }
 
 // Adds the light of one of the lights that the microfacets of a rough interface turn into the path. seen: density of that in 1/sr.
-void add_light_at_facets(inout Path path, Interaction at, SurfaceHit surface, LightSample arriving, float seen) {
+void add_light_at_facets(inout Path path, Interaction at, SurfaceHit surface, LightSample arriving, vec3 seen) {
 #if LIGHTS
     // Light that comes from the other side of the face than of the smooth surface does not exist.
     float side = dot(arriving.towards, at.normal) < 0.0 ? -1.0 : 1.0;
     float across = dot(arriving.towards, at.face_normal);
-    if (seen <= 0.0 || side * across <= 0.0) { return; }
+    if (seen == vec3(0.0) || side * across <= 0.0) { return; }
     float skipped;
     vec3 origin = origin_beside(at.point, at.face_normal, arriving.towards, skipped);
     vec3 through = straight_transmittance(origin, skipped, side > 0.0 ? path.interior : surface.interior, arriving.towards,
@@ -226,10 +226,10 @@ void interact(inout Path path, SurfaceHit surface, ObjectRow body, int before, i
 #if LIGHTS
     if (is_rough(at)) { arriving = light_drawn(min(int(shares.y * float(light_count)), light_count - 1), at.point, draws); }
 #endif
-    float seen;
-    Branch next = sampled_branch(at, lobes, path.throughput, shares.x, arriving.towards, draws, seen);
+    vec3 seen;
+    Branch next = sampled_branch(at, body, lobes, path.throughput, shares.x, arriving.towards, draws, seen);
     add_light_at_facets(path, at, surface, arriving, seen);
-    add_base(path, at, body, is_rough(at) ? vec3(next.transmitted ? 1.0 : 0.0) : lobes.transmission);
+    add_base(path, at, body, next.on_base);
     path.throughput *= next.weight;
     if (next.transmitted) {
         path.interior = surface.interior;

@@ -89,8 +89,8 @@ void interact(inout Photon photon, SurfaceHit surface, ObjectRow body, int befor
     Interaction at = interaction_at(surface, body, point, photon.direction, normal, before, after, channel);
     vec4 shares = random_shares(draws);
     vec3 emitted;
-    float seen;
-    Branch next = sampled_branch(at, polished_lobes(at, body, emitted), photon.throughput, shares.x, vec3(0.0), draws, seen);
+    vec3 seen;
+    Branch next = sampled_branch(at, body, polished_lobes(at, body, emitted), photon.throughput, shares.x, vec3(0.0), draws, seen);
     photon.throughput *= next.weight;
     if (next.transmitted) { photon.interior = surface.interior; }
     photon.bent = photon.bent || !next.transmitted || (!at.thin_walled && at.ior != 1.0);

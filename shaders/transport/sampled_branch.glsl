@@ -4,6 +4,7 @@
 struct Branch {
     vec3 direction;
     vec3 weight;       // factor of the throughput
+    vec3 on_base;      // factor of what comes to the base, of all light or of this branch's
     bool transmitted;
     bool lost;         // among very many microfacets
 };
@@ -17,11 +18,16 @@ bool is_rough(Interaction at) {
 #endif
 }
 
+// Fraction that a clear coat, taken for polished, reflects of light that comes from outside.
+float coat_at(Interaction at, ObjectRow body) {
+    return at.outside || at.thin_walled ? polished_coat_reflectance(body.clearcoat, cosine_of(at)) : 0.0;
+}
+
 // Lobes of an interface whose roughness is left out, with a polished clear coat, and the radiance that a thin wall emits.
 Lobes polished_lobes(Interaction at, ObjectRow body, out vec3 emitted) {
     float cosine = cosine_of(at);
     Lobes lobes = interface_lobes(at, body, fresnel_dielectric(cosine, at.ior), emitted);
-    float coat = at.outside || at.thin_walled ? polished_coat_reflectance(body.clearcoat, cosine) : 0.0;
+    float coat = coat_at(at, body);
     emitted *= 1.0 - coat;
     lobes = below_coat(lobes, coat);
     lobes.reflection += coat;
@@ -30,23 +36,33 @@ Lobes polished_lobes(Interaction at, ObjectRow body, out vec3 emitted) {
 
 // A branch by a random number, as likely as the light that it carries. to_light: for rough interfaces, with seen: density in 1/sr
 // with which they turn light there.
-Branch sampled_branch(Interaction at, Lobes lobes, vec3 throughput, float share, vec3 to_light, inout Draws draws, out float seen) {
+Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughput, float share, vec3 to_light, inout Draws draws,
+    out vec3 seen) {
     Branch branch;
     branch.lost = false;
-    seen = 0.0;
+    seen = vec3(0.0);
     vec3 passing = passing_base(at);
 #if ROUGH
-    if (is_rough(at)) {
+    if (is_rough(at) && share < coat_at(at, body)) {
+        branch.transmitted = false;
+        branch.weight = vec3(1.0);
+        branch.on_base = vec3(0.0);
+        branch.direction = reflected_direction(at.direction, at.normal);
+    } else if (is_rough(at)) {
         mat3 frame = frame_around(at.normal);
-        vec3 local = scattered_at_microfacets(at.direction * frame, at.ior, at.roughness * at.roughness, to_light * frame, draws, seen);
+        RoughInterface rough = RoughInterface(at.roughness * at.roughness, at.ior, at.ior_before, body.film);
+        vec3 weight;
+        vec3 local = scattered_at_microfacets(at.direction * frame, rough, throughput, to_light * frame, draws, weight, seen);
         branch.lost = local == vec3(0.0);
         branch.transmitted = local.z < 0.0;
-        branch.weight = branch.transmitted ? passing : vec3(1.0);
+        branch.weight = branch.transmitted ? weight * passing : weight;
+        branch.on_base = branch.transmitted ? weight : vec3(0.0);
         branch.direction = frame * local;
     } else
 #endif
     {
         vec3 on = lobes.transmission * passing;
+        branch.on_base = lobes.transmission;
         float back = dot(throughput, lobes.reflection);
         float chance = back / max(back + dot(throughput, on), 1e-30);
         branch.transmitted = share >= chance;

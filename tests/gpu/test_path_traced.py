@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -70,6 +71,10 @@ SCENES = {
         60,
     ),
     "film, coat and base": (tl.Scene([ball(GLASS, COATED)], CAMERA, [], SKY), 120),
+    "film and coat on rough glass": (
+        tl.Scene([ball(GLASS, replace(COATED, roughness=0.5))], CAMERA, [SUN], SKY),
+        120,
+    ),
     "a cloud": (tl.Scene([ball(tl.Medium(0.0, 3.0, phase=tl.WaterDroplets(2e-5)))], CAMERA, [SUN], SKY), 80),
     "two smokes, of two shapes": (
         tl.Scene(
@@ -121,6 +126,11 @@ def test_lossless_bodies_vanish_in_a_furnace(renderer: tl.Renderer) -> None:
     assert frame.standard_error is not None
     require_normal(scores(frame.radiance - 1.0, np.square(frame.standard_error, dtype=np.float64)))
     assert frame.standard_error.max() < 0.1
+    # Films and coats take nothing, either.
+    surface = replace(FROSTED, iridescence=1.0, iridescence_ior=2.0, iridescence_thickness=3e-7, clearcoat=0.5)
+    frame = renderer.render(tl.Scene([ball(medium, surface)], CAMERA, [], WHITE), SIZE, tl.PathTraced(1000))
+    assert frame.standard_error is not None
+    require_normal(scores(frame.radiance - 1.0, np.square(frame.standard_error, dtype=np.float64)))
 
 
 def test_a_dark_pane_in_closed_form(renderer: tl.Renderer) -> None:

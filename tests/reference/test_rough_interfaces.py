@@ -77,11 +77,11 @@ def test_light_turned_to_lamps_is_the_density_of_directions(
     way, every = [math.sqrt(1 - cosine**2), 0.0, -cosine], np.ones(count)
     lamps = rng.normal(size=(count, 3))
     lamps /= np.linalg.norm(lamps, axis=1, keepdims=True)
-    found, _, seen = lit_at_interface(
+    found, _, _, seen = lit_at_interface(
         np.tile(way, (count, 1)), np.tile([0.0, 0.0, 1.0], (count, 1)), ior * every, alpha * every, lamps[None], rng
     )
     # What is hidden deep enough underflows.
-    shown = 4 * np.pi * np.where(seen[0] < 1e-100, 0.0, seen[0])
+    shown = 4 * np.pi * np.where(seen[0, :, 0] < 1e-100, 0.0, seen[0, :, 0])
     for value in (
         lambda v: v[:, 2] > 0,
         lambda v: v[:, 2] < 0,

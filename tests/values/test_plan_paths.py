@@ -55,8 +55,7 @@ def test_nobody_gets_paths_unasked() -> None:
     [
         ([body()], NoteKind.LIGHTS_LEFT_OUT, "polished interfaces bend"),
         ([body(surface=Surface(dispersion=1.0))], NoteKind.REFRACTION, "bend all colors alike"),
-        ([body(surface=Surface(iridescence=0.5, roughness=0.2))], NoteKind.COATS, "thin films on rough interfaces"),
-        ([body(surface=Surface(clearcoat=0.5, clearcoat_roughness=0.2))], NoteKind.COATS, "clear coats that are rough"),
+        ([body(surface=Surface(clearcoat=0.5, clearcoat_roughness=0.2))], NoteKind.COATS, "roughness of clear coats"),
         ([body(surface=Surface(emissive=(1, 1, 1)))], NoteKind.GLOW, "surfaces that emit"),
         ([body(), body(None, 2.0)], NoteKind.SHADOWS, "opaque objects"),
     ],

@@ -195,9 +195,13 @@ class Interactions:
             chance = share_back.mean(axis=1)
             passed = self.rng.random(len(chosen)) >= chance
             rough = np.flatnonzero((self.alpha[chosen] > 0) & (self.ior[chosen] != 1.0))
-            back_way[rough], passed[rough] = self._at_microfacets(chosen[rough], self.rng)
+            coated = self.coated[chosen[rough], 0]
+            mirrored = self.rng.random(len(rough)) < coated if coated.any() else np.zeros(len(rough), dtype=bool)
+            passed[rough], weight = False, np.ones((len(rough), 3))
+            walking = rough[~mirrored]
+            back_way[walking], passed[walking], weight[~mirrored] = self._at_microfacets(chosen[walking], self.rng)
             on_way[rough] = back_way[rough]
-            share_back, share_on = _by_chance(share_back, chance, passed, rough)
+            share_back, share_on = _by_chance(share_back, chance, passed, rough, weight)
         back, on = np.flatnonzero((share_back > 0.0).any(axis=1)), np.flatnonzero((share_on > 0.0).any(axis=1))
         passing = (share_on * self._passing(chosen))[on]
         back_way, on_way = _towards(back_way, self.faces[chosen]), _towards(on_way, -self.faces[chosen])
@@ -207,14 +211,19 @@ class Interactions:
         refracted = live.where(on).turned(on_way[on], passing, there.where(chosen[on]), bent=True, reflected=False)
         return [reflected, refracted], share_on
 
-    def _at_microfacets(self, chosen: Integers, rng: np.random.Generator) -> tuple[Array, Mask]:
-        """Directions from rough interfaces, and whether they pass; adds what lights emit."""
+    def _at_microfacets(self, chosen: Integers, rng: np.random.Generator) -> tuple[Array, Mask, Array]:
+        """Directions from rough interfaces, whether they pass, and weights (k, 3); adds what lights emit."""
         directions, normals, points = self.live.rays.directions[chosen], self.normals[chosen], self.live.rays.origins
-        lights = None if self.lights is None else self.lights.at_interfaces(points[chosen])
+        lights = np.empty((0, len(chosen), 3)) if self.lights is None else self.lights.at_interfaces(points[chosen])
+        item, sides = self.interfaces.item[chosen], (self.interfaces.after[chosen], self.interfaces.before[chosen])
+
+        def films(ray: Integers, above: Mask, bare: Array, cosine: Array, ior: Array) -> Array:
+            before = np.where(above, sides[1][ray], sides[0][ray])
+            return self.own.filmed(bare, item[ray], before, cosine, ior)
+
         found = directions, normals, self.ior[chosen], self.alpha[chosen]
-        if lights is None or not len(lights):
-            return scattered_at_interface(*found, rng)
-        way, passed, seen = lit_at_interface(*found, lights, rng)
+        filmed = films if self._table("iridescence")[chosen].any() else None
+        way, passed, weight, seen = lit_at_interface(*found, lights, rng, filmed)
         for number, to_light in enumerate(lights):
             across, by_face = (np.einsum("ki,ki->k", to_light, n) for n in (normals, self.faces[chosen]))
             for side, passing, inside in (
@@ -222,10 +231,10 @@ class Interactions:
                 (-1.0, self._passing(chosen), self.interfaces.there),
             ):
                 # Light that comes from the other side of the face than of the smooth surface does not exist.
-                some = np.flatnonzero((seen[number] > 0) & (side * across > 0) & (side * by_face > 0))
-                to_eye = passing[some] * seen[number, some, None]
+                some = np.flatnonzero((seen[number] > 0).any(axis=1) & (side * across > 0) & (side * by_face > 0))
+                to_eye = passing[some] * seen[number, some]
                 self.radiance[chosen[some]] += self._arriving(number, chosen[some], inside, to_eye)
-        return way, passed
+        return way, passed, weight
 
     def _arriving(self, number: int, chosen: Integers, inside: Inside, share: Array) -> Array:
         """(k, 3): fraction (k, 3) of what one light emits."""
@@ -342,14 +351,14 @@ class Interactions:
                 self.radiance[rough[lit]] += mirrored[lit] * self.light.to_interfaces(light, points[lit])
 
 
-def _by_chance(back: Array, chance: Array, passed: Mask, rough: Integers) -> tuple[Array, Array]:
+def _by_chance(back: Array, chance: Array, passed: Mask, rough: Integers, weight: Array) -> tuple[Array, Array]:
     """Shares (k, 3) of light that is reflected, or has `passed`; it was reflected with a `chance` (k,) for all colors.
 
-    Walks among `rough` interfaces lose nothing.
+    Walks at `rough` interfaces have a `weight` (rough, 3).
     """
     share_back = np.where(passed[:, None], 0.0, back / np.where(chance > 0.0, chance, 1.0)[:, None])
     share_on = np.where(passed[:, None], (1.0 - back) / np.where(chance < 1.0, 1.0 - chance, 1.0)[:, None], 0.0)
-    share_back[rough], share_on[rough] = ~passed[rough, None], passed[rough, None]
+    share_back[rough], share_on[rough] = weight * ~passed[rough, None], weight * passed[rough, None]
     return share_back, share_on
 
 

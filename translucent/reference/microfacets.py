@@ -7,15 +7,21 @@ reflects or refracts by Fresnel and Snell, and no light is lost. Normals as they
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from translucent.arrays import Array, Mask
+from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import optics
 from translucent.formulas.interface import ggx_distribution, reflected_direction, refracted_direction
 
 #: Number of interactions with microfacets after which light counts as lost; at a roughness of 1 one in a million gets
 #: as far.
 MOST_INTERACTIONS = 100
+
+#: Reflectance (n, 3) of microfacets with films, given rays (n,), whether these come from above (n,), the reflectance
+#: without films, the cosine of incidence and the relative index, (n,) each.
+Films = Callable[[Integers, Mask, Array, Array, Array], Array]
 
 #: Largest slope of directions that stay at their height.
 LEVEL = 1e-6
@@ -43,14 +49,22 @@ def scattered_at_interface(
         Zero where light is lost.
     passed : (n,) bool
     """
-    found, passed, _ = lit_at_interface(directions, normals, ior, alpha, np.empty((0, *directions.shape)), rng)
+    found, passed, _, _ = lit_at_interface(directions, normals, ior, alpha, np.empty((0, *directions.shape)), rng)
     return found, passed
 
 
 def lit_at_interface(
-    directions: Array, normals: Array, ior: Array, alpha: Array, to_lights: Array, rng: np.random.Generator
-) -> tuple[Array, Mask, Array]:
-    """As `scattered_at_interface`, and an estimate (lights, n) in 1/sr of how much light turns to each of `to_lights`.
+    directions: Array,
+    normals: Array,
+    ior: Array,
+    alpha: Array,
+    to_lights: Array,
+    rng: np.random.Generator,
+    films: Films | None = None,
+) -> tuple[Array, Mask, Array, Array]:
+    """As `scattered_at_interface`, with the weight (n, 3) of the light, which is 1 without films.
+
+    And an estimate (lights, n, 3) in 1/sr of how much light turns to each of `to_lights`.
 
     At each microfacet, as much as it sends there and as gets past the others (Heitz et al. 2016, section 5.3); the
     density of the random directions, if they were many.
@@ -59,9 +73,12 @@ def lit_at_interface(
     ----------
     to_lights : (lights, n, 3) float64
         Unit vectors to point, spot and directional lights, on either side.
+    films : callable, optional
+        See `Films`.
     """
     axes = _axes(normals)
-    found, seen = np.zeros_like(directions), np.zeros(to_lights.shape[:2])
+    found, seen = np.zeros_like(directions), np.zeros(to_lights.shape)
+    weight = np.ones_like(directions)
     lights = np.einsum("kij,lkj->lki", axes, to_lights)
     above = np.ones(len(directions), dtype=bool)
     ray = np.arange(len(directions))
@@ -77,19 +94,38 @@ def lit_at_interface(
             break
         relative = np.where(above[ray], ior[ray], 1.0 / ior[ray])
         for light, own in zip(lights, seen, strict=True):
-            own[ray] += _turned_to(side * light[ray], side * way, height, relative, alpha[ray])
+            density, reflects, cosine = _turned_to(side * light[ray], side * way, height, relative, alpha[ray])
+            share = _reflectance(ray, above, cosine, relative, films)
+            with np.errstate(under="ignore"):
+                own[ray] += weight[ray] * density[:, None] * np.where(reflects[:, None], share, 1.0 - share)
         facet = side * _visible_normals(-side * way, alpha[ray], rng)
-        way, passed = _interact(way, facet, relative, rng)
+        cosine = np.clip(-np.einsum("ki,ki->k", way, facet), 0.0, 1.0)
+        share = _reflectance(ray, above, cosine, relative, films)
+        # As likely as the mean of all colors, each of which counts for as much as there is of it.
+        chance = share.mean(axis=1)
+        passed = rng.random(len(way)) >= chance
+        if films is not None:
+            passing = (1.0 - share) / np.where(chance < 1.0, 1.0 - chance, 1.0)[:, None]
+            weight[ray] *= np.where(passed[:, None], passing, share / np.where(chance > 0.0, chance, 1.0)[:, None])
+        way = np.where(passed[:, None], refracted_direction(way, facet, relative), reflected_direction(way, facet))
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
         above[ray] ^= passed
         # Heights count upwards on either side.
         height = np.where(passed, 1.0 - height, height)
-    return np.einsum("kji,kj->ki", axes, found), ~above, seen
+    return np.einsum("kji,kj->ki", axes, found), ~above, weight, seen
+
+
+def _reflectance(ray: Integers, above: Mask, cosine: Array, ior: Array, films: Films | None) -> Array:
+    """(k, 3): reflectance of microfacets that rays (k,) of those that are `above` (n,), or below, come to."""
+    bare = optics.fresnel_dielectric(cosine, ior)
+    return np.repeat(bare[:, None], 3, axis=1) if films is None else films(ray, above[ray], bare, cosine, ior)
 
 
 @np.errstate(under="ignore")
-def _turned_to(light: Array, way: Array, height: Array, ior: Array, alpha: Array) -> Array:
-    """(n,): density in 1/sr with which microfacets at `height` turn light on its `way` (n, 3) to `light` (n, 3), unseen
-    by others.
+def _turned_to(light: Array, way: Array, height: Array, ior: Array, alpha: Array) -> tuple[Array, Mask, Array]:
+    """Density (n,) in 1/sr with which microfacets at `height` may turn light on its `way` (n, 3) to `light` (n, 3).
+
+    It is to be multiplied by what they reflect, where they do (n,), or let pass, at a cosine of incidence (n,).
 
     Visible normals have the density (m.w) D / (Lambda w_z); Walter et al. 2007, eq. 13 to 17, make one of directions.
     """
@@ -100,19 +136,10 @@ def _turned_to(light: Array, way: Array, height: Array, ior: Array, alpha: Array
     cos_way, cos_light = -np.einsum("ki,ki->k", way, half), np.einsum("ki,ki->k", light, half)
     area = _lambda(way[:, 2], alpha) * way[:, 2]
     turns = (cos_way > 0) & ((cos_light > 0) == back) & (length > LEVEL) & (area > 0)
-    fresnel = optics.fresnel_dielectric(np.clip(cos_way, 0.0, 1.0), ior)
     stretch = across * across * np.abs(cos_light) / np.where(turns, length, 1.0) ** 2
-    density = np.where(back, fresnel, 1.0 - fresnel) * cos_way * ggx_distribution(np.abs(half[:, 2]), alpha) * stretch
+    density = cos_way * ggx_distribution(np.abs(half[:, 2]), alpha) * stretch
     leaves = np.where(back, height, 1.0 - height) ** _lambda(np.maximum(np.abs(light[:, 2]), LEVEL), alpha)
-    return np.where(turns, density * leaves / np.where(turns, area, 1.0), 0.0)
-
-
-def _interact(way: Array, facet: Array, ior: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
-    """Directions (n, 3) after meeting microfacets (n, 3), and whether the light is transmitted."""
-    cosine = np.clip(-np.einsum("ki,ki->k", way, facet), 0.0, 1.0)
-    passed = rng.random(len(way)) >= optics.fresnel_dielectric(cosine, ior)
-    turned = np.where(passed[:, None], refracted_direction(way, facet, ior), reflected_direction(way, facet))
-    return turned / np.linalg.norm(turned, axis=1, keepdims=True), passed
+    return np.where(turns, density * leaves / np.where(turns, area, 1.0), 0.0), back, np.clip(cos_way, 0.0, 1.0)
 
 
 @np.errstate(under="ignore", over="ignore", divide="ignore")

@@ -126,7 +126,7 @@ def _check(scene: Scene, paths: int, max_events: int | None) -> None:
         raise InputError(f"path tracing with {paths} paths", "no spread without two", "use for example 64")
     if max_events is not None and max_events < 0:
         raise InputError(f"max_events {max_events}", "below 0", "use 1 for single scattering, None for no limit")
-    check_untextured(scene, "use tl.reference.render with refraction=False")
+    check_untextured(scene, "use tl.reference.render with refraction=False", random=True)
     for body in scene.bodies:
         if body.sheet_thickness is None and not body.mesh.diagnosis.solid:
             raise InputError(f"path tracing {body.mesh.name!r}", "not closed", "use tl.reference.render")

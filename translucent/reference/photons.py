@@ -77,7 +77,7 @@ def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> Landed
     """
     if photons < 1:
         raise InputError(f"{photons} photons", "no light without any", "use for example 100_000")
-    check_untextured(scene, "photons follow even interfaces alone")
+    check_untextured(scene, "photons follow even interfaces alone", random=True)
     for body in scene.bodies:
         if body.sheet_thickness is None and not body.mesh.diagnosis.solid:
             raise InputError(f"photons through {body.mesh.name!r}", "not closed", "close it, or declare it a sheet")

@@ -171,10 +171,11 @@ def _check(scene: Scene, bounces: int, paths: int) -> None:
     check_untextured(scene, "use refraction=False")
 
 
-def check_untextured(scene: Scene, instead: str) -> None:
+def check_untextured(scene: Scene, instead: str, *, random: bool = False) -> None:
     """Check that interfaces are the same all over each body, and what lies on them is polished.
 
-    Errors say what to do `instead`.
+    Errors say what to do `instead`. `random`: paths are followed by chance, which know films on rough interfaces of
+    solids, and polished coats on these.
     """
     for body in scene.bodies:
         if body.covers or not body.has_interface:
@@ -185,7 +186,8 @@ def check_untextured(scene: Scene, instead: str) -> None:
         surface = body.surface
         if surface is not None and (surface.iridescence or surface.clearcoat):
             rough = surface.clearcoat_roughness if surface.clearcoat else 0.0
-            if max(surface.roughness, rough) > 0.0:
+            walks = random and body.sheet_thickness is None
+            if max(0.0 if walks else surface.roughness, rough) > 0.0:
                 what = f"reference of {body.mesh.name!r}"
                 raise InputError(
                     what, "a film or a clear coat on it that is rough", f"give it a polished one, or {instead}"

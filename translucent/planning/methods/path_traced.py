@@ -93,14 +93,8 @@ class PathTraced(Method):
         if dispersive := [body for body, surface in surfaces if surface.dispersion > 0.0]:
             text = f"dispersion: {object_names(dispersive)} bend all colors alike"
             notes.append(Note(NoteKind.REFRACTION, text))
-        rough = [
-            body
-            for body, surface in surfaces
-            if (surface.iridescence > 0.0 and surface.roughness > 0.0)
-            or (surface.clearcoat > 0.0 and max(surface.roughness, surface.clearcoat_roughness) > 0.0)
-        ]
-        if rough:
-            text = f"thin films on rough interfaces, and clear coats that are rough or on them: {object_names(rough)}"
+        if rough := [body for body, one in surfaces if one.clearcoat > 0.0 and one.clearcoat_roughness > 0.0]:
+            text = f"roughness of clear coats: {object_names(rough)} have polished ones"
             notes.append(Note(NoteKind.COATS, text))
         textured = [body for body, surface in surfaces if any(one is not None for one in surface.textures)]
         textured += [body for body in scene.bodies if body.mesh.colors is not None and body not in textured]
