@@ -17,7 +17,7 @@ from scipy import sparse
 import translucent as tl
 from translucent.arrays import Array
 from translucent.assets import mesh_path
-from translucent.diffusion.entering import Casters, from_light
+from translucent.diffusion.entering import Occluders, from_light
 from translucent.diffusion.field import lit_body
 from translucent.diffusion.solution import BodySystem
 from translucent.formulas import interface, optics
@@ -82,7 +82,7 @@ def diffused(medium: tl.Medium, radius: float) -> Array:
     body = tl.Object(Sphere(radius=radius).tessellate(64), medium)
     grid = lit_body(body, None, tl.Diffusion(32).cell_size(body)).grid
     skin, sun = diffuse_interface(medium.ior), tl.DirectionalLight((0, 0, -1), (1, 1, 1))
-    rays = from_light(grid, Casters(body), sun, medium.ior, skin)
+    rays = from_light(grid, Occluders(body), sun, medium.ior, skin)
     dark = np.zeros((len(grid.points), 3))
     nothing = sparse.csr_array((len(dark), len(dark)))
     found = BodySystem(grid, medium, 0.0).solved(dark, nothing, np.zeros((grid.count, 3)), [rays])

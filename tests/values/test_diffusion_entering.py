@@ -24,7 +24,7 @@ from tests.values.diffusing import (
 )
 from translucent.diffusion import entering
 from translucent.diffusion.cache import diffusion_key
-from translucent.diffusion.entering import Casters, from_light, opaque_surfaces
+from translucent.diffusion.entering import Occluders, from_light, opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
 from translucent.diffusion.grid import other_plane_points, plane_points
 from translucent.formulas import optics
@@ -76,7 +76,7 @@ def test_light_of_a_sun_goes_on_as_it_falls(rng: np.random.Generator) -> None:
     medium, grid = tl.Medium(absorption=0.5, scattering=4.5), ball_grid(20)
     exact = sunlit_ball(5.0, 0.9, 12000, 6, rng)
     ball, sun = tl.Object(BALL, medium), tl.DirectionalLight((0, 0, -1), (1, 1, 1))
-    rays = from_light(grid, Casters(ball), sun, 1.0, diffuse_interface(1.0))
+    rays = from_light(grid, Occluders(ball), sun, 1.0, diffuse_interface(1.0))
     np.testing.assert_allclose(rays.directions, np.broadcast_to([0, 0, -1.0], rays.directions.shape), atol=1e-12)
     zone = np.minimum((3 * (grid.points[:, 2] + 1)).astype(int), 5)
     off = []
@@ -204,7 +204,9 @@ def test_opaque_objects_shadow_a_directional_light() -> None:
     plate = tl.Object(Box((-0.5, 2, -3), (3, 2.1, 3)).tessellate(), None)
     grid = ball_grid(16)
     free, shadowed = (
-        entering_of(grid, from_light(grid, Casters(ball, opaque_surfaces(opaque)), light, 1.5, diffuse_interface(1.5)))
+        entering_of(
+            grid, from_light(grid, Occluders(ball, opaque_surfaces(opaque)), light, 1.5, diffuse_interface(1.5))
+        )
         for opaque in ((), (plate,))
     )
     beside = grid.points[:, 0] < -0.5
@@ -240,7 +242,7 @@ def test_a_lamp_just_outside_is_not_inside() -> None:
 def test_all_light_of_a_lamp_however_near_falls_onto_the_face_below_it(height: float) -> None:
     """Intensity times the solid angle of the face; samples are 0.04 from each other, and so is what is left of it."""
     mesh = Box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)).tessellate()
-    grid, casters = grid_of(mesh, 24), Casters(tl.Object(mesh, tl.Medium(scattering=1.0)))
+    grid, casters = grid_of(mesh, 24), Occluders(tl.Object(mesh, tl.Medium(scattering=1.0)))
     for x, z in ((0.0, 0.0), (0.013, -0.11), (0.1, 0.071)):
         rays = from_light(grid, casters, tl.PointLight((x, 0.5 + height, z), (1, 1, 1)), 1.5, diffuse_interface(1.5))
         flux = float((rays.entering + rays.mirrored)[:, 0].sum() * grid.area)

@@ -53,7 +53,7 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class PictureRays:
-    """Picture plane: positions of the rays of a camera.
+    """Pixel rays of a camera, by bands of rows.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class PictureRays:
 
     @property
     def perspective(self) -> bool:
-        """True if the rays meet in the eye."""
+        """True for a perspective camera, False for an orthographic one."""
         return self.camera.fov_y is not None
 
     def bands(self) -> Iterator[Band]:
@@ -124,7 +124,7 @@ PAIRS = 1 << 13
 
 @dataclass(frozen=True, eq=False)
 class ProjectedObject:
-    """One object, projected into one picture."""
+    """Object projected into the image plane of a camera."""
 
     body: Object
     picture: PictureRays
@@ -146,14 +146,14 @@ class ProjectedObject:
 
     @cached_property
     def beside(self) -> Mask:
-        """(n,): vertices in the plane of the eye, or nearly; they have no place in the picture."""
+        """(n,): vertices in the plane of the eye, or nearly, which have no projection."""
         if not self.picture.perspective:
             return np.zeros(len(self.vertices), dtype=bool)
         return np.asarray(np.abs(self.vertices[:, :2]).max(axis=1) >= STEEPEST * np.abs(self.vertices[:, 2]))
 
     @cached_property
     def passing(self) -> Mask:
-        """(m,): faces that pass the plane of the eye, or nearly; in the picture they are no triangles."""
+        """(m,): faces that cross the plane of the eye, or nearly, whose projections are no triangles."""
         front = self.weight > 0
         return np.asarray(self.beside[self.body.mesh.faces].any(axis=1) | (front.any(axis=1) != front.all(axis=1)))
 
@@ -389,7 +389,7 @@ class PixelTracer:
 
 
 class ExactRayCaster(SceneRayCaster):
-    """Ray caster for the objects of a scene, which also finds in float64 what float32 does not."""
+    """Ray caster for the objects of a scene, with a slow search in float64 for rays on which float32 fails."""
 
     def __init__(self, objects: Sequence[Object]) -> None:
         super().__init__(objects)

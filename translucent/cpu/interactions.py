@@ -153,7 +153,7 @@ def interact(
     pixel: Integers,
     spread: MicrofacetSamples | None,
 ) -> BranchInteractions:
-    """Reflection and refraction of branches that have come to interfaces, on microfacets if there is a `spread`."""
+    """Reflect and refract branches at interfaces, at random microfacets if there is a `spread`."""
     directions, item = branches.directions, places.item
     normals = caster.facing_normals(places.face, branches.origins, directions)
     at = table.interaction(item, places.before, places.after, channel, directions, normals)
@@ -161,7 +161,7 @@ def interact(
     facets, bare = at.normal, optics.fresnel_dielectric(at.cosine(at.normal), at.ior)
     rough = np.flatnonzero(alpha > 0)
     if spread is not None and rough.size:
-        facets, points = facets.copy(), spread.at(pixel[rough], branches.met[rough])
+        facets, points = facets.copy(), spread.at(pixel[rough], branches.depth[rough])
         sampled = alpha[rough] * np.sqrt(1.0 - spread.blurred)
         found = microfacet_normal(at.normal[rough], directions[rough], sampled, np.stack(points, axis=1))
         facets[rough], bare[rough] = _at_facets(at.where(rough), found, alpha[rough])
@@ -193,7 +193,7 @@ def interact(
 
 
 def _at_facets(at: Interaction, facets: Array, alpha: Array) -> tuple[Array, Array]:
-    """Microfacets (k, 3) that light leaves, and the fraction (k,) that they reflect.
+    """Microfacets (k, 3) whose light is not masked, and the fraction (k,) that they reflect.
 
     Light that other microfacets would block leaves by the other branch: each has the part of Fresnel's share that
     Smith's masking lets out (Heitz 2014, eq. 43), and together they have all. Where nothing is let out, the surface

@@ -131,8 +131,8 @@ class Branches:
         Ray of the picture that it is a part of.
     interior : (n, MOST) int16
         Bodies that it is inside.
-    met : (n,) int64
-        Interfaces met before.
+    depth : (n,) int64
+        Number of interfaces before.
     forks : (n,) int64
         Interfaces at which it may still become two.
     last : (n, groups) int64
@@ -152,7 +152,7 @@ class Branches:
     throughput: Array
     owner: Integers
     interior: InteriorList
-    met: Integers
+    depth: Integers
     forks: Integers
     last: Integers
     reflected: Mask

@@ -1,4 +1,4 @@
-"""Radiance along rays that bend: a ray tree through the meshes of a scene, all segments of a level at once.
+"""Radiance along rays that reflect and refract: a ray tree through the scene, all segments of a level at once.
 
 Nested dielectrics are those of Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images". All radiance is
 basic radiance L / n^2, which does not change where light enters a denser medium; emission counts as it would in a
@@ -27,7 +27,7 @@ from translucent.cpu.interior_list import (
     joined,
     leave,
 )
-from translucent.cpu.surroundings import Surroundings, first_footprints, moved_on, parted
+from translucent.cpu.surroundings import Surroundings, first_footprints, moved_on, split_footprints
 from translucent.cpu.threads import end_if_stopped
 from translucent.diffusion.field import DiffusionField
 from translucent.diffusion.interfaces import InterfaceTable
@@ -270,7 +270,7 @@ class _Growth:
             rays.directions,
             np.tile(carried, (count, 1)),
             np.arange(count),
-            self._records(hits, count),
+            self._interior_lists(hits, count),
             np.zeros(count, np.int64),
             np.full(count, self.tree.forks),
             np.full((count, self.caster.groups), -1),
@@ -288,7 +288,7 @@ class _Growth:
         samples = 1 if self.spread is None else self.spread.samples
         return first_footprints(self.scene.camera, directions, seen * self.tree.pixel, samples, self.caster.radius)
 
-    def _records(self, hits: Sequence[Hits], count: int) -> InteriorList:
+    def _interior_lists(self, hits: Sequence[Hits], count: int) -> InteriorList:
         """Interior lists of rays at their origins, from all surfaces behind these."""
         interior = empty_interior_lists(count)
         behind = [(i, hits[i].where(hits[i].distance < 0)) for i in np.flatnonzero(self.table.is_solid).tolist()]
@@ -310,13 +310,13 @@ class _Growth:
         return interior
 
     def _cross(self, interior: InteriorList, ray: Integers, item: Items, entering: Mask, owner: Integers) -> None:
-        """Cross surfaces of solids, each ray (k,) one of them; where this cannot be, the pixel is not valid."""
+        """Update interior lists at surfaces of solids; pixels whose lists contradict the surface are invalid."""
         on, off = np.flatnonzero(entering), np.flatnonzero(~entering)
         self.found.valid[owner[on[enter(interior, ray[on], item[on])]]] = False
         self.found.valid[owner[off[leave(interior, ray[off], item[off])]]] = False
 
     def _step(self, branches: Branches) -> Branches:
-        """Follow branches to the next surfaces; what continues from there."""
+        """Follow branches to the next surfaces, and return the branches that continue from there."""
         end_if_stopped()
         face, distance = self.caster.nearest(branches.origins, branches.directions, branches.last)
         self._correct(branches, face, distance)
@@ -387,7 +387,7 @@ class _Growth:
             self._add(own, (through - passed[in_scattered]) * (far * behind + near * before))
 
     def _at_surfaces(self, branches: Branches) -> Branches:
-        """Cross the surfaces that branches, with their origins there, have come to; what continues from there."""
+        """Interact branches with the surfaces at their origins, and return the branches that continue."""
         item = np.where(branches.last >= 0, self.caster.faces.item[branches.last], NOTHING)
         branches = self._through_films(branches, item)
         opaque = self.table.is_opaque[item]
@@ -416,7 +416,7 @@ class _Growth:
         return joined([straight, *self._branches(branches.where(met), interior[met], places)])
 
     def _through_films(self, branches: Branches, item: Integers) -> Branches:
-        """Dim branches by sheets without an interface, and add what these emit or show."""
+        """Attenuate branches by sheets without an interface, and add the radiance of these."""
         for column in np.flatnonzero(self.table.is_film[item].any(axis=0)):
             chosen = np.flatnonzero(self.table.is_film[item[:, column]])
             own = branches.where(chosen)
@@ -438,17 +438,17 @@ class _Growth:
         found = interact(self.table, self.channel, self.caster, branches, places, pixel, self.spread)
         self._add(branches, self.light.radiance(self._rays(branches), found))
         self._add_coats(branches, found)
-        branches = replace(branches, met=branches.met + 1)
+        branches = replace(branches, depth=branches.depth + 1)
         back, on = self._both(branches, there, found)
         if branches.footprint.size:
-            ways = parted(self.caster, branches, places, found)
+            ways = split_footprints(self.caster, branches, places, found)
             back, on = (replace(branch, footprint=way) for branch, way in zip((back, on), ways, strict=True))
         if self.tree.diffused:
             back, on = (self._from_inside(branch, found.at.normal) for branch in (back, on))
         brightness = largest(back.throughput), largest(on.throughput)
         is_back, is_on = (bright > 0.0 for bright in brightness)
         stronger = back.throughput @ LUMINANCE > on.throughput @ LUMINANCE
-        more = branches.met < self.tree.depth
+        more = branches.depth < self.tree.depth
         forks = branches.forks > 0
         back = replace(back, forks=np.where(stronger, branches.forks, branches.forks - (is_on & forks)))
         on = replace(on, forks=np.where(stronger, branches.forks - (is_back & forks), branches.forks))
@@ -462,13 +462,13 @@ class _Growth:
         return kept
 
     def _from_inside(self, branches: Branches, normals: Array) -> Branches:
-        """Branches from surfaces with these normals, with light that has diffused in the bodies there."""
+        """Branches that start inside bodies, with the subsurface light there."""
         points = self._rays(branches).origins + self.scene.camera.eye
         body = self.media.effective(branches.interior)
         return replace(branches, diffused=self.tree.diffused.radiance(body, points, branches.directions, normals))
 
     def _add_coats(self, branches: Branches, found: BranchInteractions) -> None:
-        """Add the environment as clear coats mirror it that are not as rough as what is below."""
+        """Add the environment's reflection in clear coats whose roughness differs from that of the interface below."""
         coated = np.flatnonzero(found.coated)
         if coated.size:
             own = branches.where(coated)
@@ -483,7 +483,7 @@ class _Growth:
         ways = found.reflected.copy()
         # A path that ends under total reflection is taken to leave straight on: of all that it might see, this is
         # nearest to the truth.
-        trapped = (branches.met >= self.tree.depth) & (largest(found.transmittance) == 0.0) & ~found.at.thin_walled
+        trapped = (branches.depth >= self.tree.depth) & (largest(found.transmittance) == 0.0) & ~found.at.thin_walled
         ways[trapped] = branches.directions[trapped]
         mirrored = np.ones(len(branches), dtype=bool)
         reflected = replace(

@@ -37,7 +37,7 @@ MOST_FACES = 64
 
 
 class EmbreeLightPaths(LightPaths):
-    """Light paths as the reference has them, on surfaces that Embree finds and float64 places.
+    """Straight paths from lights to points, with candidates by Embree and decisions in float64.
 
     Lines on which Embree's faces turn out to be others, or do not close a body, are traced as the reference does.
     What it may miss is a pair of faces that are within 2e-6 of the size of their mesh.
@@ -160,7 +160,7 @@ class CausticLight(SurfaceLight):
         return np.asarray(super().on_opaque(points, normals) + self._gathered(points, normals))
 
     def _gathered(self, points: Array, normals: Array) -> Array:
-        """(k, 3): irradiance of the photons that come from before the surface, and whose discs points are on."""
+        """(k, 3): irradiance by photons whose discs contain the points."""
         found = np.zeros(points.shape)
         for first in range(0, len(points), BATCH):
             part = slice(first, first + BATCH)
@@ -211,7 +211,7 @@ def _discs(points: Array, ways: Array, power: Array, scene: Scene) -> list[_Disc
 
 
 def _landed(scene: Scene, caustics: Caustics) -> tuple[Array, Array, Array]:
-    """Points, directions and power (n, 3) of the photons that interfaces have turned, where they land."""
+    """Points, directions and power (n, 3) of photons that land on opaque objects after interfaces."""
     parts = [np.zeros((3, 0, 3))]
     for segments in photon_segments(scene, caustics.photons, caustics.seed):
         ends = segments.where(segments.lands & segments.bent)
@@ -235,7 +235,7 @@ SHOWN = ("radiance", "transmittance", "optical_depth", "thickness")
 
 @dataclass(frozen=True, eq=False)
 class Shader:
-    """Shader of hits, which gives the arrays of a frame.
+    """Shader of pixel hits into the arrays of a frame.
 
     Attributes
     ----------

@@ -44,7 +44,7 @@ def moved_on(footprints: Array, path: Array) -> Array:
     return moved
 
 
-def parted(
+def split_footprints(
     caster: SceneRayCaster, branches: Branches, places: InterfaceHits, found: BranchInteractions
 ) -> tuple[Array, Array]:
     """Footprints of the reflected and the refracted branches at interfaces."""
@@ -148,7 +148,7 @@ class Surroundings:
         return filtered(self.environment)
 
     def radiance(self, branches: Branches, rays: Rays) -> Array:
-        """(n, 3): radiance along branches that nothing stops, which are `rays` in metres from the eye.
+        """(n, 3): radiance along branches that leave the scene; `rays` are the same in metres from the eye.
 
         `Rays.backdrop` is where rays that have met no interface are in the picture.
         """
@@ -204,14 +204,14 @@ class Surroundings:
         if seen.kind != "checkerboard":
             return self._light(seen, branches)
         place, ahead = places_on_backdrop(self.scene, self.aspect, rays)
-        bent = branches.met > 0
+        bent = branches.depth > 0
         found = seen.radiance(rays.directions, np.where(bent[:, None], place, rays.backdrop))
         found[bent & ~ahead] = seen.mean
         return found
 
 
 def blurred_lookups(maps: FilteredEnvironment, uv: Array, roughness: Array) -> Array:
-    """(n, 3): lookups at places (n, 2) for roughnesses (n,) from 0 to 1, to which equal steps lead from map to map."""
+    """(n, 3): lookups in prefiltered maps at (n, 2) for roughnesses (n,) from 0 to 1, linear between maps."""
     level = roughness * len(maps.levels)
     below = np.minimum(level.astype(np.int64), len(maps.levels) - 1)
     share = (level - below)[:, None]

@@ -1,4 +1,4 @@
-"""Light that is scattered many times in the last scenes, made anew only where the light, a medium or a mesh changes."""
+"""Cache of the multiply scattered light of scenes: solved again only where lights, a medium or a mesh change."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """Light of the bodies of a scene, by the number of the object.
+    """Multiply scattered light of the bodies of a scene, by the number of the object.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ NO_FIELDS = Fields({}, {})
 
 
 class FieldCache:
-    """Light of the bodies of plans in which it diffuses. Threads may share it.
+    """Cache of `Fields` by plan, and of the geometry and linear systems behind them. Threads may share it.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class FieldCache:
         self._scenes: OrderedDict[Hashable, Fields] = OrderedDict()
 
     def of(self, plan: RenderPlan) -> Fields:
-        """Light of each such body by its number; the same object until something changes it.
+        """Multiply scattered light of a plan; the same object until something changes it.
 
         With caustics, photons carry what interfaces of other bodies bend into them.
         """

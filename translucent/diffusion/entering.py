@@ -69,7 +69,7 @@ def _bounding_ball(body: Object) -> tuple[Array, float]:
 
 
 def path_inside(body: Object, points: Array, directions: Array, distance: Array) -> Array:
-    """(k,): metres inside a body on ways, from where faces are crossed: exits are ahead of every start inside."""
+    """(k,): metres inside a body from points (k, 3) in directions (k, 3), up to distances (k,)."""
     mesh = body.mesh
     caster = ray_caster_of(mesh)
     into = np.linalg.inv(body.matrix[:3, :3])
@@ -116,7 +116,7 @@ _CORRECTION = (0.5, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Casters:
+class Occluders:
     """Occluders of the light on a body.
 
     Parameters
@@ -154,7 +154,7 @@ def opaque_surfaces(objects: Sequence[Object]) -> RayCaster | None:
 
 
 def flux_of(photons: EnteringPhotons, grid: BodyGrid) -> Array:
-    """(s, 3): flux at the samples of photons that have come in next to each."""
+    """(s, 3): flux of photons at the samples of a surface: each counts at the nearest one."""
     flux = np.zeros((len(grid.points), 3))
     if len(photons.points):
         sample = cKDTree(grid.points).query(photons.points)[1]
@@ -165,7 +165,7 @@ def flux_of(photons: EnteringPhotons, grid: BodyGrid) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Sky:
-    """Parts of all directions that each sample of a body sees.
+    """Visibility of the sky and of the body itself from each sample of its surface.
 
     Attributes
     ----------
@@ -183,8 +183,8 @@ class Sky:
     facing: tuple[Integers, Integers, Integers]
 
 
-def sky_of(grid: BodyGrid, casters: Casters) -> Sky:
-    """Sky of a body: the directions that each of its samples sees."""
+def sky_of(grid: BodyGrid, casters: Occluders) -> Sky:
+    """Trace rays from each sample of a surface for the directions in which it sees the sky."""
     directions = even_directions(DIRECTIONS)
     cosine = np.maximum(grid.normals @ directions.T, 0.0)
     cosine[grid.face_normals @ directions.T <= 0.0] = 0.0
@@ -216,7 +216,7 @@ def environment_parts(environment: Environment, directions: Array) -> Array:
 
 
 def nearest_parts(directions: Array) -> tuple[Integers, Array]:
-    """Number of the direction nearest to each texel of a map of all, and the texels' solid angle of each, (k,)."""
+    """Index of the direction nearest to each texel of an environment map, and the solid angle around each (k,)."""
     return _nearest_parts(directions.tobytes())
 
 
@@ -236,7 +236,7 @@ def _map_directions() -> tuple[Array, Array]:
 
 
 def transfer(sky: Sky, solid_angles: Array, ior: float, interface: DiffuseInterface) -> Array:
-    """(s, k): flux that enters for each radiance from a direction, if it is seen, over its solid angle."""
+    """(s, k): flux that enters at samples for a unit of radiance from each direction, per solid angle."""
     passed = (1.0 - optics.fresnel_dielectric(sky.cosine, ior)) * sky.cosine
     polished = passed @ solid_angles
     exact = np.pi * interface.entering
@@ -309,7 +309,7 @@ def _sky_rays(
 
 
 def from_itself(sky: Sky, shares: Array, solid_angles: Array) -> sparse.csr_array:
-    """(s, s): flux that enters at a sample for the flux that leaves another that it faces, alike in all directions."""
+    """(s, s): form factors: flux that enters at a sample for a unit of diffuse flux that leaves another one."""
     sample, direction, other = sky.facing
     values = (shares * solid_angles)[sample, direction] / np.pi
     return sparse.csr_array((values, (sample, other)), (len(shares), len(shares)))
@@ -317,14 +317,14 @@ def from_itself(sky: Sky, shares: Array, solid_angles: Array) -> sparse.csr_arra
 
 def from_light(
     grid: BodyGrid,
-    casters: Casters,
+    casters: Occluders,
     light: Light,
     ior: float,
     interface: DiffuseInterface,
     dimming: Sequence[Object] = (),
     stops: RayCaster | None = None,
 ) -> EnteringRays:
-    """Light of a light that enters at the samples, with shadows and dimmed by other bodies.
+    """Flux of a light that enters at the samples of a surface, with shadows, dimmed by other bodies.
 
     `stops` are surfaces of other bodies that none of it passes.
     """

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from translucent.arrays import Array
 from translucent.diffusion.entering import (
     BEFORE,
-    Casters,
+    Occluders,
     Sky,
     dimming_bodies,
     environment_parts,
@@ -154,7 +154,7 @@ class DiffusionField:
 
 @dataclass(frozen=True, eq=False)
 class Entrance:
-    """Shares of light that enter a body through its interface.
+    """Transfer from radiance outside to flux that enters a body through its interface.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class LitBody:
     """
 
     grid: BodyGrid
-    casters: Casters
+    casters: Occluders
     sky: Sky
     _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
     _sky_paths: dict[tuple[Mesh, bytes], sparse.csr_array] = field(default_factory=dict)
@@ -191,7 +191,7 @@ class LitBody:
         return densities(self.casters.body, self.grid)
 
     def sky_paths(self, others: Sequence[Object]) -> list[sparse.csr_array]:
-        """Metres in each of other bodies on the way to the sky, see `sky_paths`; those of the last ones are kept."""
+        """Metres in each of other bodies on paths to the sky, see `sky_paths`; the last ones are cached."""
         places = [(body.mesh, body.matrix.tobytes()) for body in others]
         found = {
             place: self._sky_paths[place] if place in self._sky_paths else self._paths(body)
@@ -212,7 +212,7 @@ class LitBody:
         return sparse.csr_array(metres[nearest])
 
     def entrance(self, ior: float, roughness: float) -> Entrance:
-        """Light that enters through this interface; that of the last one is kept."""
+        """Transfer through an interface with this index and roughness; the last one is cached."""
         if (ior, roughness) not in self._entrances:
             solid_angles = nearest_parts(self.sky.directions)[1]
             shares = transfer(self.sky, solid_angles, ior, diffuse_interface(ior, roughness))
@@ -225,12 +225,12 @@ class LitBody:
 def lit_body(body: Object, opaque: RayCaster | None, step: float) -> LitBody:
     """Geometry of a body with cells of this side, shadowed by itself and by `opaque_surfaces`."""
     grid = body_grid(body, step)
-    casters = Casters(body, opaque)
+    casters = Occluders(body, opaque)
     return LitBody(grid, casters, sky_of(grid, casters))
 
 
 class DiffusingBody:
-    """A body with its medium, ready for any light.
+    """Solver of the subsurface light of one body and medium, for any lights.
 
     Parameters
     ----------
@@ -302,7 +302,7 @@ class DiffusingBody:
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:
-    """Number of the cell at a point, -1 outside the body; where the surface crosses a cell, a sample near tells."""
+    """Number of the cell at a point, -1 outside the body; in cells that are cut, the nearest sample decides."""
     place = np.floor((point - grid.cells.low) / grid.cells.step).astype(int)
     if (place < 0).any() or (place >= grid.number.shape).any():
         return -1

@@ -1,4 +1,4 @@
-"""First events of light that enters a body: where it is scattered for the first time, and what that makes at once.
+"""First scattering events of light that enters a body, and their source terms for diffusion.
 
 Light of smooth environments, and of the body itself, goes on below the surface as uniform light from outside does.
 Light of the lights of a scene goes in one direction below each sample, and light of the bright parts of an environment
@@ -106,7 +106,7 @@ class LayerSolution:
 
 @dataclass(frozen=True, eq=False)
 class EntryPaths:
-    """EntryPaths of light below samples of a body.
+    """Straight paths of light from samples of a surface into the body.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ def diffuse_paths(grid: BodyGrid, dense: Densities, ior: float) -> EntryPaths:
 
 
 def entry_paths(ray: EnteringRays, grid: BodyGrid, dense: Densities) -> EntryPaths:
-    """EntryPaths of a ray."""
+    """Paths of entering rays below the surface."""
     cosine = -(ray.directions * grid.face_normals[ray.samples]).sum(axis=1)
     lengths = dense.lengths(ray.samples, ray.directions)
     return EntryPaths(ray.samples, ray.directions, np.clip(cosine, _LEAST_COSINE, 1.0), False, lengths)
@@ -143,7 +143,7 @@ def entry_paths(ray: EnteringRays, grid: BodyGrid, dense: Densities) -> EntryPat
 
 @dataclass(frozen=True, eq=False)
 class Events:
-    """First events for a unit of flux that enters at each of some samples.
+    """Source terms by first scattering events, for a unit of flux that enters at each of some samples.
 
     Attributes
     ----------
@@ -177,7 +177,7 @@ class Events:
 
 
 class FirstEvents:
-    """First events in one channel of a body.
+    """First scattering events in one color channel of a body.
 
     Parameters
     ----------

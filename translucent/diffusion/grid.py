@@ -37,7 +37,7 @@ _NO_CROSSINGS: tuple[Integers, Array, Integers] = np.zeros(0, np.int64), np.zero
 
 @dataclass(frozen=True)
 class Voxels:
-    """Cut cells of a grid.
+    """Grid cells that a closed surface cuts: volume inside each, and open area between them.
 
     Attributes
     ----------
@@ -211,7 +211,7 @@ class BodyGrid:
 
     @cached_property
     def nearest(self) -> Integers:
-        """(s, `TOGETHER`): each sample and those next to it."""
+        """(s, `TOGETHER`): each sample and its nearest neighbors."""
         count = len(self.points)
         return np.reshape(cKDTree(self.points).query(self.points, min(TOGETHER, count))[1], (count, -1))
 
@@ -231,7 +231,7 @@ class BodyGrid:
         return self._crossings[ior]
 
     def ways(self, ior: float, number: int = 0) -> Array:
-        """(s, 3): a direction inside for each sample, as uniform light from outside has them; of `WAYS` others."""
+        """(s, 3): a direction inside for each sample, distributed as refracted uniform light, number one of `WAYS`."""
         # Not the numbers by which the samples lie on large triangles: there, light would come from one side alone.
         first, second = other_plane_points(len(self.points)).T
         first, second = (first + number / WAYS) % 1.0, (second + 0.618 * number) % 1.0
@@ -353,7 +353,7 @@ class BodyGrid:
         return np.asarray(((places - probe.center) * self.face_normals).sum(axis=1))
 
     def _nearest(self, missing: Mask) -> sparse.csr_array:
-        """Reading of the nearest cell, for samples that have nothing below them."""
+        """(s, cells): weights that read the nearest cell, for samples without cells below them."""
         found = np.full(len(self.points), -1)
         places = (self.points - self.cells.low) / self.cells.step
         for depth in (0.02, 0.25, 0.5, 0.9, 1.3):
@@ -406,7 +406,7 @@ def plane_points(count: int) -> Array:
 
 
 def other_plane_points(count: int) -> Array:
-    """(count, 2): another such recurrence, to be drawn together with `plane_points`: neither tells of the other."""
+    """(count, 2): another such recurrence, to be drawn together with `plane_points`: they are independent."""
     return np.asarray((0.5 + np.arange(count)[:, None] * [0.6287067210378087, 0.5385972572236101]) % 1.0)
 
 
@@ -433,7 +433,7 @@ _PIECES = 48
 
 @dataclass(frozen=True, eq=False)
 class Densities:
-    """Density of a body, as diffusion needs it.
+    """Density of a body in grid cells, below its surface, and along paths.
 
     Attributes
     ----------
@@ -458,7 +458,7 @@ class Densities:
         return np.asarray(d / np.maximum(self.cells, min(d / self.longest, densest or np.inf)))
 
     def along(self, ways: Array, metres: Array) -> Array:
-        """(s,): integral of the density in m on ways (s, 3) from all samples, up to metres (s,)."""
+        """(s,): integral of the density in m from all samples in directions (s, 3), up to metres (s,)."""
         if self._means is None:
             return metres
         cells = self._grid.cells
@@ -469,7 +469,7 @@ class Densities:
         )
 
     def lengths(self, samples: Integers, ways: Array) -> Callable[[Array], Array]:
-        """Function from integrals of the density (k,), in m, on ways (k, 3) from samples (k,), to metres (k,)."""
+        """Function from integrals of the density (k,), in m, along directions (k, 3) from samples (k,), to metres."""
         if self._means is None:
             return lambda integral: integral
         cells = self._grid.cells
@@ -515,7 +515,7 @@ def cell_means(body: Object, grid: BodyGrid) -> Array:
 
 
 def _lengths(sums: Array, dense: Array, piece: Array, integral: Array) -> Array:
-    """Lengths (s,) to integrals (s,), by sums (n, s) over pieces (s,) of densities (n, s); beyond all, twice these."""
+    """Distances (s,) at which the integral of piecewise constant densities (n, s) reaches given values (s,)."""
     number = (sums <= integral).sum(axis=0)
     at = np.minimum(number, len(sums) - 1)
     row = np.arange(len(piece))

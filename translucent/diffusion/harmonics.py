@@ -72,7 +72,7 @@ def _read(volume: Floats, low: Array, step: float, points: Array) -> Array:
 
 
 class LitAlone:
-    """A body alone in an environment, in which light diffuses.
+    """Solver of the subsurface light of a single body in an environment.
 
     Parameters
     ----------

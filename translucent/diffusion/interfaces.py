@@ -1,4 +1,4 @@
-"""Interfaces of a scene as light interacts with them: a table with a row for each object.
+"""Optical properties of the interfaces of a scene, one row for each object.
 
 The CPU renderer and photons read the parameters of `translucent.formulas.bsdf` from it, as shaders do from the table of
 objects on the GPU. `translucent.reference.interfaces` is independent of it.

@@ -1,4 +1,4 @@
-"""Keys of the light that diffuses in bodies: everything that it depends on, without what solves for it."""
+"""Cache keys of multiply scattered light: all values that it depends on. Importing them loads no solver."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from translucent.scene.scene import Object, Scene
 
 
 def diffusion_key(plan: RenderPlan) -> Hashable:
-    """Everything that the diffused light of a plan depends on; the camera is no part of it."""
+    """Key of all values that the multiply scattered light of a plan depends on; the camera is none of them."""
     scene, caustics = plan.scene, plan.caustics
     followed = caustics is not None and media_lit_by_photons(scene)
     bending = (caustics.in_media, caustics.seed, _bending(scene)) if caustics is not None and followed else ()

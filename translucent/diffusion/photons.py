@@ -41,7 +41,7 @@ TOGETHER = 2e-7
 
 @dataclass(frozen=True, eq=False)
 class PhotonSegments:
-    """Straight segments of the paths of photons, from one surface to the next.
+    """Straight segments of photon paths, from one surface to the next.
 
     Attributes
     ----------
@@ -242,7 +242,7 @@ class _PhotonTracer:
         windings: npt.NDArray[np.int16],
         since: Integers,
     ) -> tuple[_Photons, Mask, Mask]:
-        """Photons behind interactions with surfaces, one branch by chance; which go straight on, and which land.
+        """Interact photons with surfaces, one branch by chance; also masks of those that go straight on, and that land.
 
         `power` is left of them there, and `windings` and `since` are those on the other side.
         """

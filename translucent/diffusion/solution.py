@@ -45,7 +45,7 @@ ROUNDING = 1e-13
 
 
 class KnownSolutions:
-    """Span of the last solutions, for a starting point that is nearest in energy (Fischer 1998).
+    """Subspace of the last solutions, in which the solver finds its starting point (Fischer 1998).
 
     Diffusion is linear in the light: once environments and lights have been solved for, mixtures of them, dimmed or
     tinted, need no more steps; and as diffusion is smooth, turns of an environment need few.
@@ -92,7 +92,7 @@ MOST_STEPS = 4000
 
 
 class CellSystem:
-    """Fluence in cells between which light flows, in which it is absorbed, and from which it leaves.
+    """Linear system of diffusion between grid cells, with absorption and losses at the surface.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class CellSystem:
 
 
 def _balance(grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> sparse.csr_array:
-    """Symmetric matrix of what flows between cells, is absorbed in them, and leaves through the surface."""
+    """Symmetric matrix of flow between cells, absorption, and losses through the surface."""
     first, second, ratio = grid.faces
     flow = 2.0 / (1.0 / d[first] + 1.0 / d[second]) * ratio
     # Crumbs that no sample reads would otherwise keep all of the light that is put into them.
@@ -183,7 +183,7 @@ _LEAST_ABSORBING = 0.02
 
 @dataclass(frozen=True)
 class DiffuseSolution:
-    """Light at the samples of a body's surface.
+    """Solution of diffusion: fluence and flux at the samples of a body's surface, and fluence in its cells.
 
     Attributes
     ----------
@@ -207,7 +207,7 @@ class DiffuseSolution:
 
 
 class BodySystem:
-    """The linear systems of a body with a medium, ready for any light.
+    """Linear systems of diffusion of one body and medium, one for each color channel.
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ class _DirectionalEffects:
 
 
 class _ChannelSystem:
-    """The linear system of one channel."""
+    """Linear system of diffusion in one color channel."""
 
     def __init__(
         self,

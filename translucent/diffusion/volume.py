@@ -148,7 +148,7 @@ class _Sweep:
             fluence[i] += np.tensordot(weights, edge * share + rest * source * self.length, axes=1)
 
     def _between(self, values: Floats) -> Floats:
-        """(g, n, m, c): what lies where the directions come from, between cells of the slice before."""
+        """(g, n, m, c): values of the previous slice, interpolated where the directions come from."""
         (first, weight), *others = self.beside
         total = weight * values[:, *first]
         for index, weight in others:
@@ -366,7 +366,7 @@ class DiffusingVolume:
 
 
 class _Mixed:
-    """Starts of rounds, mixed from those of before so that what the last one changes would be least (Anderson 1965).
+    """Anderson mixing of the rounds of a fixed-point iteration (Anderson 1965).
 
     Light in a hollow, which diffusion ignores, goes to and fro many times: by itself each round follows it once.
     """
@@ -375,7 +375,7 @@ class _Mixed:
         self._rounds: list[tuple[Array, Array]] = []
 
     def next(self, start: Array, change: Array) -> Array:
-        """Start (x, y, z, 3) of the next round, after one that has changed its own by this."""
+        """Start (x, y, z, 3) of the next round, from the start and the change of the last one."""
         found = start + change
         if self._rounds:
             for channel in range(3):
@@ -404,7 +404,7 @@ def _finer(values: Array, times: int) -> Array:
 
 
 def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: float) -> CellSystem:
-    """Diffusion in one channel; where hardly anything is, no free path is longer than the body is thick."""
+    """Linear system of diffusion in one channel; free paths are no longer than the body is thick."""
     grid, density = volume.grid, dense[volume.inside]
     there = density * grid.cells.step**3 / grid.volumes
     d = 1.0 / (there / float(diffusion_coefficient(absorption, scattering)) + 1.0 / volume.thickness)
@@ -463,7 +463,7 @@ def _in_the_way(stops: RayCaster, points: Array, places: Array) -> npt.NDArray[n
 
 
 def _mean_shares(light: SpotLight, points: Array, step: float) -> Array:
-    """(k,): mean share of a spot's intensity in cells about points; rays may be thinner than these."""
+    """(k,): mean falloff of a spot over cells around points, as its cone may be thinner than a cell."""
     places = (np.arange(_SPOT_PLACES) + 0.5) / _SPOT_PLACES - 0.5
     total = np.zeros(len(points))
     for offset in np.stack(np.meshgrid(places, places, places), axis=-1).reshape(-1, 3) * step:

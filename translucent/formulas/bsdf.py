@@ -25,7 +25,7 @@ from translucent.formulas.thin_film import film_slab_reflectance, film_slab_tran
 
 
 class Lobes(NamedTuple):
-    """The two lobes of interfaces: fractions (..., 3) of the light that they send back, and that go on."""
+    """Reflection and transmission lobe of interfaces: fractions (..., 3) of the light."""
 
     reflection: Array
     transmission: Array
@@ -59,7 +59,7 @@ def filmed_reflectance(
 
 @np.errstate(over="ignore", under="ignore")
 def thin_wall_exitance(front: npt.ArrayLike, back: npt.ArrayLike, optical_depth: npt.ArrayLike) -> Array:
-    """Fraction of what a thin wall emits that leaves through its front, as it goes back and forth in it, too."""
+    """Fraction of a thin wall's emission that leaves through its front, with all reflections inside."""
     front, back = np.asarray(front, np.float64), np.asarray(back, np.float64)[..., None]
     depth = np.asarray(optical_depth, np.float64)
     kept = (1.0 - front) + front * ((1.0 - back) + back * optics.opacity(2.0 * depth))
@@ -198,7 +198,7 @@ def masking_ratio(cos_in: npt.ArrayLike, cos_out: npt.ArrayLike, alpha: npt.Arra
 
 
 def kept_on_side(direction: npt.ArrayLike, side: npt.ArrayLike) -> Array:
-    """Directions (..., 3), mirrored to the `side` (..., 3) of a face from which smooth normals turn them away."""
+    """Directions (..., 3), reflected to the `side` (..., 3) of a face where smooth normals turn them away from it."""
     d, s = np.asarray(direction, np.float64), np.asarray(side, np.float64)
     across = np.minimum(np.sum(d * s, axis=-1, keepdims=True), 0.0)
     return np.asarray(d - 2.0 * across * s)
@@ -227,7 +227,7 @@ def diffuse_radiance(
 
 
 def filmed_facing(film: npt.ArrayLike, facing: npt.ArrayLike, cos_view: npt.ArrayLike) -> Array:
-    """Reflectance face-on (..., 3) of what reflects as much at an angle as an interface under a film (Schlick 1994).
+    """Reflectance face-on (..., 3) with which Schlick's approximation has the reflectance of a film at an angle.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def filmed_facing(film: npt.ArrayLike, facing: npt.ArrayLike, cos_view: npt.Arra
 def microfacet_value(
     cos_half: npt.ArrayLike, cos_light: npt.ArrayLike, cos_view: npt.ArrayLike, alpha: npt.ArrayLike
 ) -> Array:
-    """Density of microfacets that reflect one direction into the other, times what of them is not masked.
+    """Density of microfacets that reflect one direction into the other, times their visibility.
 
     A bsdf is this times their reflectance.
     """

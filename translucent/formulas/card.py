@@ -30,7 +30,7 @@ DEEPEST = 1e4
 
 @np.errstate(under="ignore")
 def reflectance_on_card(albedo: npt.ArrayLike, depth: npt.ArrayLike, ior: float, card: npt.ArrayLike) -> Array:
-    """Share of white light from all sides that a slab on a card sends back, without the mirror image on the slab.
+    """Reflectance of a slab on a card for diffuse white light, without the specular reflection of the slab.
 
     Parameters
     ----------

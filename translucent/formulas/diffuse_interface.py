@@ -26,7 +26,7 @@ _PARTS = slice(0, None, 2), slice(1, None, 2)
 
 @np.errstate(under="ignore")
 def bare_half_space(albedo: float, phase: PhaseFunction, cosine: Array, weight: Array, moments: int) -> Array:
-    """Matrix (n, n) that turns radiance into a half-space without an interface into that out of it, around the normal.
+    """Reflection matrix (n, n) of a half-space without an interface, averaged around the normal.
 
     What goes up and what goes down are modes that decay with the depth, each with its own length: together they go
     down at the surface as what comes in, which says how much there is of each, and so what goes up.
@@ -164,7 +164,7 @@ def emergent_cosine(albedo: float, ior: float) -> float:
 
 @lru_cache(maxsize=1024)
 def half_space_reflectance(albedo: float, ior: float = 1.0, phase: PhaseFunction = ISOTROPIC) -> float:
-    """Share of the diffuse light entering a half-space that leaves again after it has been scattered; exact.
+    """Reflectance of a half-space for diffuse light that has entered it; exact.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def half_space_reflectance(albedo: float, ior: float = 1.0, phase: PhaseFunction
 def half_space_reflectances(
     cosine: npt.ArrayLike, albedo: float, ior: float = 1.0, phase: PhaseFunction = ISOTROPIC
 ) -> Array:
-    """Share of the light entering a half-space in one direction that leaves again after it has been scattered.
+    """Reflectance of a half-space for light that has entered it in one direction.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Light that leaves a body in which it diffuses, in float64. Each has a twin in ``shaders/lib/diffusion.glsl``.
+"""Subsurface radiance of bodies in which light diffuses, in float64. Each has a twin in ``shaders/lib/diffusion.glsl``.
 
 All functions are pure and broadcast over channels.
 
@@ -61,7 +61,7 @@ def emergent_radiance(
 
 
 def in_scattered_shares(reflected: npt.ArrayLike, passed: npt.ArrayLike) -> tuple[Array, Array]:
-    """Shares of what is scattered ahead that leave on the far side, and on the near side after mirrors inside.
+    """Fractions of forward-scattered light that leave on the far side, and after internal reflection on the near side.
 
     What the far interface mirrors, as diffuse light, crosses the body again, and again after each mirror, until it
     leaves: of p that comes across (1 - r) / (1 - (r p)^2) in all on the near side, and r p times that on the far one.

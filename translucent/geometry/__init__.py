@@ -1,1 +1,1 @@
-"""Triangle meshes: their defects and repairs, winding numbers, normals, and solids with exact chords."""
+"""Triangle meshes: their defects and repairs, winding numbers, normals, ray casting, and simple solids."""

@@ -226,7 +226,7 @@ def _partners(low: Floats, high: Floats) -> Integers:
 
 
 def _laid_out(tree: _BinaryTree, order: Integers, leaf_size: int) -> Hierarchy:
-    """Depth-first layout of the nodes of a tree that are worth a test."""
+    """Depth-first layout of a tree, with its nodes collapsed to wide ones."""
     leaves, total = len(order), len(tree.low[0])
     counts = np.ones(total, np.int32)
     for begin, end in tree.rounds:
@@ -259,7 +259,7 @@ def _laid_out(tree: _BinaryTree, order: Integers, leaf_size: int) -> Hierarchy:
 
 
 def _shares(tree: _BinaryTree, counts: npt.NDArray[np.int32], leaf_size: int) -> npt.NDArray[np.int8]:
-    """(n,): 1 for the nodes of a tree that are kept, 0 for those within leaves; others are replaced by that many.
+    """(n,): 1 for nodes of a tree that are kept, 0 for nodes within leaves; others are replaced by that many.
 
     Skip links let a node have any number of children. One whose bounds are hardly smaller than those of the node above
     it costs every ray a test and spares few of them the others, so its children take its place. Dynamic programming

@@ -170,7 +170,7 @@ def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[Numbers, Mask]:
 
 
 def _spread(faces: npt.NDArray[np.integer]) -> tuple[Numbers, Mask, bool]:
-    """The same, and whether every edge has two faces, which agree."""
+    """`spread_winding`, and whether every edge has two faces that agree."""
     part: Numbers = np.arange(len(faces), dtype=np.int32)
     paired = True
     for sides in side_blocks(faces):

@@ -1,4 +1,4 @@
-"""Support of meshes: how far they reach in any direction, exactly, though of many vertices only a few are looked at."""
+"""Support functions of meshes: their exact extent in any direction, from a few of their vertices."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class Support:
 
     @property
     def count(self) -> int:
-        """Number of points at which functions are looked at, about."""
+        """Approximate number of points at which functions are evaluated."""
         return _CLUSTERS[self._mesh].corners[..., 0].size if self.many else len(self._mesh.vertices)
 
     @cached_property

@@ -18,7 +18,7 @@ SMALL, FEWEST, MOST = 2000, 8, 1 << 17
 
 
 def diagnose_together(meshes: Iterable[Mesh]) -> None:
-    """Find the diagnoses of all small meshes that are convex bodies without a defect; others keep theirs to be found.
+    """Diagnose all small meshes that are convex bodies without a defect; other meshes are left to be diagnosed alone.
 
     They equal those of each mesh alone, to the last bit.
     """
@@ -86,7 +86,7 @@ class _Many:
         self.sides: SortedSides = sorted_sides(self.shared)
 
     def _all_vertices(self, mask: Mask) -> Mask:
-        """(meshes,): whether something is true of all vertices of each."""
+        """(meshes,): whether a mask holds for all vertices of each mesh."""
         return np.asarray(np.logical_and.reduceat(mask, self.vertex_starts))
 
     def _corners(self) -> Array:

@@ -15,7 +15,7 @@ from translucent.reference.volume import Segments
 
 @dataclass(frozen=True, eq=False)
 class ColorLayer:
-    """Layer: a color and its opacity.
+    """Color and opacity of a layer or a step.
 
     Attributes
     ----------

@@ -96,7 +96,7 @@ MOST_PASSAGES = 64
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Outcome of light at interfaces.
+    """Branches of light behind interfaces, and the radiance that these add.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class Outcome:
 
 
 class Interactions:
-    """Ray segments that end at interfaces, and continue from there.
+    """Interactions of ray segments with the interfaces at their ends.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ class Interactions:
         return way, passed, weight
 
     def _arriving(self, number: int, chosen: Integers, inside: Inside, share: Array) -> Array:
-        """(k, 3): fraction (k, 3) of what one light emits."""
+        """(k, 3): radiance by one light: its irradiance times a bsdf `share` (k, 3)."""
         assert self.lights is not None
         arriving = self.lights.irradiance(
             number, self.live.rays.origins[chosen], inside.where(chosen), self.own.tolerance
@@ -325,7 +325,7 @@ class Interactions:
             self.radiance[chosen] += share / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
 
     def _add_highlights(self, rough: Integers) -> None:
-        """Add highlights of `Scene.lights` in rough interfaces, by single reflection of what reaches these."""
+        """Add highlights of `Scene.lights` in rough interfaces, by single reflection."""
         points, normals = self.live.rays.origins[rough], self.normals[rough]
         to_eye = -self.live.rays.directions[rough]
         for light in self.light.paths.lights if rough.size else ():
@@ -352,7 +352,7 @@ class Interactions:
 
 
 def _by_chance(back: Array, chance: Array, passed: Mask, rough: Integers, weight: Array) -> tuple[Array, Array]:
-    """Shares (k, 3) of light that is reflected, or has `passed`; it was reflected with a `chance` (k,) for all colors.
+    """Weights (k, 3) of reflected and of transmitted light, where one was chosen: reflection with a `chance` (k,).
 
     Walks at `rough` interfaces have a `weight` (rough, 3).
     """
@@ -432,7 +432,7 @@ class StraightLight:
         return found
 
     def _share(self, light: Light, points: Array, inside: Inside, start: float) -> Array:
-        """(k, 3): share of a light that passes all interfaces; what absorbs it on the way is another matter."""
+        """(k, 3): fraction of a light that all interfaces on its way transmit; media are not counted."""
         directions, distance = _way(light, points)
         lines = Lines(points, directions, np.full(len(points), start), distance)
         hits, share = self.light.tracer.hits(lines), np.ones((len(points), 3))

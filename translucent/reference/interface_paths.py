@@ -148,7 +148,7 @@ class InterfacePaths:
         return _Flight(hits, wall, interfaces, end, reach >= far)
 
     def _mean_free_path(self, inside: Inside) -> Array:
-        """(k,): at least, in the media that paths start in."""
+        """(k,): lower bound of the mean free path in the media that paths start in."""
         dense = np.zeros(len(inside.windings))
         if self.scattering.any():
             dense = self.light.volume.majorant(self._filling(inside), self.scattering)
@@ -160,7 +160,7 @@ class InterfacePaths:
         return filling
 
     def _through_media(self, live: LiveRays, flight: _Flight) -> tuple[LiveRays, Array, Array]:
-        """Attenuate paths up to their events, and add what media emit; distance of the events (inf: none) and media."""
+        """Attenuate paths up to their events, and add emitted radiance; also distances and media of the events."""
         rays, count = live.rays, len(live)
         segments, filling = self._segments(live, flight)
         event, weights = self._collisions(rays, segments, filling)
@@ -236,7 +236,7 @@ class InterfacePaths:
         return replace(live, rays=replace(live.rays, origins=points), inside=inside)
 
     def _interact(self, live: LiveRays, flight: _Flight, met: Integers) -> LiveRays:
-        """Paths that go on from interfaces."""
+        """Interact paths with interfaces, and return the paths that continue."""
         interfaces = flight.interfaces.where(met)
         live = self._moved(live.where(met), interfaces.distance, interfaces.here, self.own.tolerance)
         if not len(live):
@@ -262,7 +262,7 @@ class InterfacePaths:
         return replace(live, throughput=live.throughput / chance[:, None])
 
     def _scatter(self, live: LiveRays, flight: _Flight, event: Array, weights: Array) -> LiveRays:
-        """Paths that go on from where media scatter them; adds what lights emit towards there."""
+        """Scatter paths at their events in media, and add the light of lights there."""
         some = np.flatnonzero(np.isfinite(event))
         if self.max_events is not None:
             some = some[self.events[live.owner[some]] < self.max_events]
@@ -280,7 +280,7 @@ class InterfacePaths:
         return self._roulette(replace(live, rays=rays, bent=always, reflected=always))
 
     def _inside_at(self, inside: Inside, flight: _Flight, event: Array, some: Integers) -> Inside:
-        """Bodies that the events lie in: surfaces without an interface may come before them."""
+        """Interior lists at the events: paths may have crossed surfaces without an interface."""
         hits = [line.before(np.where(np.isfinite(event), event, 0.0)) for line in flight.hits]
         return self.own.crossed(hits, inside).where(some)
 

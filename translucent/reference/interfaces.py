@@ -151,7 +151,7 @@ class Optics:
         return share
 
     def coated(self, item: Integers, outside: Mask, cosine: Array) -> Array:
-        """(k,): share of light that clear coats mirror, which only comes from outside."""
+        """(k,): reflectance of clear coats, for light that comes from outside."""
         coat = np.where(outside, self.coats[item], 0.0)
         return coat * fresnel_dielectric(cosine, CLEARCOAT_IOR) if coat.any() else coat
 
@@ -219,7 +219,7 @@ class _Crossings:
 
 
 class _InterfaceWalk:
-    """Walk of rays from surface to surface, all at once, until their medium changes."""
+    """Walk of all rays from surface to surface, until their effective medium changes."""
 
     def __init__(self, optics: Optics, hits: Sequence[Hits], inside: Inside) -> None:
         self.optics = optics

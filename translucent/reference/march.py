@@ -1,4 +1,4 @@
-"""Ray marching with a fixed number of steps, by every scheme that a renderer may choose."""
+"""Ray marching with a fixed number of steps, by all common quadratures and orders of compositing."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ class _Spans:
 
 @dataclass(frozen=True, eq=False)
 class _Terms:
-    """Terms of a march: emission or not, some lights, and the light in whose variable its steps are even."""
+    """Source terms of a march: emission, some lights, and the light for which steps are equiangular."""
 
     emission: bool
     lights: tuple[Light, ...]
@@ -229,7 +229,7 @@ class _March:
             yield _Spans(ray, np.maximum(start[ray], 0.0), end[ray], None, 0)
 
     def _layers(self, spans: _Spans, terms: _Terms) -> list[ColorLayer]:
-        """The steps of each span in order, by their own associated colors or, if so asked, unassociated ones."""
+        """Color and optical depth of the steps of each span, in order."""
         steps = self._steps(spans, terms)
         extinction, source = self._sampled(spans, steps.at, terms)
         with np.errstate(under="ignore", over="ignore"):

@@ -224,7 +224,7 @@ class _BranchTree:
         return replace(live, rays=replace(live.rays, origins=points)), interfaces
 
     def _goes_astray(self, body: int, hits: Hits, origin: Integers, interface: Array, wall: Array) -> Mask:
-        """(n,): ray segments that show a hole of a body: they never leave it, or would not if nothing stopped them."""
+        """(n,): ray segments that show a hole of a body: they enter it and never leave."""
         closed = self.scene.objects[body].mesh.diagnosis.solid
         outside = closed | (origin + sum_signs(hits.before(wall), len(origin)) == 0)
         rightly = np.isfinite(interface) | (np.isfinite(wall) & outside)

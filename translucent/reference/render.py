@@ -154,7 +154,7 @@ def render(
 
 
 def _with_own_interfaces(chosen: RenderPlan, bent: bool) -> RenderPlan:
-    """The plan with what it says of interfaces as the reference treats them: the whole tree of rays, or none."""
+    """The plan with notes on interfaces as the reference treats them: by the whole ray tree, or not at all."""
     notes = [note for note in chosen.unmodelled if note.kind is not NoteKind.CUT_OFF_PATHS]
     if len(notes) < len(chosen.unmodelled) and not bent:
         notes.append(STRAIGHT)

@@ -78,8 +78,7 @@ def scattered_once(paths: LightPaths, rays: Rays, segments: Segments, filling: A
 
 @np.errstate(over="ignore", under="ignore")
 def _rounding(paths: LightPaths, rays: Rays, segments: Segments) -> Array:
-    """(n,): relative error of scattered light from rounded distances: dense media scatter in a thinner layer than the
-    rounding.
+    """(n,): relative error of scattered light by the rounding of distances, in media of very short free paths.
 
     Of rays that scatter.
     """

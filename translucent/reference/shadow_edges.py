@@ -74,7 +74,7 @@ def cone_edges(rays: Rays, light: Light) -> tuple[Integers, Array]:
 
 @np.errstate(all="ignore")
 def _shadow_edges(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
-    """`shadow_edges` of few rays. Where nothing is finite, the ray and the light make no plane: there is none."""
+    """`shadow_edges` of few rays. Rays towards the light itself have no plane with it, and no edges."""
     if isinstance(light, DirectionalLight):
         way = np.broadcast_to(np.asarray(light.direction), rays.directions.shape)
     else:

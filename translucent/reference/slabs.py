@@ -70,7 +70,7 @@ def _phases(mu: Array, anisotropy: float, peak: float) -> tuple[Array, Array]:
 
 
 def shares(albedo: float, depth: float, ior: float, anisotropy: float = 0.0) -> tuple[float, float]:
-    """Shares of the diffuse light that enters at the top which leave there and at the bottom after being scattered."""
+    """Reflectance and transmittance of a slab for diffuse light that has entered, scattered light alone."""
     if albedo == 0:
         return 0.0, 0.0
     (r, t), (r0, t0) = whole_shares(albedo, depth, ior, anisotropy), unscattered_shares(depth, ior)
@@ -79,21 +79,21 @@ def shares(albedo: float, depth: float, ior: float, anisotropy: float = 0.0) -> 
 
 @np.errstate(under="ignore")
 def whole_shares(albedo: float, depth: float, ior: float, anisotropy: float = 0.0) -> tuple[float, float]:
-    """Shares of the diffuse light that enters at the top which leave there and at the bottom."""
+    """Reflectance and transmittance of a slab for diffuse light that has entered at the top."""
     mu, weight = cosines(ior)
     return _between_interfaces(mu, weight, ior, *bare(albedo, depth, mu, weight, anisotropy))
 
 
 @np.errstate(under="ignore")
 def unscattered_shares(depth: float, ior: float) -> tuple[float, float]:
-    """Shares of the diffuse light that enters at the top which leave there and at the bottom, never scattered."""
+    """Reflectance and transmittance of a slab for diffuse light that has entered, unscattered light alone."""
     mu, weight = cosines(ior)
     return _between_interfaces(mu, weight, ior, np.zeros((len(mu), len(mu))), np.diag(np.exp(-depth / mu)))
 
 
 @np.errstate(under="ignore")
 def entering_transmittance(depth: float, ior: float) -> float:
-    """Share of the diffuse light that entered at the top which arrives at the bottom before it is scattered."""
+    """Fraction of diffuse light that has entered at the top and reaches the bottom unscattered."""
     mu, weight = cosines(ior)
     flux = mu * weight * ((1 - optics.fresnel_dielectric(mu, 1 / ior)) if ior > 1 else 1.0)
     return float((flux * np.exp(-depth / mu)).sum() / flux.sum())

@@ -166,7 +166,7 @@ class TracedObject:
 
     @cached_property
     def tree(self) -> BoxTree:
-        """Boxes around the faces."""
+        """Bounding volume hierarchy of the faces."""
         return BoxTree.of(self.corners)
 
     def hits(self, lines: Lines) -> Hits:
@@ -175,7 +175,7 @@ class TracedObject:
         return hits.where((hits.distance >= lines.start[hits.pixel]) & (hits.distance <= lines.end[hits.pixel]))
 
     def crossings(self, lines: Lines, candidates: Iterable[tuple[Integers, Integers]]) -> Hits:
-        """All of the candidates, pairs (k,), (k,) of a line and a face, that meet, anywhere on the line."""
+        """Intersections of candidate pairs (k,), (k,) of a line and a face, anywhere on the line."""
         parts = []
         for line, face in candidates:
             seen = _sheared(self.corners[face] - lines.origins[line, None], lines.directions[line])

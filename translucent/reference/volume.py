@@ -61,7 +61,7 @@ class Volume:
         return bool((self.scattering > 0).any())
 
     def at(self, filling: Array, points: Array) -> Array:
-        """(k, n): weights at points (k, 3), from those where the density is 1, `filling` (k, n)."""
+        """(k, n): weights of media at points (k, 3) by their densities; `filling` (k, n) are those at density 1."""
         weights = filling.copy() if self._densities else filling
         for i, density in self._densities:
             inside = np.flatnonzero(filling[:, i])
