@@ -21,7 +21,10 @@ from hypothesis import settings
 
 import translucent as tl
 from tests.command_line import Result, Run
+from translucent.bake import batch
 from translucent.cli import main
+from translucent.planning.shadow_maps import ShadowMaps
+from translucent.scene import stages
 
 ASSETS = Path(__file__).parents[2] / "shared" / "assets"
 
@@ -73,6 +76,27 @@ def own_config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def uninstalled(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
     """Makes a module of this name look as if it were not installed."""
     return lambda module: monkeypatch.setitem(sys.modules, module, None)
+
+
+@pytest.fixture
+def few_shadows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Maps of shadows of 128 texels a side, where no size is stated, and of 8 directions on stages."""
+    monkeypatch.setattr(ShadowMaps.__init__, "__defaults__", (128, None))
+    monkeypatch.setattr(stages, "ENVIRONMENT_SHADOWS", 8)
+
+
+@pytest.fixture
+def without_processes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """Has batches bake in this process, once called: each of theirs takes most of a second to start."""
+
+    def here(task: Callable[[Any], Any], items: list[Any], *_: Any) -> Iterator[Any]:
+        for item in items:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # as in the processes
+                result = task(item)
+            yield result
+
+    return lambda: monkeypatch.setattr(batch, "in_processes", here)
 
 
 @pytest.fixture

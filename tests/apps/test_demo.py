@@ -9,22 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from tests.little import with_few_shadows
-
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_demo_renders_two_pictures_and_says_how_wrong_they_are(
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     in_tmp_path: Path,
+    few_shadows: None,
     capsys: pytest.CaptureFixture[str],
     renderer: object,
 ) -> None:
     demo = runpy.run_path(str(ROOT / "tools" / "demo.py"))
     main = demo["main"]
     main.__globals__["SIZE"] = (80, 60)
-    with_few_shadows(monkeypatch)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         assert main() == 0

@@ -15,7 +15,6 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from tests.little import with_few_shadows
 from translucent.formulas.color import srgb_to_linear
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,10 +23,11 @@ NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 
 
 @pytest.fixture(autouse=True)
-def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_tmp_path: Path, renderer: tl.Renderer) -> None:
+def small(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_tmp_path: Path, few_shadows: None, renderer: tl.Renderer
+) -> None:
     """Little pictures, with few shadows, by the one renderer that all tests share."""
     monkeypatch.setenv("EXAMPLE_WIDTH", "48")
-    with_few_shadows(monkeypatch)
     monkeypatch.setattr(tl, "Renderer", lambda: nullcontext(renderer))
 
 

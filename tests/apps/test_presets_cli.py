@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -20,11 +21,17 @@ def run(run: Run) -> Run:
     return partial(run, "presets")
 
 
-def pretend_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To be called by the test itself: the captured output of a fixture's time is another one."""
-    monkeypatch.delenv("NO_COLOR", raising=False)
-    monkeypatch.setenv("TERM", "xterm-256color")
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+@pytest.fixture
+def pretend_a_terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """To be called by the test itself, with variables: the captured output of a fixture's time is another one."""
+
+    def _pretend(**variables: str) -> None:
+        monkeypatch.delenv("NO_COLOR", raising=False)
+        for name, value in {"TERM": "xterm-256color", **variables}.items():
+            monkeypatch.setenv(name, value)
+        monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+
+    return _pretend
 
 
 def rows(text: str) -> dict[str, str]:
@@ -152,8 +159,8 @@ def test_slabs_on_white_and_black_are_told(run: Run) -> None:
         assert re.search(rf"^on {card} +{re.escape(words)}", out, re.MULTILINE)
 
 
-def test_a_terminal_shows_swatches(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    pretend_a_terminal(monkeypatch)
+def test_a_terminal_shows_swatches(run: Run, pretend_a_terminal: Callable[..., None]) -> None:
+    pretend_a_terminal()
     assert re.search(r"after 1 cm +\x1b\[48;2;161;120;82m  \x1b\[0m #a17852", run("show", "coke").out)
     head, *lines = run().out.splitlines()
     for line, one in zip(lines, tl.presets().values(), strict=True):
@@ -165,22 +172,21 @@ def test_a_terminal_shows_swatches(run: Run, monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.parametrize(("variable", "value"), [("NO_COLOR", "1"), ("TERM", "dumb")])
 def test_a_terminal_without_colors_shows_none(
-    run: Run, monkeypatch: pytest.MonkeyPatch, variable: str, value: str
+    run: Run, pretend_a_terminal: Callable[..., None], variable: str, value: str
 ) -> None:
-    pretend_a_terminal(monkeypatch)
+    pretend_a_terminal()
     assert ESCAPE in run("show", "coke").out
-    monkeypatch.setenv(variable, value)
+    pretend_a_terminal(**{variable: value})
     assert ESCAPE not in run("show", "coke").out + run().out
 
 
-def test_an_empty_no_color_asks_for_nothing(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    pretend_a_terminal(monkeypatch)
-    monkeypatch.setenv("NO_COLOR", "")
+def test_an_empty_no_color_asks_for_nothing(run: Run, pretend_a_terminal: Callable[..., None]) -> None:
+    pretend_a_terminal(NO_COLOR="")
     assert ESCAPE in run("show", "coke").out
 
 
-def test_json_has_no_swatches(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    pretend_a_terminal(monkeypatch)
+def test_json_has_no_swatches(run: Run, pretend_a_terminal: Callable[..., None]) -> None:
+    pretend_a_terminal()
     assert ESCAPE not in run("--json").out + run("show", "coke", "--json").out
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import re
 import shlex
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,6 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from tests.little import with_few_shadows, without_processes
 from translucent.assets import web_path
 from translucent.bake import atlas
 from translucent.cli import cli, main
@@ -62,14 +62,15 @@ def new_uv(mesh: tl.Mesh, size: int) -> Any:
 
 
 @pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer) -> None:
+def small(
+    monkeypatch: pytest.MonkeyPatch, few_shadows: None, without_processes: Callable[[], None], renderer: tl.Renderer
+) -> None:
     """One renderer, which keeps its programs, for all; few shadows, and no processes."""
     own = tl.Renderer
     monkeypatch.setattr(
         tl, "Renderer", lambda backend="auto": own("cpu") if backend == "cpu" else nullcontext(renderer)
     )
-    with_few_shadows(monkeypatch)
-    without_processes(monkeypatch)
+    without_processes()
     monkeypatch.setattr(atlas, "_new_uv", new_uv)
 
 

@@ -16,7 +16,6 @@ import trimesh
 
 import translucent as tl
 from tests.command_line import Result, Run, one_error_line
-from tests.little import without_processes
 from translucent.bake.gltf_builder import GlbBuilder
 from translucent.bake.record import sidecar_of
 from translucent.cli import main
@@ -217,7 +216,9 @@ def test_an_open_mesh_is_baked_with_a_warning(run: Run, tmp_path: Path, make_bal
 # Many
 
 
-def test_many_models_and_a_bad_one(run: Run, make_ball: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_models_and_a_bad_one(
+    run: Run, make_ball: Any, tmp_path: Path, without_processes: Callable[[], None]
+) -> None:
     models = [tmp_path / f"{name}.obj" for name in ("a", "b", "c")]
     for model in models:
         make_ball(1).export(model)
@@ -238,7 +239,7 @@ def test_many_models_and_a_bad_one(run: Run, make_ball: Any, tmp_path: Path, mon
     assert sorted(path.name for path in out.iterdir()) == ["a.png", "a.png.json", "c.png", "c.png.json"]
     models[1].unlink()
     make_ball(1).export(models[1])
-    without_processes(monkeypatch)
+    without_processes()
     result = run(*arguments[1:-1], 1, "--json")
     found = json.loads(result.out)
     assert [asset["status"] for asset in found["assets"]] == ["skipped", "baked", "skipped"]
@@ -249,10 +250,10 @@ def test_many_models_and_a_bad_one(run: Run, make_ball: Any, tmp_path: Path, mon
 
 @pytest.mark.filterwarnings("ignore::translucent.TranslucentWarning")  # of the holes
 def test_maps_that_cannot_be_right_are_suspect(
-    run: Run, make_ball: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, make_ball: Any, tmp_path: Path, without_processes: Callable[[], None]
 ) -> None:
     """Twice: a map that is there already is as suspect as it was."""
-    without_processes(monkeypatch)
+    without_processes()
     whole, opened, sheet = make_ball(1), make_ball(1), make_ball(1)
     opened.faces, sheet.faces = opened.faces[8:], sheet.faces[:1]
     for name, mesh in (("whole", whole), ("opened", opened), ("sheet", sheet)):
@@ -271,9 +272,11 @@ def test_maps_that_cannot_be_right_are_suspect(
     assert found["suspect"] == 1
 
 
-def test_lines_come_one_by_one(run: Run, ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lines_come_one_by_one(
+    run: Run, ball: Path, tmp_path: Path, without_processes: Callable[[], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Each is there, for a pipe as well, when the next asset is not done yet."""
-    without_processes(monkeypatch)
+    without_processes()
     flushed = []
     monkeypatch.setattr("sys.stdout.flush", lambda: flushed.append(True), raising=False)
     assert run(ball, "none.obj", "--out-dir", tmp_path / "maps", "--format", "npy", *QUICK, "--jobs", 1).code == 1
