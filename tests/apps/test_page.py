@@ -31,11 +31,15 @@ _SAMPLER = re.compile(r"^uniform [iu]?sampler\w+ (\w+)", re.MULTILINE)
 
 
 @pytest.fixture
-def run(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
-    """The command, with a script in place of the viewer's, which is built with npm."""
+def little_script(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A script in place of the viewer's, which is built with npm."""
     script = tmp_path / "page.js"
     script.write_text("'</script>';", encoding="utf-8")
     monkeypatch.setattr("translucent.page.write.web_path", lambda _: script)
+
+
+@pytest.fixture
+def run(run: Run, little_script: None) -> Run:
     return partial(run, "page")
 
 
@@ -225,13 +229,7 @@ def test_without_the_package_a_coarser_copy_is_told_how(uninstalled: Callable[[s
         simplified(scene_of(ball()), 200)
 
 
-@pytest.fixture
-def no_script(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "page.js").write_text("", encoding="utf-8")
-    monkeypatch.setattr("translucent.page.write.web_path", lambda _: tmp_path / "page.js")
-
-
-@pytest.mark.usefixtures("no_script")
+@pytest.mark.usefixtures("little_script")
 def test_a_frame_writes_the_page_of_its_scene(
     renderer: tl.Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

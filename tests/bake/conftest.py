@@ -11,6 +11,7 @@ import pytest
 import trimesh
 
 import translucent as tl
+from translucent.bake import strips
 from translucent.bake.settings import BakeSettings
 from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
 
@@ -95,3 +96,10 @@ def ball_glb(tmp_path: Path) -> Path:
 def make_ball() -> Callable[..., trimesh.Trimesh]:
     """`sphere_uv`."""
     return sphere_uv
+
+
+@pytest.fixture
+def checkpoints_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Checkpoints of bakes after every strip, however short the time since the last one."""
+    monkeypatch.setattr(strips, "EVERY", 0.0)
+    monkeypatch.setattr(strips, "REST", 0.0)

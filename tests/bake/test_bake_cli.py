@@ -310,6 +310,7 @@ def test_a_pipe_shows_no_bar(run: Run, ball: Path, tmp_path: Path) -> None:
     assert run(ball, "-o", tmp_path / "t.npy", *QUICK).err == ""
 
 
+@pytest.mark.usefixtures("checkpoints_at_once")
 def test_an_interrupted_bake_goes_on(run: Run, ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from contextlib import contextmanager
 
@@ -318,7 +319,6 @@ def test_an_interrupted_bake_goes_on(run: Run, ball: Path, tmp_path: Path, monke
     assert run(*arguments).code == 0
     whole = path.read_bytes()
     path.unlink(), sidecar_of(path).unlink()
-    monkeypatch.setattr("translucent.bake.strips.EVERY", 0.0)
 
     @contextmanager
     def interrupt(_: str) -> Any:

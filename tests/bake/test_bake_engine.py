@@ -15,7 +15,6 @@ from translucent.assets import mesh_path
 from translucent.bake import measure, strips
 from translucent.bake import rays as directions
 from translucent.bake import rays as following
-from translucent.bake import strips as canvas
 from translucent.bake.measure import RayMean, block_edges
 from translucent.bake.rays import Directions, _plain_sobol
 from translucent.bake.settings import BakeSettings
@@ -245,9 +244,8 @@ def test_an_interruption_ends_the_threads(monkeypatch: pytest.MonkeyPatch) -> No
     assert threading.active_count() == before
 
 
-def test_a_checkpoint_is_taken_up_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(canvas, "EVERY", 0.0)
-    monkeypatch.setattr(canvas, "REST", 0.0)
+@pytest.mark.usefixtures("checkpoints_at_once")
+def test_a_checkpoint_is_taken_up_again(tmp_path: Path) -> None:
     path, mesh = tmp_path / "map.partial", Torus().tessellate(32)
     whole = tl.bake_thickness(mesh, 300, rays=4)
     with pytest.raises(KeyboardInterrupt):
@@ -260,8 +258,8 @@ def test_a_checkpoint_is_taken_up_again(tmp_path: Path, monkeypatch: pytest.Monk
     assert not path.exists()
 
 
-def test_a_checkpoint_of_another_bake_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(canvas, "EVERY", 0.0)
+@pytest.mark.usefixtures("checkpoints_at_once")
+def test_a_checkpoint_of_another_bake_is_refused(tmp_path: Path) -> None:
     path, mesh = tmp_path / "map.partial", Torus().tessellate(32)
     with pytest.raises(KeyboardInterrupt):
         tl.bake_thickness(mesh, 300, rays=4, checkpoint=path, progress=interrupted(1))
