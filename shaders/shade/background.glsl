@@ -1,13 +1,18 @@
-// What is behind the media: opaque surfaces, or the environment. Needs <constants>, <View> and <Environment>.
+// What is behind the media: opaque surfaces, or the environment. Needs <constants>, <View> and <Environment>. SEEN_MAP: the
+// environment is no picture (0), one of its own (1), or the one that lights (2).
 
 #include "lib/environment.glsl"
+#include "shade/light_map.glsl"
 
 #if OPAQUE
 uniform sampler2D opaque_axial_depth;
 uniform sampler2D opaque_radiance;
 #endif
-#if SEEN_MAP
+#if SEEN_MAP == 1
 uniform sampler2D seen_map;
+#endif
+#if SEEN_MAP == 2
+#define seen_map light_map
 #endif
 
 // The environment as it is seen. at: position in the picture, right and down, in its heights; ray: unit vector.

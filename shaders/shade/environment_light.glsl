@@ -1,9 +1,9 @@
 // Light from the environment, prefiltered. Needs <constants> and <Environment>.
 
 #include "lib/environment.glsl"
+#include "shade/light_map.glsl"
 
-uniform sampler2D light_map;            // as it is
-uniform sampler2DArray light_levels;    // seen in surfaces of roughness 1/n, 2/n .. 1
+uniform sampler2DArray light_levels;  // seen in surfaces of roughness 1/n, 2/n .. 1
 uniform sampler2D light_irradiance;  // on surfaces, by their normal
 
 // Radiance averaged over the reflections of a surface of this roughness; direction: of a mirror's reflection.

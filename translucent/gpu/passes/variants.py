@@ -151,10 +151,10 @@ def look_switches(body: Object) -> dict[str, bool]:
     return {"VERTEX_COLORS": body.mesh.colors is not None, "OCCLUSION": occluded}
 
 
-def seen_switches(environment: Environment) -> dict[str, bool]:
+def seen_switches(environment: Environment) -> dict[str, int]:
     """Switches of shaders in which rays end at the environment: whether it is a picture, and the one that lights."""
-    seen_map = environment.seen.kind == "image"
-    return {"SEEN_MAP": seen_map, "SEEN_LIGHTS": seen_map and environment.seen is environment}
+    seen_map, lights = environment.seen.kind == "image", environment.seen is environment
+    return {"SEEN_MAP": seen_map + (seen_map and lights), "SEEN_LIGHTS": seen_map and lights}
 
 
 def coat_switches(objects: Iterable[Object]) -> dict[str, bool]:

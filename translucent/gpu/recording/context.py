@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -252,47 +251,15 @@ def _plain(value: Any) -> Any:
 
 
 def _es(text: str) -> tuple[str, tuple[str, ...]]:
-    """A preprocessed stage, lifted for WebGL2, with fewer textures, as WebGL2 promises 16 in a shader; and the textures
-    that are now parts of others.
+    """A preprocessed stage, lifted for WebGL2, and the names of samplers whose textures are now parts of others.
+
+    Triangles follow the nodes of hierarchies, as WebGL2 promises no more than 16 textures in a shader.
     """
     named = _NAMED.search(text)
     assert named is not None
     head = text.partition("#line")[0]
-    defines = {key: int(value) for key, value in _DEFINE.findall(head)}
-    return _merged(lift(named[1], defines, "webgl2").text, defines)
-
-
-def _merged(text: str, defines: Mapping[str, int]) -> tuple[str, tuple[str, ...]]:
-    """A shader whose textures of one kind are put together, and the names of samplers that follow others.
-
-    Triangles follow the nodes of hierarchies; and an environment that is seen is the one that lights, where it is.
-    """
-    merged: list[str] = []
-    if _declares(text, "hierarchy_triangles"):
-        merged.append("hierarchy_triangles")
-        text = re.sub(r"^uniform usampler2D hierarchy_triangles;", _TRIANGLE_ROW, text, flags=re.MULTILINE)
-        found = "texelFetch(hierarchy_triangles, "
-        text = text.replace(found, "texelFetch(hierarchy_nodes, ivec2(0, hierarchy_triangle_row) + ")
-    if defines.get("SEEN_LIGHTS") and _declares(text, "light_map") and _declares(text, "seen_map"):
-        text = _declared_first(_without(text, "seen_map"), "light_map", "#define seen_map light_map\n")
-    return text, tuple(merged)
-
-
-_TRIANGLE_ROW = "uniform int hierarchy_triangle_row;"
-
-
-def _declares(text: str, sampler: str) -> bool:
-    """True if a shader declares a sampler."""
-    return re.search(rf"^uniform u?sampler2D {sampler};", text, re.MULTILINE) is not None
-
-
-def _without(text: str, sampler: str) -> str:
-    """A shader without the declaration of a sampler."""
-    return re.sub(rf"^uniform sampler2D {sampler};.*\n", "", text, flags=re.MULTILINE)
-
-
-def _declared_first(text: str, sampler: str, more: str = "") -> str:
-    """A shader with the declaration of a sampler before all others, and more behind it."""
-    text = _without(text, sampler)
-    last = list(re.finditer(r"^precision highp \w+;\n", text, re.MULTILINE))[-1].end()
-    return f"{text[:last]}uniform sampler2D {sampler};\n{more}{text[last:]}"
+    lifted = lift(named[1], {key: int(value) for key, value in _DEFINE.findall(head)}, "webgl2").text
+    row = "uniform int hierarchy_triangle_row;"
+    merged, found = re.subn(r"^uniform usampler2D hierarchy_triangles;", row, lifted, flags=re.MULTILINE)
+    of_nodes = "texelFetch(hierarchy_nodes, ivec2(0, hierarchy_triangle_row) + "
+    return merged.replace("texelFetch(hierarchy_triangles, ", of_nodes), ("hierarchy_triangles",) * found

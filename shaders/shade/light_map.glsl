@@ -1,0 +1,1 @@
+uniform sampler2D light_map;  // the environment that lights, as it is
