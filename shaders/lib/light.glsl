@@ -7,8 +7,8 @@ struct Light {
     vec4 position;  // w = 1: where it is; w = 0: infinitely far away, the direction to it
     vec3 power;     // radiant intensity in W/sr; at infinity irradiance on what faces it, in W/m^2
     vec4 cone;      // in which it shines, as cone_attenuation takes it
-    float radius;   // of the disc that it looks like, in metres; 0 for a light without size
-    vec4 disc;      // way to the middle of the disc that highlights show, and its radius in metres; 0 for none
+    float radius;   // of its part of that sphere, over which shadows are filtered, in metres
+    vec4 disc;      // vector to the center of the sphere that it is a part of, and its radius, in metres; 0 for none
 };
 
 // Light that arrives at a point.

@@ -286,7 +286,7 @@ LIGHTS = UniformBlock(
             (MAX_LIGHTS, 4),
         ),  # from the center of the media, w = 1; direction to it, w = 0
         ("light_power", "f4", (MAX_LIGHTS, 4)),  # intensity or irradiance; w: radius of its part of a sphere in metres
-        ("light_disc", "f4", (MAX_LIGHTS, 4)),  # way to the middle of the whole sphere, and its radius in metres
+        ("light_disc", "f4", (MAX_LIGHTS, 4)),  # vector to the center of the sphere, and its radius in metres
         ("light_cone", "f4", (MAX_LIGHTS, 4)),  # as cone_attenuation takes it
         ("light_count", "i4", ()),  # that surfaces are lit by
     ),

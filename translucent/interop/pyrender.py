@@ -283,7 +283,8 @@ def to_pyrender(scene: Scene) -> Any:
     """The opaque objects of a scene as a pyrender scene, with its camera and lights.
 
     The eye is at the origin of it, since pyrender's coordinates are float32. Faces are flat and reflect alike on both
-    sides. Of the environment it has the light, as the mean from everywhere, and a background without opacity.
+    sides. Of the environment it has the light, as the mean from everywhere, and a background without opacity. A
+    sphere light is a point light there, of the same irradiance.
 
     Returns
     -------

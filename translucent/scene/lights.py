@@ -33,8 +33,8 @@ class PositionalLight(Frozen):
     #: Radius in metres of the part of a sphere over which its shadows are filtered; 0 for a light without size.
     part_radius = 0.0
 
-    #: Way to the middle of the whole sphere, which is mirrored and sends out photons, and its radius, in metres; 0 for
-    #: none.
+    #: Vector to the center of the whole sphere, which is mirrored and sends out photons, and its radius, in
+    #: metres; 0 for none.
     disc: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
