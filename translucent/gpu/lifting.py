@@ -35,43 +35,8 @@ _SAMPLER = re.compile(r"\b[iu]?sampler\w+")
 PLAIN, WITH_STORAGE, ES, VULKAN = 330, 430, 300, 450
 
 
-@dataclass(frozen=True)
-class Head:
-    """First lines of a shader.
-
-    Attributes
-    ----------
-    version : int
-        Of GLSL that the code needs.
-    lines : tuple of str
-    """
-
-    version: int
-    lines: tuple[str, ...]
-
-
-def check_dialect(dialect: str) -> None:
-    """Refuse what is no dialect.
-
-    Raises
-    ------
-    InputError
-        With the known ones.
-    """
-    if dialect not in get_args(Dialect):
-        raise InputError(f"target {dialect!r}", "unknown", f"use one of {', '.join(get_args(Dialect))}")
-
-
-def head_of(name: str, code: str, dialect: Dialect) -> Head:
-    """Version, extensions and precision statements for the code of a shader.
-
-    Parameters
-    ----------
-    name : str
-        File under ``shaders/``.
-    code : str
-        Without comments.
-    dialect : {"glsl", "webgl2", "vulkan"}
+def _head(name: str, code: str, dialect: Dialect) -> tuple[int, list[str]]:
+    """Version of GLSL that the code of a shader needs, without comments, and its first lines.
 
     Raises
     ------
@@ -83,10 +48,8 @@ def head_of(name: str, code: str, dialect: Dialect) -> Head:
     origin = f"// translucent: shaders/{name}"
     if dialect == "glsl":
         version = WITH_STORAGE if stores else PLAIN
-        extensions = (
-            ["#extension GL_ARB_gpu_shader5 : enable // for precise; leave both out elsewhere"] if precise else []
-        )
-        return Head(version, (f"#version {version} core", origin, *extensions))
+        extension = "#extension GL_ARB_gpu_shader5 : enable // for precise; leave both out elsewhere"
+        return version, [f"#version {version} core", origin, *[extension] * precise]
     if stores:
         raise InputError(
             f"shader {name!r} for {'WebGL2' if dialect == 'webgl2' else 'other languages'}",
@@ -94,13 +57,13 @@ def head_of(name: str, code: str, dialect: Dialect) -> Head:
             "use the shaders of a method that does not: signed_depth for sums, peel and peel_fold for ordered segments",
         )
     if dialect == "vulkan":
-        extensions = ["#extension GL_EXT_samplerless_texture_functions : require"] if "texelFetch" in code else []
-        return Head(VULKAN, (f"#version {VULKAN} core", origin, *extensions))
+        extension = "#extension GL_EXT_samplerless_texture_functions : require"
+        return VULKAN, [f"#version {VULKAN} core", origin, *[extension] * ("texelFetch" in code)]
     # Fragment shaders have no precision by default, and most samplers a low one in both stages.
     samplers = sorted(set(_SAMPLER.findall(code)))
     highp = [f"precision highp {kind};" for kind in ("float", "int", *samplers)]
-    extensions = ["#define precise // not in GLSL ES: a driver may fuse products and sums"] if precise else []
-    return Head(ES, (f"#version {ES} es", origin, *highp, *extensions))
+    define = "#define precise // not in GLSL ES: a driver may fuse products and sums"
+    return ES, [f"#version {ES} es", origin, *highp, *[define] * precise]
 
 
 #: Outputs of the vertex shaders of bodies, of the pass over pixels, and of pictures in windows, each by location.
@@ -141,7 +104,6 @@ VARYINGS = {name: place for names in (_OF_BODIES, _OF_PICTURES, _OF_WINDOWS) for
 LOOSE = {"frag": 14, "vert": 15}
 FIRST_TEXTURE = {"frag": 16, "vert": 64}
 
-_BLOCK_TEXT = re.compile(r"^layout\(std140, row_major\) uniform (\w+) \{", re.MULTILINE)
 _TEXTURE = re.compile(r"^uniform ([iu]?)sampler(\w+) (\w+);", re.MULTILINE)
 _UNIFORM = re.compile(r"^uniform (\w+ \w+(?:\[\w+\])?;.*)$", re.MULTILINE)
 _VARYING = re.compile(r"^(flat )?(in|out) (\w+) (\w+);", re.MULTILINE)
@@ -165,7 +127,7 @@ def in_vulkan(name: str, texts: Iterable[str], code: str) -> Iterator[str]:
     loose = [match[1] for text in texts for match in _UNIFORM.finditer(text) if not _TEXTURE.match(match[0])]
     places = _Places(stage, code)
     for text in texts:
-        text = _BLOCK_TEXT.sub(places.block, text)
+        text = _BLOCK.sub(places.block, text)
         text = _VARYING.sub(places.varying, text)
         text = _TEXTURE.sub(places.texture, text)
         if _UNIFORM.search(text):
@@ -225,6 +187,7 @@ _WORDS = re.compile(
     r"[iub]?vec[234]|mat[234](x[234])?|float|u?int|bool|void|[iu]?sampler\w+|const|uniform|buffer|struct|layout|std140|"
     r"std430|row_major|binding|location|define|if|else|for|while|return|in|out|inout|flat|\d\w*"
 )
+_FACE = re.compile(r"\s*(layout\s*\([^)]*\)\s*)?(flat\s+)?(in|out|invariant)\b")
 _LINE = re.compile(r"#line \d+ (\d+)$")
 _BLOCK = re.compile(r"^layout\(std140, row_major\) uniform (\w+) \{", re.MULTILINE)
 _DIRECTIVE = re.compile(r"\s*#\s*(if|elif|else|endif|error)\b(.*)$")
@@ -332,7 +295,8 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
     InputError
         If a switch is unknown or missing, the shader refuses the values, or it needs what the target lacks.
     """
-    check_dialect(target)
+    if target not in get_args(Dialect):
+        raise InputError(f"target {target!r}", "unknown", f"use one of {', '.join(get_args(Dialect))}")
     gathered = gather(name)
     if unknown := sorted(defines.keys() - gathered.switches):
         known = ", ".join(sorted(gathered.switches)) or "it has none"
@@ -342,15 +306,15 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
     used = set().union(*(part.names for part in kept))
     texts = [part.text.strip("\n") for part in kept]
     code = "\n".join(part.code for part in kept)
-    head = head_of(name, code, target)
+    version, head = _head(name, code, target)
     body = "\n\n".join(in_vulkan(name, texts, code) if target == "vulkan" else texts)
     decided = {key: int(value) for key, value in defines.items()}
     defined = [f"#define {key} {value}" for key, value in decided.items() if key in used]
     defined += [f"#define {key} {CONSTANTS[key]}" for key in _constants(used)]
     files = tuple(dict.fromkeys(gathered.files[part.file] for part in kept))
     blocks = tuple(BLOCKS[key] for key in _BLOCK.findall(code))
-    text = "\n".join([*head.lines, *defined, "", body, ""])
-    return Lifted(name, target, head.version, decided, files, blocks, text)
+    text = "\n".join([*head, *defined, "", body, ""])
+    return Lifted(name, target, version, decided, files, blocks, text)
 
 
 def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Iterator[tuple[int, str]]:
@@ -370,7 +334,8 @@ def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Itera
             reached = live[-1] and not taken
             absent = {key for key in _NAME.findall(rest) if key not in defines} if reached else set()
             missing |= absent
-            holds = reached and not absent and _value(rest, defines)
+            text = re.sub(r"!(?!=)", " not ", rest.replace("&&", " and ").replace("||", " or ")).strip()
+            holds = reached and not absent and bool(_evaluated(ast.parse(text, mode="eval").body, defines))
             live.append(live[-1] and holds)
             done.append(taken or holds)
         elif word == "else":
@@ -383,23 +348,15 @@ def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Itera
         elif live[-1] and not word:
             yield file, line
     if missing:
-        options = " ".join(f"--define {key}={_least(key, gathered)}" for key in sorted(missing))
+        # The smallest value that the shader accepts.
+        least = {key: int(any(re.match(rf"\s*#if {key} < 1$", line) for line in gathered.lines)) for key in missing}
+        options = " ".join(f"--define {key}={value}" for key, value in sorted(least.items()))
         count = f"{len(missing)} {'switch' if len(missing) == 1 else 'switches'}"
         raise InputError(f"shader {name!r}", f"it asks for {count} more", f"add {options}, or other values")
 
 
-def _least(key: str, gathered: Gathered) -> int:
-    """Smallest value that a shader accepts for a switch."""
-    return int(any(re.match(rf"\s*#if {key} < 1$", line) for line in gathered.lines))
-
-
-def _value(condition: str, defines: Mapping[str, int]) -> bool:
-    """Value of a preprocessor condition of integers and switches."""
-    text = re.sub(r"!(?!=)", " not ", condition.replace("&&", " and ").replace("||", " or "))
-    return bool(_evaluated(ast.parse(text.strip(), mode="eval").body, defines))
-
-
 def _evaluated(node: ast.expr, defines: Mapping[str, int]) -> int:
+    """Value of a preprocessor condition of whole numbers and switches, as Python parses it."""
     match node:
         case ast.Constant(value=int(value)):
             return value
@@ -452,8 +409,11 @@ def _reached(parts: list[_Part]) -> list[_Part]:
     for part in parts:
         for name in part.declares:
             declaring.setdefault(name, []).append(part)
+    # Inputs and outputs of a stage have to match the neighboring stage.
     roots = [
-        part for part in parts if (part.function == "main" if "main" in functions else part.file == 0) or _faces(part)
+        part
+        for part in parts
+        if (part.function == "main" if "main" in functions else part.file == 0) or _FACE.match(part.code)
     ]
     kept = {id(part) for part in roots}
     waiting = roots
@@ -465,11 +425,6 @@ def _reached(parts: list[_Part]) -> list[_Part]:
                     waiting.append(part)
     files = {part.file for part in parts if id(part) in kept and part.code}
     return [part for part in parts if (id(part) in kept if part.code else part.file in files)]
-
-
-def _faces(part: _Part) -> bool:
-    """True if a part is an input or output of a stage, which has to match the neighboring stage."""
-    return re.match(r"\s*(layout\s*\([^)]*\)\s*)?(flat\s+)?(in|out|invariant)\b", part.code) is not None
 
 
 def _constants(used: set[str]) -> list[str]:

@@ -12,8 +12,7 @@ from translucent.gpu.job import CameraView, FrameJob
 from translucent.gpu.layout import BODY_STRIDE
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.placement import Part
-from translucent.gpu.recording.context import RecordingContext
-from translucent.gpu.recording.objects import RecordedBuffer, RecordedMeshes
+from translucent.gpu.recording.context import RecordedBuffer, RecordedMeshes, RecordingContext
 from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
 from translucent.planning.passes import PassName
