@@ -1,5 +1,5 @@
 // Random paths of light through media and interfaces, some events of one path of each pixel, and then of the next one. The
-// estimator is that of translucent/reference/interface_paths.py, but for what follows here. The channels of light take one path
+// estimator is that of translucent/reference/path_trace.py, but for what follows here. The channels of light take one path
 // together: how far they fly is drawn for one of them, chosen by what it carries, and weighted with the balance heuristic
 // over all (Veach & Guibas 1995; Wilkie et al. 2014), so that together they never carry more than before. What media absorb
 // and emit on a segment is exact.

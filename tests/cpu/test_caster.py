@@ -10,7 +10,7 @@ from translucent.arrays import Array
 from translucent.assets import mesh_path
 from translucent.cpu.hits import ExactRayCaster
 from translucent.geometry.solids import Box, Sphere
-from translucent.reference.tracer import Lines, Tracer
+from translucent.reference.hits import Lines, SceneTracer
 
 GLASS = tl.Medium(ior=1.5)
 
@@ -46,7 +46,7 @@ def test_nearest_surfaces_are_those_of_the_reference(rng: np.random.Generator) -
     points = origins * caster.radius + caster.center - scene.camera.eye
     lines = Lines(points, directions, np.zeros(4000), np.full(4000, np.inf))
     expected = np.full(4000, np.inf)
-    for hits in Tracer(scene).hits(lines):
+    for hits in SceneTracer(scene).hits(lines):
         np.minimum.at(expected, hits.pixel, hits.distance)
     found = distance.min(axis=1) * caster.radius
     assert (np.isinf(found) != np.isinf(expected)).sum() <= 1

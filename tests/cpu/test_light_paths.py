@@ -14,9 +14,8 @@ from translucent.cpu.renderer import CpuRenderer
 from translucent.cpu.shading import EmbreeLightPaths
 from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.solids import Box, Sphere
-from translucent.reference.light_paths import LightPaths
-from translucent.reference.sheets import sheet_thicknesses
-from translucent.reference.surface_light import SurfaceLight
+from translucent.reference.light_paths import LightPaths, SurfaceLight
+from translucent.reference.surfaces import sheet_thicknesses
 
 CAMERA = tl.Camera.look_at((2.5, 2.0, 3.5), (0.0, -0.3, 0.0))
 RED = tl.Medium(absorption=(0.1, 1.0, 2.0))

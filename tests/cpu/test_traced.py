@@ -24,10 +24,9 @@ from translucent.planning.plan import plan_scene
 from translucent.planning.rendered import Treatment
 from translucent.planning.request import RenderRequest
 from translucent.reference import pixel_rays
-from translucent.reference.light_paths import LightPaths
+from translucent.reference.light_paths import LightPaths, SurfaceLight
 from translucent.reference.render import scene_hits
-from translucent.reference.sheets import sheet_thicknesses
-from translucent.reference.surface_light import SurfaceLight
+from translucent.reference.surfaces import sheet_thicknesses
 
 SIZE = (20, 20)
 BALL = Sphere().tessellate(24)

@@ -12,7 +12,7 @@ import translucent as tl
 from tests import references
 from translucent.geometry.solids import Box, Sphere
 from translucent.reference.light_paths import LightPaths
-from translucent.reference.sheets import sheet_thicknesses
+from translucent.reference.surfaces import sheet_thicknesses
 
 Array = npt.NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from translucent.gpu.constants import CONSTANTS
 from translucent.interop.pyrender import backdrop_from_pyrender, render, render_scene, scene_from_pyrender, to_pyrender
 from translucent.planning.passes import PassName
 from translucent.reference.hits import line_hits, world_normals
-from translucent.reference.opaque import nearest_opaque
+from translucent.reference.surfaces import nearest_opaque
 
 Array = npt.NDArray[Any]
 

@@ -9,8 +9,8 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, SphericalShell
 from translucent.media.medium import Medium
 from translucent.reference import Hits, line_hits
+from translucent.reference.hits import pixel_rays
 from translucent.reference.intervals import Intervals, body_intervals, merge, scene_intervals, unbalanced
-from translucent.reference.rays import pixel_rays
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 

@@ -8,9 +8,9 @@ import pytest
 from translucent.geometry.solids import Box
 from translucent.media.medium import Medium
 from translucent.reference.compositing import composite
+from translucent.reference.hits import Rays
 from translucent.reference.intervals import Intervals
-from translucent.reference.rays import Rays
-from translucent.reference.sheets import Crossings
+from translucent.reference.surfaces import Crossings
 from translucent.reference.volume import Segments, Volume, multiplicities, volume_segments
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Overlap, Scene

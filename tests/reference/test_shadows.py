@@ -274,8 +274,7 @@ def test_paint_and_layers_are_shadowed_and_do_not_shadow_themselves() -> None:
 
 def sky_on_ground(count: int, *objects: tl.Object, points: Array) -> Array:
     """(k, 3): irradiance at points of the ground under a sky of radiance 1."""
-    from translucent.reference.light_paths import LightPaths
-    from translucent.reference.surface_light import SurfaceLight
+    from translucent.reference.light_paths import LightPaths, SurfaceLight
 
     shown = tl.Scene([*objects, GROUND], DOWN, environment=tl.Environment.constant(1.0), environment_shadows=count)
     light = SurfaceLight(LightPaths(shown, (None,) * len(shown.objects)))

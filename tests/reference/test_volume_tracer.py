@@ -10,7 +10,7 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere, SphericalShell, Torus
 from translucent.media.medium import Medium
 from translucent.reference import line_hits, pixel_rays
-from translucent.reference.tracer import BoxTree, Lines, Tracer
+from translucent.reference.hits import BoxTree, Lines, SceneTracer
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 
@@ -39,7 +39,9 @@ def test_the_rays_of_a_picture(matrix: Array, eye: tuple[float, ...]) -> None:
         mesh = solid.tessellate(24)
         expected = line_hits(mesh, matrix, camera, (31, 23))
         rays = pixel_rays(camera, (31, 23))
-        (found,) = Tracer(Scene([Object(mesh, Medium(1.0), matrix)], camera)).hits(lines(rays.origins, rays.directions))
+        (found,) = SceneTracer(Scene([Object(mesh, Medium(1.0), matrix)], camera)).hits(
+            lines(rays.origins, rays.directions)
+        )
         for name in ("pixel", "face", "sign"):
             np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
         np.testing.assert_allclose(found.distance, expected.distance, atol=1e-13)
@@ -49,7 +51,7 @@ def test_every_ray_enters_as_often_as_it_leaves(rng: np.random.Generator) -> Non
     """Also through vertices and along edges, where the faces around them must agree."""
     mesh = Sphere().tessellate(12)
     scene = Scene([Object(mesh, Medium(1.0), TURN)], Camera.look_at((0.3, 0.2, 5.0), (0, 0, 0)))
-    traced = Tracer(scene).objects[0]
+    traced = SceneTracer(scene).objects[0]
     for target in (traced.corners[:, 0], 0.5 * (traced.corners[:, 0] + traced.corners[:, 1])):
         rays = random_lines(rng, len(target), target)
         hits = traced.hits(rays)
@@ -69,7 +71,7 @@ def test_rays_along_the_axes_of_a_box() -> None:
     for axis in range(3):
         turned = np.roll(origin, axis + 1, axis=1)
         along = np.broadcast_to(np.roll([0.0, 0.0, 1.0], axis + 1), turned.shape)
-        (hits,) = Tracer(Scene([Object(mesh, Medium(1.0))], camera)).hits(lines(turned, along))
+        (hits,) = SceneTracer(Scene([Object(mesh, Medium(1.0))], camera)).hits(lines(turned, along))
         assert (np.bincount(hits.pixel, hits.sign, 9) == 0).all()
         assert set(np.bincount(hits.pixel, hits.sign * -hits.distance, 9)) <= {0.0, 1.0}
         assert np.bincount(hits.pixel, minlength=9)[4] == 2
@@ -100,7 +102,7 @@ def test_trees_of_any_size(count: int, rng: np.random.Generator) -> None:
 
 def test_lines_end(rng: np.random.Generator) -> None:
     mesh = Sphere().tessellate(16)
-    tracer = Tracer(Scene([Object(mesh, Medium(1.0))], Camera.look_at((0.0, 0.0, 5.0), (0, 0, 0))))
+    tracer = SceneTracer(Scene([Object(mesh, Medium(1.0))], Camera.look_at((0.0, 0.0, 5.0), (0, 0, 0))))
     rays = random_lines(rng, 300)
     rays = Lines(rays.origins + tracer.center, rays.directions, rays.start, rays.end)
     (whole,) = tracer.hits(rays)
@@ -114,7 +116,7 @@ def test_lines_end(rng: np.random.Generator) -> None:
 
 def test_a_ball_holds_the_scene(rng: np.random.Generator) -> None:
     mesh = Torus().tessellate(16)
-    tracer = Tracer(Scene([Object(mesh, Medium(1.0), TURN)], Camera.look_at((9.0, 2.0, 5.0), (0, 0, 0))))
+    tracer = SceneTracer(Scene([Object(mesh, Medium(1.0), TURN)], Camera.look_at((9.0, 2.0, 5.0), (0, 0, 0))))
     rays = random_lines(rng, 300)
     rays = Lines(rays.origins + tracer.center, rays.directions, rays.start, rays.end)
     enter, leave = tracer.ball(rays.origins, rays.directions)
@@ -130,7 +132,9 @@ def test_unwelded_corners_close_as_welded_ones(rng: np.random.Generator) -> None
     welded = Sphere().tessellate(10)
     corners = welded.vertices[welded.faces].reshape(-1, 3)
     mesh = Mesh(corners, np.arange(len(corners)).reshape(-1, 3))
-    traced = Tracer(Scene([Object(mesh, Medium(1.0), MIRROR)], Camera.look_at((0.3, 0.1, 5.0), (0, 0, 0)))).objects[0]
+    traced = SceneTracer(
+        Scene([Object(mesh, Medium(1.0), MIRROR)], Camera.look_at((0.3, 0.1, 5.0), (0, 0, 0)))
+    ).objects[0]
     rays = random_lines(rng, len(corners), traced.corners.reshape(-1, 3))
     hits = traced.hits(rays)
     assert (np.bincount(hits.pixel, hits.sign, len(rays)) == 0).all()

@@ -32,9 +32,8 @@ from translucent.media.medium import Medium
 from translucent.media.presets import preset
 from translucent.planning.caustics import Caustics
 from translucent.planning.passes import PassName
-from translucent.reference.light_paths import LightPaths
-from translucent.reference.sheets import sheet_thicknesses
-from translucent.reference.surface_light import SurfaceLight
+from translucent.reference.light_paths import LightPaths, SurfaceLight
+from translucent.reference.surfaces import sheet_thicknesses
 from translucent.renderer import Renderer
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment

@@ -41,9 +41,9 @@ from translucent.gpu.targets import Targets
 from translucent.media.medium import Medium
 from translucent.planning.passes import PassName
 from translucent.planning.shadow_maps import ShadowMaps
+from translucent.reference.hits import Lines
 from translucent.reference.light_paths import LightPaths, way_of
-from translucent.reference.sheets import sheet_thicknesses
-from translucent.reference.tracer import Lines
+from translucent.reference.surfaces import sheet_thicknesses
 from translucent.renderer import Renderer
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment

@@ -16,9 +16,17 @@ from translucent.arrays import Array, Integers, Mask, expanded, slices
 from translucent.files.reading import require_memory
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.ray_caster import NEAREST, RayCaster, SceneRayCaster, point_from
-from translucent.reference.hits import Hits, PictureGrid, camera_vertices, cross_triangles, pixel_span, sorted_hits
-from translucent.reference.rays import Rays
-from translucent.reference.tracer import Lines, TracedObject
+from translucent.reference.hits import (
+    Hits,
+    Lines,
+    PictureGrid,
+    Rays,
+    TracedObject,
+    camera_vertices,
+    cross_triangles,
+    pixel_span,
+    sorted_hits,
+)
 from translucent.scene.camera import Camera, check_size
 from translucent.scene.scene import Object
 

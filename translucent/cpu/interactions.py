@@ -17,8 +17,8 @@ from translucent.formulas.bsdf import Interaction, below_coat, diffuse_radiance,
 from translucent.formulas.interface import CLEARCOAT_IOR, reflected_direction, refracted_direction
 from translucent.formulas.light import highlight_from
 from translucent.geometry.ray_caster import SceneRayCaster, dot, unit
-from translucent.reference.rays import Rays
-from translucent.reference.surface_light import SurfaceLight
+from translucent.reference.hits import Rays
+from translucent.reference.light_paths import SurfaceLight
 from translucent.scene.lights import PositionalLight
 
 #: Interfaces of a ray that have points of their own; later interfaces take them again, with other offsets.

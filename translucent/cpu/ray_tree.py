@@ -35,14 +35,11 @@ from translucent.formulas import optics
 from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS
 from translucent.formulas.interface import reflected_direction
 from translucent.geometry.ray_caster import dot, unit
-from translucent.reference.compositing import composite
-from translucent.reference.emission import emission_of_mixtures
-from translucent.reference.hits import Hits
+from translucent.reference.compositing import composite, emission_of_mixtures
+from translucent.reference.hits import Hits, Rays
 from translucent.reference.intervals import Intervals
-from translucent.reference.opaque import OpaqueHits, reflected_radiance
-from translucent.reference.rays import Rays
-from translucent.reference.sheets import scene_crossings
-from translucent.reference.surface_light import SurfaceLight
+from translucent.reference.light_paths import SurfaceLight
+from translucent.reference.surfaces import OpaqueHits, reflected_radiance, scene_crossings
 from translucent.reference.volume import Volume, volume_segments
 
 

@@ -26,9 +26,8 @@ from translucent.frames.frame import Frame
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.ray_caster import RayCaster, embree_versions
 from translucent.planning.render_plan import Capabilities, RenderPlan
-from translucent.reference.hits import Hits
-from translucent.reference.rays import Rays
-from translucent.reference.refraction import bends
+from translucent.reference.hits import Hits, Rays
+from translucent.reference.refracted import bends
 from translucent.scene.scene import Scene
 
 #: Rays of the picture that are followed together: the working arrays stay below 100 MB.

@@ -22,14 +22,11 @@ from translucent.planning.caustics import Caustics
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import darkened
-from translucent.reference.hits import Hits, sorted_hits
+from translucent.reference.hits import Hits, Lines, Rays, SceneTracer, TracedObject, sorted_hits
 from translucent.reference.intervals import sum_signs
-from translucent.reference.light_paths import LightPaths
-from translucent.reference.rays import Rays
+from translucent.reference.light_paths import LightPaths, SurfaceLight
 from translucent.reference.render import shade_hits
-from translucent.reference.sheets import sheet_thicknesses
-from translucent.reference.surface_light import SurfaceLight
-from translucent.reference.tracer import Lines, TracedObject, Tracer
+from translucent.reference.surfaces import sheet_thicknesses
 from translucent.scene.scene import Light, Scene
 
 #: Number of faces of one object on a line after which Embree is not asked for more.
@@ -56,9 +53,9 @@ class EmbreeLightPaths(LightPaths):
         self._meshes = meshes
 
     @cached_property
-    def tracer(self) -> Tracer:
+    def tracer(self) -> SceneTracer:
         """Ray caster for the objects."""
-        found = Tracer(self.scene)
+        found = SceneTracer(self.scene)
         found.objects = [
             _EmbreeObject(traced.body, traced.corners, self._meshes[traced.body.mesh], self.scene)
             for traced in found.objects

@@ -12,7 +12,7 @@ from translucent.cpu.interactions import BranchInteractions, InterfaceHits
 from translucent.cpu.interior_list import Branches
 from translucent.formulas.footprint import ALPHA_OF_DEVIATION, FOOTPRINT_STEP, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
 from translucent.geometry.ray_caster import SceneRayCaster, dot
-from translucent.reference.rays import Rays
+from translucent.reference.hits import Rays
 from translucent.reference.refracted import places_on_backdrop
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment, FilteredEnvironment, equirectangular_uv, filtered

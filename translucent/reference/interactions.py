@@ -17,12 +17,10 @@ from translucent.formulas.interface import (
     slab_reflectance,
 )
 from translucent.formulas.thin_film import film_slab_reflectance, film_slab_transmittance
+from translucent.reference.hits import Lines, Rays
 from translucent.reference.interfaces import FirstInterfaces, Inside, Optics, interface_normals
-from translucent.reference.light_paths import LightPaths
+from translucent.reference.light_paths import LightPaths, SurfaceLight
 from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
-from translucent.reference.rays import Rays
-from translucent.reference.surface_light import SurfaceLight
-from translucent.reference.tracer import Lines
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from translucent.arrays import Array, Integers, Mask
-from translucent.reference.hits import Hits
-from translucent.reference.rays import Rays
+from translucent.reference.hits import Hits, Rays
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 

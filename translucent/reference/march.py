@@ -19,12 +19,11 @@ from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.reference import compositing as blending
 from translucent.reference.compositing import ColorLayer, _layers
-from translucent.reference.light_paths import LightPaths
+from translucent.reference.hits import Rays, pixel_rays
+from translucent.reference.light_paths import LightPaths, SurfaceLight
 from translucent.reference.quadrature import MarchSteps, even_steps, gauss_steps, hashed
-from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.render import CrossedMedia, crossed_media, scene_hits, seen_behind
 from translucent.reference.scattering import light_source, light_variable
-from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import points_on
 from translucent.scene.camera import check_size
 from translucent.scene.lights import PositionalLight

@@ -1,6 +1,6 @@
 """Photons from the lights of a scene through its interfaces onto opaque objects, in float64: the truth of caustics.
 
-They go the ways of `translucent.reference.interface_paths` from the other end: interfaces turn the same shares of light
+They go the ways of `translucent.reference.path_trace` from the other end: interfaces turn the same shares of light
 either way.
 """
 
@@ -13,18 +13,13 @@ import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.errors import InputError
-from translucent.reference.hits import world_normals
+from translucent.reference.hits import Lines, Rays, SceneTracer, world_normals
 from translucent.reference.interactions import LiveRays
-from translucent.reference.interface_paths import InterfacePaths, _Flight
 from translucent.reference.interfaces import Optics
-from translucent.reference.light_paths import LightPaths, parts_of
-from translucent.reference.path_trace import BENT_BATCH, _alike
-from translucent.reference.rays import Rays
-from translucent.reference.refracted import RayEnds
-from translucent.reference.refraction import check_untextured
-from translucent.reference.sheets import sheet_thicknesses
-from translucent.reference.surface_light import SurfaceLight
-from translucent.reference.tracer import Lines, Tracer
+from translucent.reference.light_paths import LightPaths, SurfaceLight, parts_of
+from translucent.reference.path_trace import BENT_BATCH, InterfacePaths, _alike, _Flight
+from translucent.reference.refracted import RayEnds, check_untextured
+from translucent.reference.surfaces import sheet_thicknesses
 from translucent.scene.camera import check_size
 from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Scene
@@ -158,7 +153,7 @@ def _emitted(scene: Scene, light: Light, some: Integers, photons: int, rng: np.r
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction)
         across = radius * np.sqrt(u)[:, None] * turn @ _across(direction)
-        tracer = Tracer(scene)
+        tracer = SceneTracer(scene)
         origins = middle + across - 2.0 * (tracer.radius + radius) * direction
         power = np.asarray(light.irradiance) * np.pi * radius**2 / photons
         return Rays(origins, np.tile(direction, (len(some), 1)), none), np.tile(power, (len(some), 1))
@@ -218,7 +213,7 @@ def _visible(scene: Scene, points: Array) -> Array:
         directions = points / distance[:, None]
     origins = points - distance[:, None] * directions
     visible = np.ones(len(points), dtype=bool)
-    tracer = Tracer(scene)
+    tracer = SceneTracer(scene)
     for traced in tracer.objects:
         if traced.body.medium is None:
             lines = Lines(origins, directions, np.zeros(len(points)), distance * (1.0 - _CONTACT))

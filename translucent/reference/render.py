@@ -22,17 +22,20 @@ from translucent.planning.methods.base import check_method
 from translucent.planning.passes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities, RenderPlan
-from translucent.reference.compositing import composite
-from translucent.reference.emission import emission_of_mixtures
-from translucent.reference.hits import Hits, line_hits
+from translucent.reference.compositing import composite, emission_of_mixtures
+from translucent.reference.hits import Hits, Rays, line_hits, pixel_rays
 from translucent.reference.intervals import scene_intervals
-from translucent.reference.light_paths import LightPaths
-from translucent.reference.opaque import OpaqueHits, nearest_opaque, reflected_radiance
-from translucent.reference.rays import Rays, pixel_rays
-from translucent.reference.refraction import BOUNCES, PATHS, bends, refracted_light
+from translucent.reference.light_paths import LightPaths, SurfaceLight
+from translucent.reference.refracted import BOUNCES, PATHS, bends, refracted_light
 from translucent.reference.scattering import scattered_once
-from translucent.reference.sheets import scene_crossings, sheet_hits, sheet_thicknesses
-from translucent.reference.surface_light import SurfaceLight
+from translucent.reference.surfaces import (
+    OpaqueHits,
+    nearest_opaque,
+    reflected_radiance,
+    scene_crossings,
+    sheet_hits,
+    sheet_thicknesses,
+)
 from translucent.reference.volume import Segments, Volume, volume_segments
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene, check_scene

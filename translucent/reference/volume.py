@@ -10,10 +10,10 @@ import numpy.typing as npt
 from translucent.arrays import Array, Integers
 from translucent.formulas.phase import ISOTROPIC
 from translucent.geometry.ray_caster import point_from
+from translucent.reference.hits import Rays
 from translucent.reference.intervals import Intervals
 from translucent.reference.phase import phase_value
-from translucent.reference.rays import Rays
-from translucent.reference.sheets import Crossings
+from translucent.reference.surfaces import Crossings
 from translucent.scene.scene import Scene
 
 
