@@ -13,7 +13,8 @@ import pytest
 
 import translucent as tl
 from translucent.cli import main
-from translucent.geometry.solids import Box
+from translucent.geometry import support
+from translucent.geometry.solids import Box, Sphere
 from translucent.planning.plan import plan
 from translucent.preview import document as orbiting
 from translucent.preview import scenes
@@ -296,6 +297,20 @@ def test_another_process_reads_models_beside_a_picture(
     task = Task("opening", lambda _: None, lambda _: None)
     found: Any = scenes.load_with(task, Elsewhere(), Model(str(path)), pictured=pictured)  # type: ignore[arg-type]
     assert found.by == read
+
+
+def test_what_takes_long_of_an_opened_model_is_there_before_it_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(*_: object) -> None:
+        raise AssertionError("the window would stand still")
+
+    ball = Sphere().tessellate(200)
+    opened = SimpleNamespace(scene=SimpleNamespace(objects=[tl.Object(ball)]))
+    monkeypatch.setattr(scenes, "load", lambda *_: opened)
+    scenes.load_with(Task("opening", lambda _: None, lambda _: None), None, Model("ball"))  # type: ignore[arg-type]
+    monkeypatch.setattr(support, "_Clusters", late)
+    monkeypatch.setattr(tl.Mesh, "_used", property(late))
+    turned = tl.Object(ball, transform=np.diag([2.0, 2.0, 2.0, 1.0]))
+    assert (support.Support(ball, turned.matrix).many, turned.radius) == (True, pytest.approx(2.0))
 
 
 def test_drawing_has_less_time_where_the_rest_of_the_window_takes_long() -> None:

@@ -122,7 +122,7 @@ def load_with(task: Task, pool: Pool, model: Model, allow_outside: bool = False,
     else:
         loaded = load(model, allow_outside)
     for item in loaded.scene.objects:
-        Support(item.mesh, item.matrix)  # which divides large meshes into clusters here, and not in the window's loop
+        _ = Support(item.mesh, item.matrix), item.radius  # whose parts are kept: the window's loop would stand still
     return loaded
 
 
