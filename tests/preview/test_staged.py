@@ -155,7 +155,8 @@ def test_maps_that_take_several_frames_are_those_of_one(staged: Workspace, monke
                 break
             except PostponedError:
                 continue
-    assert asked == 13, "maps of a lamp and of 9 directions, those above the ground, and 3 frames that ended early"
+    seen, drawn = 1 + scene.environment_shadows, 1 + 9  # by a light and all directions; maps of those above the ground
+    assert asked == seen + drawn + 8, "once for what each sees and for each map, and 8 frames that ended early"
     np.testing.assert_array_equal(found, expected)
 
 
