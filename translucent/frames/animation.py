@@ -177,14 +177,6 @@ def _alike(frames: Iterable[Pixels]) -> Iterator[Pixels]:
     return checked()
 
 
-def _write_gif(path: Path, pictures: Iterator[Pixels], fps: float) -> None:
-    _write_with_pillow(path, pictures, fps, format="GIF")
-
-
-def _write_webp(path: Path, pictures: Iterator[Pixels], fps: float) -> None:
-    _write_with_pillow(path, pictures, fps, format="WEBP", quality=90, method=4)
-
-
 def _write_with_pillow(path: Path, pictures: Iterator[Pixels], fps: float, **options: Any) -> None:
     from PIL import Image
 
@@ -194,4 +186,8 @@ def _write_with_pillow(path: Path, pictures: Iterator[Pixels], fps: float, **opt
         first.save(stream, save_all=True, append_images=images, duration=round(1000.0 / fps), loop=0, **options)
 
 
-WRITERS: dict[str, Callable[..., None]] = {".webp": _write_webp, ".gif": _write_gif, ".mp4": write_film}
+WRITERS: dict[str, Callable[..., None]] = {
+    ".webp": partial(_write_with_pillow, format="WEBP", quality=90, method=4),
+    ".gif": partial(_write_with_pillow, format="GIF"),
+    ".mp4": write_film,
+}

@@ -7,7 +7,6 @@ from collections.abc import Generator
 from contextlib import ExitStack
 
 import numpy as np
-import numpy.typing as npt
 
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.path_trace import TILE, Progress
@@ -93,17 +92,14 @@ class PhotonPicture:
         self._job.uniforms.bind()
         self._into.clear()
         self._pass.shade(self._job, self._into, self.rounds)
-        before, light = self._shown[1], self._read()
+        before = self._shown[1]
+        light = np.frombuffer(self._into.read(components=3, dtype="f4"), np.float32).copy()
         if before.size:
             # Half of the rounds were in both: their difference varies as the mean of all does.
             with np.errstate(under="ignore"):
                 share = self._shown[0] / (self.rounds - self._shown[0])
                 self.error = float(np.sqrt(share * np.square(light - before, dtype=np.float64).mean()))
         self._shown = self.rounds, light
-
-    def _read(self) -> npt.NDArray[np.float32]:
-        values = np.frombuffer(self._into.read(components=3, dtype="f4"), np.float32)
-        return values.copy()
 
     def release(self) -> None:
         """Free what belongs to it."""

@@ -262,7 +262,11 @@ def build_program(
         With the compiler's message, by file and line.
     """
     given = dict(defines or {})
-    stages = [_stage(name, given, version) for name in (vertex, fragment)]
+    stages = []
+    for name in (vertex, fragment):
+        gathered = gather(name)
+        own = {key: value for key, value in given.items() if key in gathered.switches}
+        stages.append(_with_switches(name, gathered, own, version))
     used = {key for stage in stages for key in given if f"#define {key} " in stage.text}
     if unused := sorted(given.keys() - used):
         raise RenderError(f"shaders {vertex!r} and {fragment!r}", f"neither asks for {unused}", "check the spelling")
@@ -281,13 +285,6 @@ def build_program(
         if name in program or not any(re.search(rf"\b{name}\b", stage.text) for stage in stages):
             set_uniform(program, name, unit)
     return program
-
-
-def _stage(name: str, defines: Mapping[str, int], version: int) -> ShaderSource:
-    """Preprocessed stage, with those of the defines that it uses."""
-    gathered = gather(name)
-    used = {key: value for key, value in defines.items() if key in gathered.switches}
-    return _with_switches(name, gathered, used, version)
 
 
 def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:

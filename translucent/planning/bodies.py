@@ -47,7 +47,7 @@ def medium_slots(scene: Scene, apart: Sequence[int] = ()) -> tuple[Slot, ...]:
     for i, body in enumerate(scene.objects):
         if body.medium is None or body.sheet_thickness is not None:
             continue
-        own = i if i in apart or not _never_negative(body) else None
+        own = i if i in apart or not body.mesh.diagnosis.sound else None
         priority = body.priority if scene.overlap == "priority" else 0
         groups.setdefault((own, priority, fillings[i]), []).append(i)
     slots = []
@@ -102,23 +102,15 @@ def overlapping_pair(
     return first_overlap(np.stack([body.bounds for body in bodies]), matters)
 
 
-def _never_negative(body: Object) -> bool:
-    return body.mesh.diagnosis.sound
-
-
 def _fillings(scene: Scene) -> list[Hashable]:
     """Key of the medium of each object; objects with equal keys may fill a point in place of each other."""
     # Many bodies share a medium, and its key.
     media = {id(item.medium): item.medium for item in scene.objects}
     keys = {number: _medium_key(medium, bool(scene.lights)) for number, medium in media.items()}
-    return [
-        i if (key := keys[id(item.medium)]) is None or _is_like_no_other(item) else key
-        for i, item in enumerate(scene.objects)
-    ]
-
-
-def _is_like_no_other(item: Object) -> bool:
-    return item.density is not None or treatment_of(item) is Treatment.VOLUME
+    # Where density varies, or rays gather light, a body is like no other.
+    own = [item.density is not None or treatment_of(item) is Treatment.VOLUME for item in scene.objects]
+    found = [keys[id(item.medium)] for item in scene.objects]
+    return [i if key is None or apart else key for i, (key, apart) in enumerate(zip(found, own, strict=True))]
 
 
 def _medium_key(medium: Medium | None, lit: bool) -> Hashable:

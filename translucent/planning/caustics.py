@@ -122,16 +122,12 @@ def passes_with_caustics(
     for one in passes:
         steps.append(_into_media(one, scene, lit, caustics) if lit and one.name is carries else one)
         if one.name is PassName.OPAQUE:
-            steps.append(_onto_opaque(scene, caustics))
+            opaque = indices(scene, lambda item: item.medium is None)
+            cost = caustics.cost_of_a_million * caustics.photons / 1e6
+            steps.append(PassSpec(PassName.CAUSTICS, _landing(scene, caustics), opaque, 1, cost=cost))
         elif one.name is PassName.SHADE and scene.opaque:
             steps[-1] = _shaded_with(steps[-1], scene, caustics)
     return tuple(steps)
-
-
-def _onto_opaque(scene: Scene, caustics: Caustics) -> PassSpec:
-    """Pass of the photons that land on opaque objects."""
-    opaque, cost = indices(scene, lambda item: item.medium is None), caustics.cost_of_a_million * caustics.photons / 1e6
-    return PassSpec(PassName.CAUSTICS, _landing(scene, caustics), opaque, 1, cost=cost)
 
 
 def _shaded_with(step: PassSpec, scene: Scene, caustics: Caustics) -> PassSpec:

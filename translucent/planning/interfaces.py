@@ -333,11 +333,6 @@ INTERFACES: dict[str, type[InterfaceMode]] = {
 USUAL_DEPTH = 12
 
 
-def _default_interfaces(*, solid: bool) -> InterfaceMode:
-    """The way that the planner takes, if none is requested: sheets, which bend no ray, need no tracing."""
-    return TracedInterfaces(depth=USUAL_DEPTH) if solid else ScreenInterfaces()
-
-
 def chosen_interfaces(scene: Scene, requested: InterfaceMode | None, *, sheets: bool) -> tuple[InterfaceMode, str]:
     """The way in which interfaces are found, and why it is not the one that the planner would rather take.
 
@@ -354,7 +349,8 @@ def chosen_interfaces(scene: Scene, requested: InterfaceMode | None, *, sheets: 
         If what is requested cannot be done in the scene.
     """
     solid = not sheets and any(scene.objects[i].sheet_thickness is None for i in with_interfaces(scene))
-    chosen = _default_interfaces(solid=solid) if requested is None else requested
+    # Sheets, which bend no ray, need no tracing.
+    chosen = requested or (TracedInterfaces(depth=USUAL_DEPTH) if solid else ScreenInterfaces())
     if chosen.one_interface and not solid:
         return ScreenInterfaces(), ""  # sheets have one interface, whatever is requested
     if sheets or not with_interfaces(scene) or (refusal := chosen.refusal(scene)) is None:

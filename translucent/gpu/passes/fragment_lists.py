@@ -87,8 +87,10 @@ class FragmentListsPass:
         heads.clear()
         for name, buffer in (("count", count), ("heads", heads), ("nodes", self._nodes(job))):
             buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
-        _use_rows(job.targets["steepest"], first, last)
-        job.targets["steepest"].clear()
+        steepest = job.targets["steepest"]
+        steepest.scissor = 0, first, steepest.width, last - first
+        steepest.use()
+        steepest.clear()
         gl.enable_only(moderngl.BLEND)
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MAX
@@ -116,8 +118,3 @@ class FragmentListsPass:
         self._resolve.draw_covered(job, program, job.targets["ordered"], rows=(first, last))
         # The next lists must not begin before these have been walked along.
         job.gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
-
-
-def _use_rows(framebuffer: moderngl.Framebuffer, first: int, last: int) -> None:
-    framebuffer.scissor = (0, first, framebuffer.width, last - first)
-    framebuffer.use()

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import moderngl
-import numpy as np
-import numpy.typing as npt
 
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
@@ -140,7 +138,7 @@ def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:
         "VARIES": features.varies,
         "SCATTERS_AGAIN": features.scatters_again,
         # One set of points serves all channels where light fares alike in them.
-        "GRAY": all(_is_gray(slot.medium.extinction) for slot in features.slots),
+        "GRAY": all((slot.medium.extinction == slot.medium.extinction[0]).all() for slot in features.slots),
         "SHADOWS": bool(features.scene.opaque),
     }
 
@@ -164,7 +162,3 @@ def coat_switches(objects: Iterable[Object]) -> dict[str, bool]:
         "THIN_FILM": any(surface.iridescence > 0 for surface in surfaces),
         "CLEAR_COAT": any(surface.clearcoat > 0 for surface in surfaces),
     }
-
-
-def _is_gray(values: npt.NDArray[np.float64]) -> bool:
-    return bool((values == values[0]).all())
