@@ -127,7 +127,7 @@ def _along_last_axis(
 
 
 def _intervals(line: Integers, height: Array, sign: Integers) -> tuple[Integers, Integers]:
-    """Numbers of the crossings at which intervals inside begin and end; lines that do not balance have none."""
+    """Indices of the crossings at which lines enter and leave the mesh; unbalanced lines have none."""
     winding = np.cumsum(sign)
     first = np.flatnonzero(np.diff(line, prepend=-1) != 0)
     of = np.cumsum(np.diff(line, prepend=-1) != 0) - 1

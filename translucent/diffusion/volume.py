@@ -438,7 +438,7 @@ def _from_lights(
             place = points - np.asarray(light.direction) * cells.step * sum(density.shape)
             power = np.broadcast_to(np.asarray(light.irradiance), points.shape)
         if stops is not None:
-            power = np.where(_in_the_way(stops, points, place)[:, None], 0.0, power)
+            power = np.where((stops.nearest(points, place - points)[1] < 1.0)[:, None], 0.0, power)
         # From the edge of the cell on, the mean over it: of what lets nothing through, all that gets in.
         own = density[inside] * cells.step
         if body.density is None:
@@ -455,11 +455,6 @@ def _from_lights(
         unturned[inside] += turned
         ahead[inside] += turned - all_turned
     return unturned, ahead
-
-
-def _in_the_way(stops: RayCaster, points: Array, places: Array) -> npt.NDArray[np.bool_]:
-    """(k,): whether surfaces are between points (k, 3) and places (k, 3)."""
-    return np.asarray(stops.nearest(points, places - points)[1] < 1.0)
 
 
 def _mean_shares(light: SpotLight, points: Array, step: float) -> Array:

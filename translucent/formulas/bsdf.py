@@ -181,7 +181,7 @@ def sampled_branches(lobes: Lobes, throughput: Array, share: Array) -> tuple[Mas
 def microfacet_normal(
     normal: npt.ArrayLike, direction: npt.ArrayLike, alpha: npt.ArrayLike, shares: npt.ArrayLike
 ) -> Array:
-    """Normal (..., 3) of a microfacet as light sees it, for two random numbers `shares` (..., 2), 0 to 1."""
+    """Random visible normal (..., 3) of a GGX microfacet, from two random numbers `shares` (..., 2), 0 to 1."""
     n, d = np.asarray(normal, np.float64), np.asarray(direction, np.float64)
     axis = np.where(np.abs(n[..., :1]) < 0.7, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     aside = np.cross(n, axis)

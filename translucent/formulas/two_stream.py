@@ -87,7 +87,7 @@ def multiple_reflectance(absorption_depth: npt.ArrayLike, scattering_depth: npt.
 
 @np.errstate(under="ignore")
 def mirrored_reflectance(reflectance: npt.ArrayLike, transmittance: npt.ArrayLike, mirrored: npt.ArrayLike) -> Array:
-    """Reflectance of a layer between interfaces that mirror the share r of diffuse light (Saunderson 1942).
+    """Reflectance of a layer between interfaces of internal reflectance r for diffuse light (Saunderson 1942).
 
     Of what the layer sends out, 1 - r leaves, and the rest comes back to it, any number of times:
     (1 - r) (R (1 - r R) + r T^2) / ((1 - r R)^2 - r^2 T^2).
@@ -106,7 +106,7 @@ def mirrored_reflectance(reflectance: npt.ArrayLike, transmittance: npt.ArrayLik
 
 @np.errstate(under="ignore")
 def mirrored_transmittance(reflectance: npt.ArrayLike, transmittance: npt.ArrayLike, mirrored: npt.ArrayLike) -> Array:
-    """Transmittance of a layer between two such interfaces: (1 - r) T / ((1 - r R)^2 - r^2 T^2)."""
+    """Transmittance of a layer between interfaces of internal reflectance r: (1 - r) T / ((1 - r R)^2 - r^2 T^2)."""
     back, through, r = (np.asarray(x, dtype=np.float64) for x in (reflectance, transmittance, mirrored))
     return np.asarray((1.0 - r) * through / _mirrored_denominator(back, through, r))
 

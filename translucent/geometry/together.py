@@ -22,7 +22,11 @@ def diagnose_together(meshes: Iterable[Mesh]) -> None:
 
     They equal those of each mesh alone, to the last bit.
     """
-    waiting = {id(mesh): mesh for mesh in meshes if "diagnosis" not in mesh.__dict__ and _is_small(mesh)}
+    waiting = {
+        id(mesh): mesh
+        for mesh in meshes
+        if "diagnosis" not in mesh.__dict__ and len(mesh.faces) <= SMALL and len(mesh.vertices) <= 3 * SMALL
+    }
     if len(waiting) < FEWEST:
         return
     batch: list[Mesh] = []
@@ -34,10 +38,6 @@ def diagnose_together(meshes: Iterable[Mesh]) -> None:
         batch.append(mesh)
         triangles += len(mesh.faces)
     _diagnose(batch)
-
-
-def _is_small(mesh: Mesh) -> bool:
-    return len(mesh.faces) <= SMALL and len(mesh.vertices) <= 3 * SMALL
 
 
 def _diagnose(meshes: list[Mesh]) -> None:

@@ -388,8 +388,7 @@ class StraightLight:
         return np.array(found).reshape(len(found), len(points), 3)
 
     def scattered(self, live: LiveRays, weights: Array, channel: int) -> Array:
-        """(k, 3): radiance that media scatter from lights at the origins of `live` back along them, for each unit that
-        they scatter.
+        """(k, 3): in-scattered radiance of lights at the origins of `live`, over the scattering coefficient there.
 
         Parameters
         ----------

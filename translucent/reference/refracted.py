@@ -418,7 +418,7 @@ def _check(scene: Scene, bounces: int, paths: int) -> None:
 
 
 def check_untextured(scene: Scene, instead: str, *, random: bool = False) -> None:
-    """Check that interfaces are the same all over each body, and what lies on them is polished.
+    """Raise unless interfaces are the same all over each body, without textures.
 
     Errors say what to do `instead`. `random`: paths are followed by chance, which know films on rough interfaces of
     solids, and polished coats on these.

@@ -265,7 +265,7 @@ def _add_scattered(
     light: SurfaceLight,
     tolerance: float,
 ) -> None:
-    """Add light scattered once to what `shade_hits` gives, and its relative ``error`` (n,)."""
+    """Add singly scattered light to the arrays of `shade_hits`, and its relative ``error`` (n,)."""
     media = crossed_media(light, rays, hits, light.paths.sheets)
     found = scattered_once(light.paths, rays, media.segments, media.filling, tolerance)
     brightest = found.radiance.max(axis=1)

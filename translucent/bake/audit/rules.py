@@ -28,6 +28,7 @@ import numpy as np
 
 from translucent.arrays import Array
 from translucent.bake.audit.body import Body, Placement, material_name
+from translucent.formulas import optics
 from translucent.formulas.color import to_hex
 from translucent.gltf.accessors import Accessors, raw_mesh
 from translucent.gltf.file import GltfFile, Json
@@ -513,7 +514,7 @@ def viewer_colors(body: Body) -> dict[str, Array]:
     stated = body.seen_stated[finite]
     by_columns = stated * np.linalg.norm(directions * np.linalg.norm(matrix, axis=0), axis=1)
     ior = material.ior or 1.5
-    refracted = np.sqrt(1.0 - (1.0 - body.cosines[finite] ** 2) / ior**2)
+    refracted = optics.refracted_cosine(body.cosines[finite], ior)
     color, distance = np.asarray(material.attenuation_color), material.attenuation_distance
     sigma = extinction_of(body)
     absorbed = np.zeros(3) if np.isinf(distance) else (1.0 - np.maximum(color, BLACKEST)) / distance
