@@ -206,7 +206,7 @@ class SurfaceLight:
 
     def __init__(self, paths: LightPaths) -> None:
         self.paths, self.scene = paths, paths.scene
-        # A painted sheet does not shadow its own paint.
+        # A sheet with a diffuse base does not shadow that base.
         self._before = 2.0 * SHEET_ON_OPAQUE * paths.scene.diagonal
 
     def on_opaque(self, points: Array, normals: Array) -> Array:
@@ -214,7 +214,7 @@ class SurfaceLight:
         return self._irradiance(points, normals, 0.0)
 
     def on_interfaces(self, points: Array, normals: Array) -> Array:
-        """Irradiance (k, 3) on layers, and on paint of interfaces; parameters as for `on_opaque`."""
+        """Irradiance (k, 3) on layers, and on diffuse bases of interfaces; parameters as for `on_opaque`."""
         return self._irradiance(points, normals, self._before)
 
     def to_interfaces(self, light: Light, points: Array) -> Array:

@@ -18,7 +18,7 @@ from translucent.scene.surface import LEAST_COVER
 from translucent.scene.texture import Texture
 
 
-def painted(body: Object, face: Integers, barycentric: Array) -> Array:
+def color_and_opacity(body: Object, face: Integers, barycentric: Array) -> Array:
     """(k, 4): color and opacity of texture and vertices on faces (k,), at barycentric coordinates (k, 3)."""
     found = sampled(body, face, barycentric, None if body.surface is None else body.surface.color_texture)
     colors = body.mesh.colors
@@ -38,7 +38,7 @@ def without_cut_out(body: Object, hits: Hits) -> Hits:
     """Hits of an opaque object outside its holes (`Surface.alpha_cutoff`)."""
     if body.surface is None or body.surface.alpha_cutoff <= 0:
         return hits
-    return hits.where(painted(body, hits.face, hits.barycentric)[:, 3] >= body.surface.alpha_cutoff)
+    return hits.where(color_and_opacity(body, hits.face, hits.barycentric)[:, 3] >= body.surface.alpha_cutoff)
 
 
 def _across(body: Object, face: Integers, barycentric: Array, values: Array) -> Array:
@@ -122,7 +122,7 @@ def _lambert(body: Object, hits: OpaqueHits, rays: Rays, irradiance: Irradiance)
     points = rays.origins + hits.distance[:, None] * rays.directions
     color, emitted = np.broadcast_to(body.base_color, points.shape), np.zeros(3)
     if hits.barycentric is not None:
-        color = color * painted(body, hits.face, hits.barycentric)[:, :3]
+        color = color * color_and_opacity(body, hits.face, hits.barycentric)[:, :3]
         if body.surface is not None and body.surface.glows:
             texture = sampled(body, hits.face, hits.barycentric, body.surface.emissive_texture)
             emitted = np.asarray(body.surface.emissive) * texture[:, :3]
@@ -140,7 +140,7 @@ def without_holes(body: Object, hits: Hits) -> Hits:
         return hits
     if body.covers and not body.surface.double_sided:
         hits = hits.where(hits.sign > 0)
-    alpha = painted(body, hits.face, hits.barycentric)[:, 3]
+    alpha = color_and_opacity(body, hits.face, hits.barycentric)[:, 3]
     return hits.where(alpha >= (body.surface.alpha_cutoff or LEAST_COVER))
 
 
@@ -149,7 +149,11 @@ def layer_depth(body: Object, hits: Hits) -> Array:
     if body.surface is None or body.surface.opacity is None:
         return np.zeros(len(hits.pixel))
     return np.asarray(
-        -np.log(np.maximum(1.0 - body.surface.opacity * painted(body, hits.face, hits.barycentric)[:, 3], _LEAST_LEFT))
+        -np.log(
+            np.maximum(
+                1.0 - body.surface.opacity * color_and_opacity(body, hits.face, hits.barycentric)[:, 3], _LEAST_LEFT
+            )
+        )
     )
 
 
@@ -167,7 +171,7 @@ def layer_radiance(body: Object, hits: Hits, rays: Rays, irradiance: Irradiance)
     )
     with np.errstate(under="ignore"):
         lit = irradiance(points, normals) / np.pi
-        return np.asarray(body.base_color * painted(body, hits.face, hits.barycentric)[:, :3] * lit + emitted)
+        return np.asarray(body.base_color * color_and_opacity(body, hits.face, hits.barycentric)[:, :3] * lit + emitted)
 
 
 @dataclass(frozen=True, eq=False)
