@@ -77,7 +77,7 @@ OpaqueBsdf opaque_bsdf(OpaqueSurface surface, float cos_view) {
     return bsdf;
 }
 
-// Evaluate its microfacets without Fresnel's reflectance. away: (1 - cos)^5 of the angle to those that mirror the light.
+// Evaluate its microfacets without Fresnel's reflectance. away: (1 - cos)^5 of the angle to facets that mirror the light.
 float facets_value(LightSample arriving, vec3 normal, vec3 to_eye, float cos_view, float cos_light, float alpha, out float away) {
     vec4 from = highlight_from(arriving.towards, arriving.disc, reflected_direction(-to_eye, normal), alpha, cos_view);
     vec3 half_way = normalize(from.xyz + to_eye);

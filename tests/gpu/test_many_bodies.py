@@ -12,7 +12,7 @@ import translucent as tl
 from tests.work import calls
 from translucent.gpu import light_cameras
 from translucent.gpu.constants import INTERIOR_SIZE
-from translucent.gpu.light_cameras import ShadowThrowers, support_of
+from translucent.gpu.light_cameras import ShadowOccluders, support_of
 from translucent.gpu.placement import PlacedScene, SampleView, face_counts
 from translucent.gpu.uniforms import BodyRoles, body_records, clip_rows
 
@@ -83,14 +83,14 @@ def test_bodies_are_placed_as_each_alone() -> None:
         assert (normals[2] == np.eye(3)).all()
 
 
-def _floor(count: int) -> tuple[tl.Scene, ShadowThrowers]:
+def _floor(count: int) -> tuple[tl.Scene, ShadowOccluders]:
     """A floor of flat tiles that a lamp lights, with a ball on it, and what throws shadows there."""
     tile = tl.Mesh([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)])
     tiles = [tl.Object(tile, None, trimesh.transformations.translation_matrix((i, 0, 0))) for i in range(count)]
     ball = tl.Object(BOX, WINE, trimesh.transformations.translation_matrix((2, 0.5, 1)))
     given = tl.Scene([*tiles, ball], tl.Camera.look_at((0, 0, 20), (0, 0, 0)))
     lamp = tl.PointLight((1, 1, 9), 1.0)
-    return given, ShadowThrowers(lamp, given, [support_of(item) for item in given.objects])
+    return given, ShadowOccluders(lamp, given, [support_of(item) for item in given.objects])
 
 
 def test_tiles_that_shadow_none_are_found_in_linear_time() -> None:

@@ -15,7 +15,7 @@ import trimesh
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.geometry.solids import Box, Sphere
-from translucent.gpu.light_cameras import ShadowThrowers, support_of
+from translucent.gpu.light_cameras import ShadowOccluders, support_of
 from translucent.gpu.shaders import CompileBudget, PostponedError
 from translucent.gpu.shadow_atlas import LEAST_TEXELS, MOST_BYTES, ShadowViews
 from translucent.scene.grounds import lit_side
@@ -118,7 +118,7 @@ def test_each_texel_has_the_transmittance_of_its_ray(renderer: tl.Renderer, mesh
     item = tl.Object(body, tl.Medium(absorption=np.array([1, 2, 4]) / diagonal))
     shown = tl.Scene([item, floor], CAMERA, [lamps[light]], DARK)
     renderer.render(shown, (8, 8), shadows=tl.ShadowMaps(size))
-    camera = ShadowThrowers(lamps[light], shown, [support_of(item) for item in shown.objects]).cameras()[0]
+    camera = ShadowOccluders(lamps[light], shown, [support_of(item) for item in shown.objects]).cameras()[0]
     origins, ways = camera.rays((size, size))
     ways = np.broadcast_to(ways, (size, size, 3))
     path = _held(renderer)[::-1, :, 0] * np.linalg.norm(ways / (ways @ camera.forward)[..., None], axis=-1)
@@ -350,14 +350,14 @@ def test_a_window_finds_what_one_light_sees_after_the_other(monkeypatch: pytest.
     would take half a second.
     """
     looked = 0
-    cameras = ShadowThrowers.cameras
+    cameras = ShadowOccluders.cameras
 
-    def looks(throwers: ShadowThrowers) -> list[tl.Camera]:
+    def looks(occluders: ShadowOccluders) -> list[tl.Camera]:
         nonlocal looked
         looked += 1
-        return cameras(throwers)
+        return cameras(occluders)
 
-    monkeypatch.setattr(ShadowThrowers, "cameras", looks)
+    monkeypatch.setattr(ShadowOccluders, "cameras", looks)
     shown = scene("ball", "sun", environment=tl.Environment.gradient(0.2, 1.0), environment_shadows=8)
     with tl.Renderer() as own:
         own.gpu.context.gl.extra = budget = CompileBudget()
@@ -442,10 +442,10 @@ def test_grounds_are_not_in_the_way() -> None:
     """A floor is none of what throws shadows, unless it is lit from behind; a bowl that shadows itself does."""
     supports = [support_of(item) for item in (SCENES["ball"]["objects"])]
     shown = scene("ball", "sun")
-    found = ShadowThrowers(SUN, shown, supports)
+    found = ShadowOccluders(SUN, shown, supports)
     assert found.grounds == (1,)
     assert not found.in_the_way
-    below = ShadowThrowers(tl.DirectionalLight((0, 1, 0.2), (1, 1, 1)), shown, supports)
+    below = ShadowOccluders(tl.DirectionalLight((0, 1, 0.2), (1, 1, 1)), shown, supports)
     assert below.in_the_way == (1,)
     stone = replace(shown, objects=[*shown.objects, STONE])
-    assert ShadowThrowers(SUN, stone, [support_of(item) for item in stone.objects]).in_the_way == (2,)
+    assert ShadowOccluders(SUN, stone, [support_of(item) for item in stone.objects]).in_the_way == (2,)

@@ -35,7 +35,7 @@ from translucent.frames.metrics import interior
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.job import FrameJob
-from translucent.gpu.light_cameras import ShadowThrowers, support_of
+from translucent.gpu.light_cameras import ShadowOccluders, support_of
 from translucent.gpu.passes.shortcuts import DepthOnlyPass, HalfFloatPass
 from translucent.gpu.targets import Targets
 from translucent.media.medium import Medium
@@ -475,7 +475,7 @@ def error_statistics(differences: Array) -> ErrorStatistics:
 
 def map_camera(scene: Scene) -> Camera:
     """Camera of the one map of a scene with one light; raises `RenderError` if there are more."""
-    cameras = ShadowThrowers(scene.lights[0], scene, [support_of(item) for item in scene.objects]).cameras()
+    cameras = ShadowOccluders(scene.lights[0], scene, [support_of(item) for item in scene.objects]).cameras()
     if len(cameras) != 1:
         raise RenderError("a map of shadows", f"its light has {len(cameras)}", "move it away from what it lights")
     return cameras[0]

@@ -237,7 +237,7 @@ class _Sides:
     lit: Array
 
 
-class ShadowThrowers:
+class ShadowOccluders:
     """Objects that throw shadows in the light of one light, and objects that only receive them.
 
     Parameters

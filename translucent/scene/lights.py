@@ -168,7 +168,7 @@ class SphereLight(PositionalLight):
     position : array_like (3,)
         Of its center, in metres.
     intensity : array_like (3,)
-        Radiant intensity in W/sr, linear RGB; one number stands for all channels.
+        Radiant intensity in W/sr, linear RGB; one number for all channels.
     radius : float
         In metres, above 0.
 

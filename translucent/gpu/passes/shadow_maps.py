@@ -15,7 +15,7 @@ from translucent.arrays import Array
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
-from translucent.gpu.light_cameras import ShadowThrowers, holds_eye, light_key, objects_key, support_of
+from translucent.gpu.light_cameras import ShadowOccluders, holds_eye, light_key, objects_key, support_of
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
 from translucent.gpu.passes.opaque import OpaquePass
@@ -211,8 +211,8 @@ class ShadowMapsPass:
             for light in [*scene.lights, *_sky_lights(scene)[:: seen.step]][len(found) :]:
                 if job.plan.shadows.directions is None:
                     before_making(self._gl)
-                throwers = ShadowThrowers(light, scene, supports)
-                found.append((throwers.cameras(), throwers.in_the_way if in_place else opaque, throwers.middle))
+                occluders = ShadowOccluders(light, scene, supports)
+                found.append((occluders.cameras(), occluders.in_the_way if in_place else opaque, occluders.middle))
             limit, count = int(self._gl.info["GL_MAX_TEXTURE_SIZE"]), len(scene.lights)
             self._placed = key, ShadowViews.of(found[:count], found[count:], job.plan.shadows.size, limit)
             self._looked_at = None, []
