@@ -119,3 +119,30 @@ def test_what_counts_as_covered_scales_with_the_scene() -> None:
     small, big = seen_from(OUTSIDE, body()), seen_from((0.0, 0.0, 1e4), large)
     assert balance(small).coverage_floor == COVERAGE_FLOOR * np.sqrt(3.0)
     assert balance(big).coverage_floor == pytest.approx(1e3 * balance(small).coverage_floor)
+
+
+def boxes_with_holes() -> tl.Mesh:
+    """Boxes one behind the other from the eye on: of the second the near side has a hole, of the third the far one."""
+    parts = []
+    for low, high, side in ((-1.0, 1.0, None), (-3.5, -2.0, 1.0), (-6.0, -3.7, -1.0)):
+        box = trimesh.creation.box(bounds=[[-1.0, -1.0, low], [1.0, 1.0, high]])
+        box = box.subdivide().subdivide().subdivide()
+        near_axis = np.abs(box.triangles_center[:, :2]).max(axis=1) < 0.25
+        kept = ~(near_axis & (box.face_normals[:, 2] == side)) if side is not None else slice(None)
+        parts.append(trimesh.Trimesh(box.vertices, box.faces[kept], process=False))
+    joined = trimesh.util.concatenate(parts)
+    return tl.Mesh(joined.vertices, joined.faces)
+
+
+@pytest.mark.parametrize("method", [None, tl.SignedDepth()])
+def test_two_holes_ahead_of_an_eye_within_do_not_cancel(method: Method | None, renderer: tl.Renderer) -> None:
+    """Rays leave at 1, then at 3.5, and enter at 3.7: as many faces as of one body, whose thickness would be .8."""
+    holes = boxes_with_holes()
+    assert not holes.diagnosis.inside_out
+    around = tl.Camera.look_at((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), fov_y=4.0)
+    found = tl.Scene([tl.Object(holes, tl.Medium(absorption=0.1))], around)
+    with pytest.warns(tl.TranslucentWarning, match="open edges"):
+        frame = renderer.render(found, (24, 24), method=method)
+    assert frame.coverage.all()
+    assert not frame.valid.any()
+    assert "two holes" in str(frame.plan)

@@ -9,6 +9,7 @@ import numpy as np
 
 from translucent.arrays import Array, Mask
 from translucent.gpu.constants import CONSTANTS
+from translucent.planning.bodies import open_around_eye
 from translucent.planning.methods import Method
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
@@ -367,7 +368,8 @@ def face_counts(scene: Scene, subpixel_bits: int) -> FaceCounts:
     # open bodies leave no room in the fraction of a count.
     sound = all(body.mesh.diagnosis.sound for body in scene.bodies if body.sheet_thickness is None)
     subpixel = 0.5**subpixel_bits if sound else 0.0
-    offsets = np.array([count_offset(body) for body in scene.objects])
+    around = open_around_eye(scene)
+    offsets = np.array([UNEXPECTED if i in around else count_offset(body) for i, body in enumerate(scene.objects)])
     return FaceCounts(np.array(count_weights(scene)), offsets, subpixel, subpixel / scene.diagonal)
 
 

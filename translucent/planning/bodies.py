@@ -141,6 +141,15 @@ def open_bodies(scene: Scene) -> tuple[int, ...]:
     return tuple(i for i in solids_of(scene) if not scene.objects[i].mesh.diagnosis.solid)
 
 
+def open_around_eye(scene: Scene) -> tuple[int, ...]:
+    """Indices of open bodies whose bounds contain the eye: the errors of two holes on a ray may cancel in a sum."""
+    eye = scene.camera.eye
+    if scene.camera.fov_y is None:
+        return ()  # an orthographic ray is a whole line, wherever the picture is
+    bounds = {i: scene.objects[i].bounds for i in open_bodies(scene)}
+    return tuple(i for i, (low, high) in bounds.items() if (low <= eye).all() and (eye <= high).all())
+
+
 def emitting_bodies(scene: Scene) -> tuple[int, ...]:
     """Indices of bodies whose surfaces emit light; layers, which do so in their own color, apart."""
     return indices(

@@ -10,7 +10,7 @@ import numpy as np
 from translucent.formulas.color import luminance
 from translucent.formulas.two_stream import two_stream_absorption, two_stream_reflectance, two_stream_scattering
 from translucent.media.medium import Medium
-from translucent.planning.bodies import emitting_bodies, open_bodies, scatters, sheets_of
+from translucent.planning.bodies import emitting_bodies, open_around_eye, open_bodies, scatters, sheets_of
 from translucent.planning.interfaces import InterfaceMode
 from translucent.planning.methods import Method
 from translucent.planning.passes import Note, NoteKind
@@ -47,6 +47,20 @@ def open_limits(scene: Scene) -> list[Note]:
             "(sheet_thickness=..., --method thin-layer)",
         )
         for mesh in dict.fromkeys(scene.objects[i].mesh for i in open_bodies(scene))
+    ]
+
+
+def eye_limits(scene: Scene, method: Method) -> list[Note]:
+    """Notes on open bodies around the eye, where the method adds up faces in any order."""
+    if method.ordered or method.makes_sheets:
+        return []
+    return [
+        Note(
+            NoteKind.OPEN_MESH,
+            f"{scene.objects[i].mesh.name!r} is open and the eye within its bounds: {type(method).__name__} cannot say "
+            "which pixels show two holes, so all that it covers are marked invalid; FragmentLists can",
+        )
+        for i in open_around_eye(scene)
     ]
 
 

@@ -17,6 +17,7 @@ from translucent.planning.bodies import (
     MAX_SLOTS,
     media_differ,
     medium_slots,
+    open_around_eye,
     overlapping_pair,
     require_clear_priorities,
     scatters,
@@ -301,7 +302,7 @@ def why_order_matters(scene: Scene, method: Method | None, interfaces: Interface
         return "emission among several media: what is in front dims what is behind"
     if method is None and interfaces.finds_exits and (touching := touching_interfaces(scene)) is not None:
         return touching
-    if method is None and (why := _inside_out(scene)) is not None:
+    if method is None and (why := _undecided_by_sums(scene)) is not None:
         return why
     if scene.overlap == "add":
         return None
@@ -321,14 +322,17 @@ def why_order_matters(scene: Scene, method: Method | None, interfaces: Interface
     return None
 
 
-def _inside_out(scene: Scene) -> str | None:
-    """Reason that a body is inside out in places, so that a sum cannot say which pixels show that; None where intervals
-    cannot.
-    """
-    broken = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.inside_out]
-    if not broken or len(medium_slots(scene)) > MAX_SLOTS:
+def _undecided_by_sums(scene: Scene) -> str | None:
+    """Reason that a sum cannot say which pixels of a body are wrong; None where intervals cannot either."""
+    if len(medium_slots(scene)) > MAX_SLOTS:
         return None
-    return f"{broken[0].mesh.name!r} is inside out in places, and a sum does not say which pixels show one"
+    for body in scene.bodies:
+        if body.sheet_thickness is None and body.mesh.diagnosis.inside_out:
+            return f"{body.mesh.name!r} is inside out in places, and a sum does not say which pixels show one"
+    for index in open_around_eye(scene):
+        name = scene.objects[index].mesh.name
+        return f"the eye is within the bounds of {name!r}, which is open: a sum misses a ray that passes two holes"
+    return None
 
 
 def _ordered_method(scene: Scene, method: Method | None, machine: Capabilities, why: str) -> Method:
