@@ -146,3 +146,15 @@ def test_two_holes_ahead_of_an_eye_within_do_not_cancel(method: Method | None, r
     assert frame.coverage.all()
     assert not frame.valid.any()
     assert "two holes" in str(frame.plan)
+
+
+def test_two_holes_ahead_of_an_eye_outside_do_not_cancel_where_the_planner_chooses(renderer: tl.Renderer) -> None:
+    holes = boxes_with_holes()
+    assert holes.diagnosis.holes == 2
+    before = tl.Camera.look_at((0.0, 0.0, 9.0), (0.0, 0.0, -1.0), fov_y=1.0)
+    found = tl.Scene([tl.Object(holes, tl.Medium(absorption=0.1))], before)
+    with pytest.warns(tl.TranslucentWarning, match="open edges"):
+        frame = renderer.render(found, (24, 24))
+    assert frame.coverage.all()
+    assert not frame.valid.any()
+    assert any("2 holes: SignedDepth may miss" in note for note in tl.plan(found, tl.SignedDepth()).limits)

@@ -81,7 +81,7 @@ def test_where_a_lobe_is_inside_out_the_order_of_surfaces_has_to_be_found() -> N
     assert plan(scene).ordered
     assert "'bow tie' is inside out in places" in plan(scene).passes[0].reason
     assert plan(scene, tl.SignedDepth()).limits == (
-        "'bow tie': inside out in places: SignedDepth cannot tell which pixels show one, so all that it covers are "
+        "'bow tie': inside out in places: SignedDepth cannot say which pixels show one, so all that it covers are "
         "marked invalid; FragmentLists can",
     )
 

@@ -80,6 +80,8 @@ class Diagnosis:
         Solid, with all faces looking inwards.
     convex : bool
         Solid, one component, and no edge bends inwards.
+    holes : int
+        Parts that the edges of `open_bounds` form by common vertices.
     open_bounds : ((x, y, z), (x, y, z)), optional
         Smallest and largest coordinates of edges that faces pass more often in one direction than in the other: where
         the mesh is open, or changes its winding. None for a solid.
@@ -100,6 +102,7 @@ class Diagnosis:
     negative_winding: bool
     inverted: bool
     convex: bool
+    holes: int = 0
     open_bounds: Bounds | None = None
 
     @property
@@ -187,6 +190,7 @@ def diagnose(vertices: Array, faces: npt.NDArray[np.int32], one_closed_part: boo
         negative_winding=whole and not convex and winds_negatively(vertices, outwards),
         inverted=inverted,
         convex=convex,
+        holes=0 if edges is None else edges.holes(),
         open_bounds=None if solid else _open_bounds(vertices[used & finite], vertices, edges if whole else None),
     )
 
@@ -210,6 +214,11 @@ class _Edges:
             return Finding(0)
         first = self.sides.ends(np.flatnonzero(mask)[:FIRST]).tolist()
         return Finding(int(mask.sum()), tuple((a, b) for a, b in first))
+
+    def holes(self) -> int:
+        """Connected components of the edges that faces use more often in one direction, by common vertices."""
+        ends = self.sides.ends(np.flatnonzero(self.net))
+        return len(np.unique(connected(self.sides.vertices, *ends.T)[ends])) if len(ends) else 0
 
     def components(self) -> int:
         """Connected components by shared edges."""

@@ -22,7 +22,7 @@ from translucent.planning.limits import (
     AMBIENT,
     MAX_SCATTER_LIGHTS,
     UNLIT,
-    eye_limits,
+    hole_limits,
     layer_limits,
     mesh_limits,
     open_limits,
@@ -161,7 +161,7 @@ def _through_bodies(scene: Scene, interfaces: InterfaceMode) -> tuple[Note, ...]
 
 def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:
     """Notes on where the thickness that a method finds in this scene is not exact."""
-    limits = [] if method.makes_sheets else [*open_limits(scene), *eye_limits(scene, method)]
+    limits = [] if method.makes_sheets else [*open_limits(scene), *hole_limits(scene, method)]
     limits += layer_limits(scene, method) + method.limits(scene)
     if method.ordered:
         limits += scattering_limits(scene) + sheet_limits(scene)

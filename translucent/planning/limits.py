@@ -50,18 +50,21 @@ def open_limits(scene: Scene) -> list[Note]:
     ]
 
 
-def eye_limits(scene: Scene, method: Method) -> list[Note]:
-    """Notes on open bodies around the eye, where the method adds up faces in any order."""
+def hole_limits(scene: Scene, method: Method) -> list[Note]:
+    """Notes on bodies with several holes, or around the eye with one, where the method adds up faces in any order."""
     if method.ordered or method.makes_sheets:
         return []
-    return [
-        Note(
-            NoteKind.OPEN_MESH,
-            f"{scene.objects[i].mesh.name!r} is open and the eye within its bounds: {type(method).__name__} cannot say "
-            "which pixels show two holes, so all that it covers are marked invalid; FragmentLists can",
-        )
-        for i in open_around_eye(scene)
-    ]
+    around, notes = open_around_eye(scene), list[Note]()
+    for i in open_bodies(scene):
+        mesh, name = scene.objects[i].mesh, type(method).__name__
+        if i in around:
+            text = f"the eye is within its bounds: {name} cannot say which pixels show two holes, and marks all invalid"
+        elif mesh.diagnosis.holes > 1:
+            text = f"{mesh.diagnosis.holes} holes: {name} may miss that a ray passes two, whose errors cancel"
+        else:
+            continue
+        notes.append(Note(NoteKind.OPEN_MESH, f"{mesh.name!r}: {text}; FragmentLists can tell"))
+    return notes
 
 
 def layer_limits(scene: Scene, method: Method) -> list[Note]:

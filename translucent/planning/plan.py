@@ -18,6 +18,7 @@ from translucent.planning.bodies import (
     media_differ,
     medium_slots,
     open_around_eye,
+    open_bodies,
     overlapping_pair,
     require_clear_priorities,
     scatters,
@@ -329,9 +330,11 @@ def _undecided_by_sums(scene: Scene) -> str | None:
     for body in scene.bodies:
         if body.sheet_thickness is None and body.mesh.diagnosis.inside_out:
             return f"{body.mesh.name!r} is inside out in places, and a sum does not say which pixels show one"
-    for index in open_around_eye(scene):
-        name = scene.objects[index].mesh.name
-        return f"the eye is within the bounds of {name!r}, which is open: a sum misses a ray that passes two holes"
+    around = open_around_eye(scene)
+    for index in open_bodies(scene):
+        mesh = scene.objects[index].mesh
+        if mesh.diagnosis.holes > 1 or index in around:
+            return f"{mesh.name!r} is open, and a sum does not say which pixels show two holes, whose errors may cancel"
     return None
 
 
