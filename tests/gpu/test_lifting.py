@@ -15,7 +15,7 @@ from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import shaders
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.lifting import ES, PLAIN, VULKAN, WITH_STORAGE, Dialect, find_shader, lift, switches
-from translucent.gpu.shaders import ShaderSource, gather
+from translucent.gpu.shaders import Gathered, ShaderSource
 
 SIZE = (24, 18)
 BALL, BOX = Sphere().tessellate(12), Box((-0.4, -0.3, -0.6), (0.5, 0.7, 0.2)).tessellate()
@@ -58,18 +58,17 @@ def test_a_picture_is_the_same_with_lifted_shaders(
         if target == "webgl2" and "GL_ARB_ES3_compatibility" not in gl.extensions:
             pytest.skip("this OpenGL does not compile GLSL ES 3.00: no GL_ARB_ES3_compatibility")
 
-    def text_of(file: str, defines: Mapping[str, int], version: int) -> ShaderSource:
-        asked = gather(file).switches
-        found = lift(file, {key: int(value) for key, value in defines.items() if key in asked}, target)
+    def text_of(file: str, gathered: Gathered, defines: Mapping[str, int], version: int) -> ShaderSource:
+        found = lift(file, {key: int(value) for key, value in defines.items()}, target)
         assert found.version <= version
         lifted.add(file)
         # Whoever builds a program wants to know which stage asks for a switch and which declares a sampler.
-        declared = re.findall(r"^uniform .*", "\n".join(gather(file).lines), re.MULTILINE)
+        declared = re.findall(r"^uniform .*", "\n".join(gathered.lines), re.MULTILINE)
         told = "".join(f"// {line}\n" for line in [*(f"#define {key} " for key in found.defines), *declared])
         return ShaderSource(found.text.replace("#version 330", f"#version {version}") + told, (file,))
 
     expected = renderer.render(scene, SIZE, method)
-    monkeypatch.setattr(shaders, "_stage", text_of)
+    monkeypatch.setattr(shaders, "_with_switches", text_of)
     with tl.Renderer() as other:
         frame = other.render(scene, SIZE, method)
     assert len(lifted) >= 3
