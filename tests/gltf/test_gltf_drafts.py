@@ -14,7 +14,7 @@ from tests.gltf.gltf_writer import COLOR, Writer, glass, material_scene
 from translucent.gltf.file import read_gltf
 from translucent.gltf.materials import read_materials
 from translucent.media.albedo import hulst_albedo
-from translucent.reference.slabs import whole_shares
+from translucent.reference.slabs import total_fractions
 
 Json = dict[str, Any]
 
@@ -106,14 +106,14 @@ def test_a_new_draft_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
 def test_how_well_the_color_is_that_of_a_thick_body(g: float, most: float) -> None:
     """Against radiative transfer of a layer of 1e5 mean free paths in diffuse light, without an interface."""
     colors = np.array([0.06, 0.22, 0.5, 0.8])
-    true = [whole_shares(float(albedo), 1e5, 1.0, g)[0] for albedo in hulst_albedo(colors, g)]
+    true = [total_fractions(float(albedo), 1e5, 1.0, g)[0] for albedo in hulst_albedo(colors, g)]
     assert np.abs(true - colors).max() < most
 
 
 def test_an_interface_makes_the_color_darker() -> None:
     """Both drafts leave this out: 0.58 is seen as 0.33 behind the interface of glass."""
     (albedo,) = hulst_albedo([0.58])
-    assert whole_shares(float(albedo), 1e5, 1.5)[0] == pytest.approx(0.58 - 0.2515, abs=1e-3)
+    assert total_fractions(float(albedo), 1e5, 1.5)[0] == pytest.approx(0.58 - 0.2515, abs=1e-3)
 
 
 def test_a_scene_scatters_where_drafts_are_asked_for(tmp_path: Path) -> None:

@@ -20,13 +20,13 @@ def test_a_slab_that_scatters_forwards_is_that_of_the_tables() -> None:
 @pytest.mark.parametrize("ior", [1.0, 1.5])
 @pytest.mark.parametrize("anisotropy", [0.0, 0.5, 0.9])
 def test_a_lossless_slab_loses_nothing(anisotropy: float, ior: float) -> None:
-    assert sum(slabs.whole_shares(1.0, 10.0, ior, anisotropy)) == pytest.approx(1.0, abs=3e-4)
+    assert sum(slabs.total_fractions(1.0, 10.0, ior, anisotropy)) == pytest.approx(1.0, abs=3e-4)
 
 
 def test_a_deep_slab_depends_on_reduced_scattering_alone() -> None:
     """Similarity of media that scatter often (van de Hulst 1980, chapter 14), to a percent."""
     g, depth, absorbed = 0.9, 100.0, 1e-3
-    forwards = slabs.whole_shares(1 - absorbed, depth, 1.0, g)
+    forwards = slabs.total_fractions(1 - absorbed, depth, 1.0, g)
     reduced = (1 - absorbed) * (1 - g) / ((1 - absorbed) * (1 - g) + absorbed)
-    alike = slabs.whole_shares(reduced, depth * (1 - g * (1 - absorbed)), 1.0)
+    alike = slabs.total_fractions(reduced, depth * (1 - g * (1 - absorbed)), 1.0)
     np.testing.assert_allclose(forwards, alike, atol=0.01)

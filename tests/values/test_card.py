@@ -25,7 +25,7 @@ QUADRATURE = 1e-3
 @pytest.mark.parametrize(("albedo", "depth"), [(0.9, 1.0), (0.99, 20.0), (0.5, 0.3), (0.9999, 64.0)])
 def test_on_black_without_an_interface_it_is_the_bare_slab(albedo: float, depth: float) -> None:
     assert reflectance_on_card(albedo, depth, 1.0, 0.0) == pytest.approx(
-        slabs.whole_shares(albedo, depth, 1.0)[0], abs=QUADRATURE
+        slabs.total_fractions(albedo, depth, 1.0)[0], abs=QUADRATURE
     )
 
 

@@ -72,7 +72,7 @@ def test_slabs_are_as_deep_as_their_optical_depth(density: Density, side: float)
     middle = np.abs(grid.points[:, [0, 2]]).max(axis=1) < 1
     normal = side * grid.face_normals[:, 1]
     found = np.stack([leaving[middle & (sign * normal > 0.9)].mean(axis=0) for sign in (1, -1)])
-    exact = np.array([slabs.shares(ALBEDO, depth, 1.5) for depth in DEPTHS.tolist()]).T
+    exact = np.array([slabs.scattered_fractions(ALBEDO, depth, 1.5) for depth in DEPTHS.tolist()]).T
     assert np.abs(found - exact).max() < 0.015
 
 
@@ -82,7 +82,7 @@ def test_parts_of_a_slab_are_slabs_of_their_own() -> None:
     for sign, dense in ((-1, 0.5), (1, 1.5)):
         part = (np.abs(sign * grid.points[:, 0] - 1.5) < 0.5) & (np.abs(grid.points[:, 2]) < 1)
         found = np.stack([leaving[part & (grid.face_normals[:, 1] * way > 0.9)].mean(axis=0) for way in (1, -1)])
-        exact = np.array([slabs.shares(ALBEDO, dense * depth, 1.5) for depth in DEPTHS.tolist()]).T
+        exact = np.array([slabs.scattered_fractions(ALBEDO, dense * depth, 1.5) for depth in DEPTHS.tolist()]).T
         assert np.abs(found - exact).max() < 0.015
 
 

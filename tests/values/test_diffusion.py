@@ -189,7 +189,7 @@ def test_wide_slabs_reflect_and_transmit(slab: BodyGrid, albedo: float, ior: flo
         1.5  0.9999  .011   .011   .017  -.011   .004  -.004
     """
     found = slab_shares(slab, albedo, ior)
-    exact = np.array([slabs.shares(albedo, depth, ior) for depth in DEPTHS.tolist()]).T
+    exact = np.array([slabs.scattered_fractions(albedo, depth, ior) for depth in DEPTHS.tolist()]).T
     off = np.abs(found - exact)
     assert off[:, 0].max() < 0.05  # thin: hardly deeper than a mean free path, where nothing diffuses
     assert off[:, 1].max() < 0.03
@@ -208,7 +208,10 @@ def test_deep_slabs_that_scatter_ahead_reflect(slab: BodyGrid, anisotropy: float
     top = slab.face_normals[:, 1] > 0.9
     middle = np.abs(slab.points[:, [0, 2]]).max(axis=1) < 1
     fluence = lit(slab, medium, np.where(top, 1.0, 0.0)[:, None]).fluence[top & middle].mean(axis=0)
-    exact = [slabs.shares(w, d, 1.33, anisotropy)[0] for w, d in zip(albedo.tolist(), depth.tolist(), strict=True)]
+    exact = [
+        slabs.scattered_fractions(w, d, 1.33, anisotropy)[0]
+        for w, d in zip(albedo.tolist(), depth.tolist(), strict=True)
+    ]
     np.testing.assert_allclose(diffuse_interface(1.33).exit_share * fluence, exact, rtol=0.025)
 
 
@@ -224,8 +227,8 @@ def test_exact_slabs_are_exact() -> None:
         c, d = diffuse_interface(ior).conductance, float(diffusion_coefficient(0.1, 0.9))
         k = math.sqrt(0.1 / d)
         diffused = 0.9 * c / ((d * k + c) * (1 + k * diffuse_interface(ior).mean_cosine))
-        assert slabs.shares(0.9, 200.0, ior)[0] == pytest.approx(diffused - excess, abs=2e-5)
-        lossless, absorbing = (slabs.shares(albedo, 40.0, ior) for albedo in (1.0, 0.999))
+        assert slabs.scattered_fractions(0.9, 200.0, ior)[0] == pytest.approx(diffused - excess, abs=2e-5)
+        lossless, absorbing = (slabs.scattered_fractions(albedo, 40.0, ior) for albedo in (1.0, 0.999))
         assert sum(lossless) == pytest.approx(1.0, abs=1e-4)
         assert sum(absorbing) < 0.97
 

@@ -62,7 +62,7 @@ def bare(albedo: float, anisotropy: float, ior: float = 1.0) -> tuple[Array, Arr
 def test_half_spaces_are_deep_slabs(albedo: float, anisotropy: float) -> None:
     """Deep slabs are doubled layers, and have the values of van de Hulst's tables."""
     for ior in (1.0, 1.33):
-        deep = slabs.shares(albedo, 400.0, ior, anisotropy)[0]
+        deep = slabs.scattered_fractions(albedo, 400.0, ior, anisotropy)[0]
         assert half_space_reflectance(albedo, ior, HenyeyGreenstein(anisotropy)) == pytest.approx(deep, abs=MODES)
 
 

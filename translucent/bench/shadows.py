@@ -42,7 +42,7 @@ from translucent.media.medium import Medium
 from translucent.planning.passes import PassName
 from translucent.planning.shadow_maps import ShadowMaps
 from translucent.reference.hits import Lines
-from translucent.reference.light_paths import LightPaths, way_of
+from translucent.reference.light_paths import LightPaths, direction_and_distance
 from translucent.reference.surfaces import sheet_thicknesses
 from translucent.renderer import Renderer
 from translucent.scene.camera import Camera
@@ -457,7 +457,7 @@ def _crossings(scene: Scene, points: Array) -> list[Integers]:
     """Number of crossings with each object but the ground between points (h, w, 3) and the light."""
     paths = LightPaths(scene, sheet_thicknesses(scene))
     places = points.reshape(-1, 3) - scene.camera.eye
-    travel, distance = way_of(paths.lights[0], places)
+    travel, distance = direction_and_distance(paths.lights[0], places)
     lines = Lines(places, -travel, np.full(len(places), _CONTACT * scene.diagonal), distance)
     objects = paths.tracer.objects[:-1]
     return [np.bincount(one.hits(lines).pixel, minlength=len(places)).reshape(points.shape[:2]) for one in objects]

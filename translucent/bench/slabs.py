@@ -86,7 +86,7 @@ def _measured(albedo: float, depths: Array, anisotropy: float, ior: float) -> li
     layer, diffused = _layer(medium), _diffused(medium)
     found = []
     for i, depth in enumerate(depths.tolist()):
-        passing = slabs.unscattered_shares(depth, ior)
+        passing = slabs.unscattered_fractions(depth, ior)
         in_scattered = _ahead(albedo, depth, anisotropy, ior)
         by_diffusion, by_layer = (
             (float(model[0, i]) + passing[0] + more[0], float(model[1, i]) + passing[1] + more[1])
@@ -95,7 +95,7 @@ def _measured(albedo: float, depths: Array, anisotropy: float, ior: float) -> li
         body = Object(_mesh(), Medium((1.0 - albedo) * depth, albedo * depth, anisotropy=anisotropy, ior=ior))
         scene = Scene([body], Camera.look_at((0.0, 5.0, 5.0), (0.0, 0.0, 0.0)))
         treatment = choose_treatments(scene, None).of.get(0, Treatment.SINGLE)
-        whole = slabs.whole_shares(albedo, depth, ior, anisotropy)
+        whole = slabs.total_fractions(albedo, depth, ior, anisotropy)
         found.append(Slab(albedo, depth, anisotropy, ior, *whole, passing, by_diffusion, by_layer, PLANNED[treatment]))
     return found
 

@@ -64,14 +64,14 @@ def normals_picture(normals: npt.NDArray[Any]) -> Pixels:
 
 def lengths_picture(lengths: npt.NDArray[Any], coverage: Mask, valid: Mask) -> Pixels:
     """Picture of lengths in false colors from 0 to the largest, with a scale in a metric unit below."""
-    seen = coverage & valid & np.isfinite(lengths)
-    most = float(lengths[seen].max(initial=0.0))
+    visible = coverage & valid & np.isfinite(lengths)
+    most = float(lengths[visible].max(initial=0.0))
     with np.errstate(under="ignore"):
-        share = np.where(seen, lengths, 0.0).astype(np.float64) / (most or 1.0)
-    pixels = false_colors()[np.rint(share * 255).astype(np.intp)]
-    pixels[~seen] = EMPTY
+        fraction = np.where(visible, lengths, 0.0).astype(np.float64) / (most or 1.0)
+    pixels = false_colors()[np.rint(fraction * 255).astype(np.intp)]
+    pixels[~visible] = EMPTY
     pixels[~valid] = WRONG
-    if not seen.any():
+    if not visible.any():
         return _with_legend(pixels, [(EMPTY, "no medium")])
     factor, unit = next((entry for entry in UNITS if most >= entry[0]), UNITS[-1])
     return np.concatenate([pixels, _scale(pixels.shape[1], most / factor, unit)], axis=0)

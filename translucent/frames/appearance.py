@@ -48,8 +48,8 @@ class Appearance:
     colors : (5, 3) float64
         Linear, at these thicknesses: from the thin parts to the thick ones.
     thin_share : (3,) float64
-        Share of the average color that the thinnest 5 % of the pixels bring: 0.05 in a clear medium, and near 1 where
-        all but the edges is black.
+        Fraction of the average color that the thinnest 5 % of the pixels bring: 0.05 in a clear medium, and near 1
+        where all but the edges is black.
     """
 
     medium: Medium
@@ -64,8 +64,10 @@ class Appearance:
         """Summary as values that JSON can hold; lengths in metres."""
         with np.errstate(under="ignore"):
             parts = [
-                {"thinner": share, "thickness": metres, "color": color, "hex": to_hex(color)}
-                for share, metres, color in zip(QUANTILES, self.thickness.tolist(), self.colors.tolist(), strict=True)
+                {"thinner": fraction, "thickness": metres, "color": color, "hex": to_hex(color)}
+                for fraction, metres, color in zip(
+                    QUANTILES, self.thickness.tolist(), self.colors.tolist(), strict=True
+                )
             ]
             return {
                 "average_color": self.color.tolist(),
@@ -97,8 +99,10 @@ def appearance_of(seen: Frame | npt.ArrayLike, medium: Medium) -> Appearance:
     thin = max(1, round(QUANTILES[0] * thickness.size))
     with np.errstate(under="ignore"):
         light = average_color(thickness[:thin], medium) * thin / thickness.size
-        share = np.divide(light, color, out=np.ones(3), where=color > 0)
-    return Appearance(medium, color, thickness.size, float(thickness.mean()), parts, medium.transmittance(parts), share)
+        fraction = np.divide(light, color, out=np.ones(3), where=color > 0)
+    return Appearance(
+        medium, color, thickness.size, float(thickness.mean()), parts, medium.transmittance(parts), fraction
+    )
 
 
 def thickness_samples(seen: Frame | npt.ArrayLike) -> Array:
@@ -144,7 +148,7 @@ def average_color(seen: Frame | npt.ArrayLike, medium: Medium) -> Array:
 def extinction_for_average_color(seen: Frame | npt.ArrayLike, color: str | npt.ArrayLike) -> Array:
     """(3,): the extinction in 1/m at which a mesh shows `color` on average.
 
-    Per channel the one root of mean(exp(-sigma d)) = t: the mean falls from 1 at sigma = 0 to the share of pixels
+    Per channel the one root of mean(exp(-sigma d)) = t: the mean falls from 1 at sigma = 0 to the fraction of pixels
     without any thickness.
 
     Parameters
@@ -185,7 +189,7 @@ def _solve(thickness: Array, name: str, target: float) -> float:
     if target <= clear:
         found = f"{100 * clear:.3g} % of the pixels have no thickness and stay white"
         raise InputError(f"average color with {name} = {target:g}", found, "give a brighter color, or another view")
-    # Without a unit: lengths as shares of the mean one, so that neither kilometers nor micrometers overflow.
+    # Without a unit: lengths as fractions of the mean one, so that neither kilometers nor micrometers overflow.
     scale = float(thickness.mean())
     with np.errstate(under="ignore", over="ignore"):
         solved = _root(thickness / scale, log(target)) / scale if scale > 0 else np.inf
@@ -194,7 +198,7 @@ def _solve(thickness: Array, name: str, target: float) -> float:
     return float(solved)
 
 
-def _root(shares: Array, goal: float) -> float:
+def _root(relative: Array, goal: float) -> float:
     """Root x >= 0 of log(mean(exp(-x shares))) = goal: Newton within a bracket, else bisection.
 
     The logarithm of the mean is convex and falls, so Newton from the left never passes the root; the bracket is for
@@ -202,11 +206,11 @@ def _root(shares: Array, goal: float) -> float:
     """
     low, high, x = 0.0, np.inf, -goal
     for _ in range(_MAX_STEPS):
-        light = optics.transmittance(x * shares)
+        light = optics.transmittance(x * relative)
         mean = light.mean()
         excess = np.log(mean) - goal if mean > 0 else -np.inf
         low, high = (x, high) if excess >= 0 else (low, x)
-        slope = (light * shares).mean() / mean if mean > 0 else 0.0
+        slope = (light * relative).mean() / mean if mean > 0 else 0.0
         step = excess / slope if slope > 0 else np.inf
         if abs(step) <= 4e-16 * x:
             break

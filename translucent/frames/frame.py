@@ -138,11 +138,11 @@ class Frame:
     truncated : (h, w) int32, optional
         How many of them the method had to leave out.
     alpha : (h, w) float, optional
-        Of a frame rendered without the environment behind: share of what is behind that it hides, the mean of the
+        Of a frame rendered without the environment behind: fraction of what is behind that it hides, the mean of the
         channels. The radiance is then that of the frame alone: an associated (premultiplied) color.
     passed : (h, w, 3) float, optional
-        Of such a frame: share of what is behind that passes, by channel, so that ``radiance + passed * behind`` is the
-        picture before anything, colored shadows on a shadow catcher included. 1 - alpha is its mean.
+        Of such a frame: fraction of what is behind that passes, by channel, so that ``radiance + passed * behind`` is
+        the picture before anything, colored shadows on a shadow catcher included. 1 - alpha is its mean.
     normals : (h, w, 3) float, optional
         Unit normals, in world axes, of the interfaces where rays enter bodies; 0 where there is none. Only of frames
         whose plan has interfaces.
@@ -211,7 +211,7 @@ class Frame:
 
     def summary(self) -> dict[str, Any]:
         """Statistics of the frame as values that JSON can hold; thickness in metres over the valid, covered pixels."""
-        seen = self.thickness[self.coverage & self.valid]
+        visible = self.thickness[self.coverage & self.valid]
         found: dict[str, Any] = {
             "size": list(self.size),
             "plan": self.plan.summary(),
@@ -219,7 +219,7 @@ class Frame:
             "provenance": dict(self.provenance),
             "covered_pixels": int(self.coverage.sum()),
             "invalid_pixels": int((~self.valid).sum()),
-            "thickness": {"median": float(np.median(seen)), "max": float(seen.max())} if seen.size else None,
+            "thickness": {"median": float(np.median(visible)), "max": float(visible.max())} if visible.size else None,
         }
         if self.layers is not None and self.truncated is not None:
             found["layers"] = {"max": int(self.layers.max()), "truncated_pixels": int((self.truncated > 0).sum())}

@@ -28,9 +28,9 @@ class Errors:
     bias : float
         Mean signed error.
     invalid : float
-        Share of the covered pixels that the frame marks invalid.
+        Fraction of the covered pixels that the frame marks invalid.
     coverage_mismatch : float
-        Pixels that only one of the two covers, as a share of the covered ones.
+        Pixels that only one of the two covers, as a fraction of the covered ones.
     pixels : int
         How many pixels the mask keeps.
     mask : str

@@ -76,7 +76,8 @@ Rectangle = tuple[int, int, int, int]
 #: Tiles along a side of a patch, from whose scatter its error is known, noise that neighbors share included.
 TILES = 4
 
-#: Share of a patch's pixels that may be at a limit of what the picture holds, and largest relative error of its mean.
+#: Fraction of a patch's pixels that may be at a limit of what the picture holds, and largest relative error of its
+#: mean.
 MOST_LIMITED, MOST_ERROR = 0.01, 0.1
 
 #: Strips that a wedge is cut into, and the part of a step that counts: its edges are where steps meet.
@@ -239,8 +240,8 @@ def _steps(photograph: Photograph, number: int, left_out: list[str]) -> PatchTra
         picture, name = LinearPicture(np.asarray(given, dtype=np.float64), 0), f"photograph {number + 1}"
     white = _measured(picture, photograph.white, f"white of {name}")
     if (white.saturated > MOST_LIMITED).any():
-        share = 100 * white.saturated.max()
-        raise InputError(f"white of {name}", f"{share:.0f} % of its pixels are saturated", "expose it shorter")
+        percent = 100 * white.saturated.max()
+        raise InputError(f"white of {name}", f"{percent:.0f} % of its pixels are saturated", "expose it shorter")
     if (white.black > MOST_LIMITED).any():
         raise InputError(f"white of {name}", "it is black", "mark where the light is seen with nothing before it")
     if not photograph.patches:

@@ -45,17 +45,17 @@ def frame_bundle(picture: Pixels, arrays: Mapping[str, npt.NDArray[Any]], plan: 
     lengths = arrays["thickness"], arrays["coverage"], arrays["valid"]
     said = frame_text(*lengths)
     thickness = png(lengths_picture(*lengths))
-    shown = [(png(picture), f"Picture of {said}"), (thickness, f"Thickness in false colors, of {said}")]
-    return bundle(shown, [said, plan], text)
+    pictures = [(png(picture), f"Picture of {said}"), (thickness, f"Thickness in false colors, of {said}")]
+    return bundle(pictures, [said, plan], text)
 
 
 def frame_text(thickness: npt.NDArray[Any], coverage: Mask, valid: Mask) -> str:
     """Frame in words: size, coverage, thickness, and pixels that cannot be trusted."""
-    seen = thickness[coverage & valid]
+    visible = thickness[coverage & valid]
     height, width = thickness.shape
     said = f"{width} x {height} pixels; media cover {coverage.mean():.0%}"
-    if seen.size:
-        median, most = (length_text(float(found)) for found in (np.median(seen), seen.max()))
+    if visible.size:
+        median, most = (length_text(float(found)) for found in (np.median(visible), visible.max()))
         said += f", {median} thick in the median and {most} at most"
     invalid = int((~valid).sum())
     return said + (f"; {invalid} pixels cannot be trusted" if invalid else "")

@@ -55,7 +55,7 @@ def hulst_color(albedo: npt.ArrayLike, anisotropy: npt.ArrayLike = 0.0) -> Array
     InputError
         If an albedo is not in 0..1, or an anisotropy not between -1 and 1.
     """
-    a, g = _share("albedo", albedo), _anisotropy(anisotropy)
+    a, g = _fraction("albedo", albedo), _anisotropy(anisotropy)
     with np.errstate(under="ignore"):
         s = np.sqrt((1.0 - a) / (1.0 - a * g))
         return (1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s)
@@ -70,7 +70,7 @@ def chiang_albedo(color: npt.ArrayLike) -> Array:
         If a color is not in 0..1.
     """
     with np.errstate(under="ignore"):
-        return -np.expm1(-_chiang_depth(_share("color", color)))
+        return -np.expm1(-_chiang_depth(_fraction("color", color)))
 
 
 def chiang_color(albedo: npt.ArrayLike) -> Array:
@@ -83,7 +83,7 @@ def chiang_color(albedo: npt.ArrayLike) -> Array:
     InputError
         If an albedo is not in the map's range.
     """
-    a = _share("albedo", albedo, CHIANG_MAX_ALBEDO)
+    a = _fraction("albedo", albedo, CHIANG_MAX_ALBEDO)
     depth, c = -np.log1p(-a), np.array(a)
     p, q, r = _CHIANG
     with np.errstate(under="ignore"):
@@ -131,13 +131,13 @@ def scattering_medium(
         elif anisotropy != 0:
             raise InputError(f"anisotropy {anisotropy}", "Chiang's map is isotropic", 'use model="hulst"')
         else:
-            albedo, rest = chiang_albedo(triple), np.exp(-_chiang_depth(_share("color", triple)))
+            albedo, rest = chiang_albedo(triple), np.exp(-_chiang_depth(_fraction("color", triple)))
         return Medium(absorption=rest / path, scattering=albedo / path, anisotropy=anisotropy, ior=ior)
 
 
 def _similarity(color: npt.ArrayLike) -> Array:
     """Similarity parameter s in 0..1: the smaller root of 0.139 s^2 - (1.139 + 1.17 C) s + (1 - C) = 0."""
-    c = _share("color", color)
+    c = _fraction("color", color)
     b = 1.139 + 1.17 * c
     with np.errstate(under="ignore"):
         return 2.0 * (1.0 - c) / (b + np.sqrt(b * b - 4.0 * 0.139 * (1.0 - c)))
@@ -149,7 +149,7 @@ def _chiang_depth(c: Array) -> Array:
         return c * (p + c * (q + c * r))
 
 
-def _share(what: str, values: npt.ArrayLike, most: float = 1.0) -> Array:
+def _fraction(what: str, values: npt.ArrayLike, most: float = 1.0) -> Array:
     array = np.asarray(values, dtype=np.float64)
     inside = (array >= 0) & (array <= most)
     if not inside.all():

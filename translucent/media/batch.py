@@ -51,13 +51,13 @@ class Batch:
 
     def _repr_html_(self) -> str:
         """Names, swatches and errors, for notebooks; of long tables the first rows."""
-        shown = [
+        parts = [
             f"<div>{escape(one['name'])}</div>{html_strip(one['extinction'], one['distance'])}"
             for one in self.records[:MOST_SHOWN]
         ]
         if (more := len(self.records) - MOST_SHOWN) > 0:
-            shown.append(f"<div>and {more} more</div>")
-        return "".join([*shown, *(f"<div>error: {escape(line)}</div>" for line in self.errors[:MOST_SHOWN])])
+            parts.append(f"<div>and {more} more</div>")
+        return "".join([*parts, *(f"<div>error: {escape(line)}</div>" for line in self.errors[:MOST_SHOWN])])
 
     def to_json(self) -> str:
         """The records as a JSON list, one record per line; null is infinity."""

@@ -122,10 +122,10 @@ def _read(what: str, path: str | Path, do: str, per_pixel: int = 16) -> tuple[Im
             if not (image.mode.startswith("I;16") or image.mode in _EIGHT_BITS) or (deep and image.format != "PNG"):
                 kind = f"{image.mode} of 16 bits" if deep else image.mode
                 raise InputError(what, f"pixels of the kind {kind}", "save it as an 8-bit RGB image")
-            shown, turn = ImageOps.exif_transpose(image), image.getexif().get(_ORIENTATION, 1)
-            if shown.mode == "P":  # with what Pillow warns of
-                shown = shown.convert("RGBA")
-        return shown, _deep_channels(what, data, turn) if deep else []
+            upright, turn = ImageOps.exif_transpose(image), image.getexif().get(_ORIENTATION, 1)
+            if upright.mode == "P":  # with what Pillow warns of
+                upright = upright.convert("RGBA")
+        return upright, _deep_channels(what, data, turn) if deep else []
     except InputError:
         raise
     except Exception as error:  # each of Pillow's decoders raises its own kinds

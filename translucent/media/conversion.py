@@ -200,8 +200,8 @@ def distance_for_color(extinction: npt.ArrayLike, color: npt.ArrayLike) -> Dista
         raise InputError(f"extinction {sigma.tolist()}", "not three numbers >= 0, one above", "give one that absorbs")
     peak = sigma.max()
     with np.errstate(under="ignore", over="ignore"):  # relative to the largest channel, no square can overflow
-        share = sigma / peak
-        distance = float((share * depth).sum() / (share * share).sum() / peak)
+        relative = sigma / peak
+        distance = float((relative * depth).sum() / (relative * relative).sum() / peak)
         if not np.isfinite(distance):
             raise InputError(f"distance for color {np.asarray(color).tolist()}", "it overflows", "check the extinction")
         per_channel = tuple(

@@ -93,11 +93,11 @@ class DensityGrid(Frozen):
         count = np.array(values.shape)
         position = np.clip(vectors("density at points", points) * count - 0.5, 0.0, count - 1.0)
         low = np.minimum(position.astype(np.int64), np.maximum(count - 2, 0))
-        share = position - low
+        weight = position - low
         high = np.minimum(low + 1, count - 1)
         x, y, z = np.moveaxis(np.stack([low, high]), -1, 0)
         lower, upper = (np.stack([values[x[i], y[j], z[k]] for j in (0, 1) for k in (0, 1)], axis=-1) for i in (0, 1))
-        return trilinear(lower, upper, share)
+        return trilinear(lower, upper, weight)
 
     @checked
     def mean_between(self, start: Array, end: Array) -> Array:
@@ -280,7 +280,7 @@ def exponential_density_mean(
         return np.asarray(thickest * optics.mean_transmittance(np.abs(ratio) * np.abs(a - b)))
 
 
-def trilinear(low: npt.ArrayLike, high: npt.ArrayLike, share: npt.ArrayLike) -> Array:
+def trilinear(low: npt.ArrayLike, high: npt.ArrayLike, fraction: npt.ArrayLike) -> Array:
     """(...,): values between the corners of cells.
 
     Parameters
@@ -288,10 +288,10 @@ def trilinear(low: npt.ArrayLike, high: npt.ArrayLike, share: npt.ArrayLike) -> 
     low, high : array_like (..., 4)
         At the corners at the lower and the upper end along x, in the order of (y, z) = (low, low), (low, high),
         (high, low), (high, high).
-    share : array_like (..., 3)
+    fraction : array_like (..., 3)
         Position in the cell, 0 to 1 along each axis.
     """
-    u, v, w = np.moveaxis(np.asarray(share, dtype=np.float64), -1, 0)[..., None]
+    u, v, w = np.moveaxis(np.asarray(fraction, dtype=np.float64), -1, 0)[..., None]
     with np.errstate(under="ignore"):
         face = np.asarray(low) * (1.0 - u) + np.asarray(high) * u
         edge = face[..., :2] * (1.0 - v) + face[..., 2:] * v

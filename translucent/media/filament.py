@@ -2,8 +2,8 @@
 
 Transmission distance (TD) is one length for a filament, which HueForge and the tags of spools state in millimetres.
 HueForge defines it in words, as the thickness at which no perceptible amount of light passes any more (HueForge wiki,
-"Common Terms"), and names no share of light. Sources that compute with it differ: T = 10^(-d / TD), so that 10 % are
-left (FilaScope, "TD layer simulator"); 5 %, as exp(-3) (others that calibrate it to the words). So the share that is
+"Common Terms"), and names no fraction of light. Sources that compute with it differ: T = 10^(-d / TD), so that 10 % are
+left (FilaScope, "TD layer simulator"); 5 %, as exp(-3) (others that calibrate it to the words). So the fraction that is
 left is a parameter here, `TD_TRANSMITTANCE` unless stated.
 
 Formula: sigma_t = -ln(T) / TD, the same in all channels. The way back: the thickness after which white light has kept
@@ -25,7 +25,7 @@ from translucent.formulas import optics
 from translucent.formulas.color import luminance
 from translucent.media.medium import Medium
 
-#: Share of light that is left after one TD: T = 10^(-d / TD).
+#: Fraction of light that is left after one TD: T = 10^(-d / TD).
 TD_TRANSMITTANCE = 0.1
 
 #: Halvings of the interval that holds a distance: more change nothing in float64.
@@ -33,14 +33,14 @@ _HALVINGS = 60
 
 
 def medium_of_td(td: float, transmittance: float = TD_TRANSMITTANCE) -> Medium:
-    """Gray absorbing medium that lets the share `transmittance` of light pass after `td` metres.
+    """Gray absorbing medium that lets the fraction `transmittance` of light pass after `td` metres.
 
     Raises
     ------
     InputError
-        If the distance is not positive and finite, or the share not between 0 and 1.
+        If the distance is not positive and finite, or the fraction not between 0 and 1.
     """
-    return Medium.from_color(np.full(3, _share(transmittance)), td)
+    return Medium.from_color(np.full(3, _fraction(transmittance)), td)
 
 
 def td_of(extinction: npt.ArrayLike, transmittance: float = TD_TRANSMITTANCE) -> float:
@@ -56,9 +56,9 @@ def td_of(extinction: npt.ArrayLike, transmittance: float = TD_TRANSMITTANCE) ->
     Raises
     ------
     InputError
-        If the share is not between 0 and 1.
+        If the fraction is not between 0 and 1.
     """
-    sigma, depth = np.asarray(extinction, dtype=np.float64), -math.log(_share(transmittance))
+    sigma, depth = np.asarray(extinction, dtype=np.float64), -math.log(_fraction(transmittance))
     if luminance(sigma == 0) >= transmittance:
         return math.inf
     with np.errstate(under="ignore", over="ignore"):
@@ -75,7 +75,7 @@ def td_of(extinction: npt.ArrayLike, transmittance: float = TD_TRANSMITTANCE) ->
     return float(0.5 * (near + far))
 
 
-def _share(transmittance: float) -> float:
+def _fraction(transmittance: float) -> float:
     if not 0 < transmittance < 1:
         do = "give the share of light that is left after one TD, for example 0.1"
         raise InputError(f"TD at a transmittance of {transmittance!r}", "not between 0 and 1", do)

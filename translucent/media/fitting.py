@@ -71,7 +71,7 @@ class StepFit:
     interval : (3,) float64
         Half width in 1/m of the interval that holds the extinction with a probability of 95 %.
     surface_loss : (3,) float64
-        Share of light that the faces keep back by the fit, 1 - exp(-k); with a known index of refraction, by that.
+        Fraction of light that the faces keep back by the fit, 1 - exp(-k); with a known index of refraction, by that.
     chi2_per_degree : (3,) float64 or NaN
         About 1 where noise alone scatters the residuals; NaN with as many unknowns as samples. Where it is above, the
         errors have grown.
@@ -411,11 +411,11 @@ def fit_wedge(path: str | Path, unit: str = "m") -> Fit:
 def _least_squares(d: Array, depth: Array, w: Array) -> tuple[Array, Array, Array | None]:
     """Least-squares slopes (3,), residuals (n, 3) to those of 0 and above, and the slopes' standard errors (3,)."""
     longest = d.max()
-    share = (d / longest)[:, None]  # of the longest distance, so that no square overflows
+    relative = (d / longest)[:, None]  # of the longest distance, so that no square overflows
     with np.errstate(under="ignore"):
-        spread = (w[:, None] * share**2).sum()
-        best = (w[:, None] * share * depth).sum(axis=0) / spread
-        residuals = share * np.maximum(best, 0.0) - depth
+        spread = (w[:, None] * relative**2).sum()
+        best = (w[:, None] * relative * depth).sum(axis=0) / spread
+        residuals = relative * np.maximum(best, 0.0) - depth
         count = int((w > 0).sum())
         if count == 1:
             return best / longest, residuals, None

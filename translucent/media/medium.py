@@ -131,7 +131,7 @@ class Medium(Frozen):
     ) -> Medium:
         """Medium of many small opaque spheres: sigma_t = rho A with their projected area A = pi r^2.
 
-        Max 1995, sections 2 to 5: of the light that meets a particle it scatters the share `albedo` and absorbs
+        Max 1995, sections 2 to 5: of the light that meets a particle it scatters the fraction `albedo` and absorbs
         the rest, and it sends out the radiance `glow` where it absorbs, so that q = sigma_a glow.
 
         Parameters
@@ -155,17 +155,17 @@ class Medium(Frozen):
         for name, value in (("number_density", number_density), ("radius", radius)):
             if not 0 <= value < np.inf:
                 raise InputError(f"particles of {name} {value}", "not a number of 0 and above", "give it in metres")
-        shares = _channels("albedo", albedo)
-        if (shares > 1).any():
+        fractions = _channels("albedo", albedo)
+        if (fractions > 1).any():
             raise InputError(
-                f"medium albedo {tuple(shares.tolist())}",
+                f"medium albedo {tuple(fractions.tolist())}",
                 "above 1",
                 "particles scatter at most all light that they meet",
             )
         # What overflows is refused as any medium is.
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
             extinction = number_density * np.pi * radius * radius
-            absorption, scattering = extinction * (1.0 - shares), extinction * shares
+            absorption, scattering = extinction * (1.0 - fractions), extinction * fractions
             return cls(absorption, scattering, absorption * _channels("glow", glow), anisotropy)
 
     @cached_property
@@ -177,7 +177,7 @@ class Medium(Frozen):
 
     @checked
     def transmittance(self, distance: npt.ArrayLike) -> Array:
-        """(..., 3): share of light per channel that passes `distance` (...,) metres of the medium, 0 and above.
+        """(..., 3): fraction of light per channel that passes `distance` (...,) metres of the medium, 0 and above.
 
         Raises
         ------

@@ -127,12 +127,12 @@ class Preset:
     @property
     def albedo(self) -> Array:
         """(3,): single-scattering albedo sigma_s / sigma_t; 0 where nothing happens."""
-        return _share(self.scattering, self.medium.extinction)
+        return _ratio(self.scattering, self.medium.extinction)
 
     @property
     def reduced_albedo(self) -> Array:
         """(3,): sigma_s' / (sigma_a + sigma_s'); 0 where nothing happens."""
-        return _share(self.reduced_scattering, self.absorption + self.reduced_scattering)
+        return _ratio(self.reduced_scattering, self.absorption + self.reduced_scattering)
 
     @property
     def diffusion_length(self) -> Array:
@@ -144,9 +144,9 @@ class Preset:
 
     @property
     def diffuse_reflectance(self) -> Array:
-        """(3,): share of white light from all sides that a thick slab scatters back through a polished surface.
+        """(3,): fraction of white light from all sides that a thick slab scatters back through a polished surface.
 
-        What the medium looks like where it is thick, without the mirror image on the surface: the share that enters,
+        What the medium looks like where it is thick, without the mirror image on the surface: the fraction that enters,
         times `half_space_reflectance`: exact, with each channel's own anisotropy.
         """
         ior = self.medium.ior
@@ -263,7 +263,7 @@ def _reciprocal(values: Array) -> Array:
         return np.asarray(1.0 / values)
 
 
-def _share(part: Array, whole: Array) -> Array:
+def _ratio(part: Array, whole: Array) -> Array:
     return np.divide(part, whole, out=np.zeros(3), where=whole > 0)
 
 

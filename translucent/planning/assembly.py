@@ -38,7 +38,8 @@ from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.shadow_maps import dims_interfaces
 from translucent.scene.scene import Scene, object_names
 
-#: Thickness, as a share of its diagonal, of the sheet that replaces an open mesh declared solid where it is not closed.
+#: Thickness, as a fraction of its diagonal, of the sheet that replaces an open mesh declared solid where it is not
+#: closed.
 FALLBACK_SHEET = 0.01
 
 #: Time of a pass in multiples of drawing the same geometry into a depth buffer, as measured on a software rasterizer

@@ -88,7 +88,9 @@ _CARRYING = PassName.LIGHT_VIEWS, PassName.TRACED, PassName.SURFACES
 
 def opaque_to_shadows(scene: Scene) -> frozenset[int]:
     """Numbers of the objects that stop the straight light of the lights where photons carry it: solids that bend it."""
-    return frozenset(i for i, body in enumerate(scene.objects) if _turns_light(body) and body.sheet_thickness is None)
+    return frozenset(
+        i for i, body in enumerate(scene.objects) if _redirects_light(body) and body.sheet_thickness is None
+    )
 
 
 def lit_by_photons(scene: Scene, solved: Iterable[int]) -> tuple[int, ...]:
@@ -109,7 +111,7 @@ def check_caustics(scene: Scene, method: Method | None, lit: tuple[int, ...]) ->
             else "it takes every face for a sheet, which bends nothing"
         )
         raise InputError(f"caustics with {method}", found, "leave out one of the two")
-    _check_ways(scene, lit)
+    _check_paths(scene, lit)
 
 
 def passes_with_caustics(
@@ -156,24 +158,24 @@ def _into_media(step: PassSpec, scene: Scene, lit: tuple[int, ...], caustics: Ca
 
 
 def _bending(scene: Scene) -> str:
-    return _names(scene, indices(scene, _turns_light))
+    return _names(scene, indices(scene, _redirects_light))
 
 
 def _names(scene: Scene, numbers: tuple[int, ...]) -> str:
     return object_names([scene.objects[i] for i in numbers])
 
 
-def _turns_light(body: Object) -> bool:
+def _redirects_light(body: Object) -> bool:
     """True if interfaces of an object bend or mirror light."""
     return body.medium is not None and body.has_interface and body.medium.ior != 1.0
 
 
-def _check_ways(scene: Scene, lit: tuple[int, ...]) -> None:
+def _check_paths(scene: Scene, lit: tuple[int, ...]) -> None:
     """Refuse a scene in which no photon could land."""
     if not scene.lights:
         do = "add a tl.PointLight, tl.SpotLight or tl.DirectionalLight; light of the environment makes no caustics"
         raise InputError("caustics", "the scene has no lights", do)
-    if not any(_turns_light(body) for body in scene.objects):
+    if not any(_redirects_light(body) for body in scene.objects):
         found = f"no interface of {object_names(scene.bodies)} bends or mirrors light"
         raise InputError("caustics", found, "give a medium an index of refraction: ior=1.5")
     if not scene.opaque and not lit:
@@ -230,7 +232,7 @@ class PhotonAim:
         Of a directional light through the rectangle, or of a light as bright in all directions, in W; of a light
         that aims at a rectangle, to be multiplied by the cosine over the squared distance.
     weight : float
-        Share of the photons, up to a factor.
+        Fraction of the photons, up to a factor.
     cone : (4,) float64
         In which the light shines, as `translucent.formulas.light.cone_attenuation` takes it.
     inside : tuple of int
@@ -313,13 +315,13 @@ def _point_aims(
     )
     intensity, away = np.asarray(light.intensity), float(np.linalg.norm(middle - at))
     position = np.array([*at, 1.0])
-    seen = None if inside or away == 0.0 else _seen(clouds, middle, at, away, light.disc[3])
-    if seen is None:
+    bounds = None if inside or away == 0.0 else _visible_bounds(clouds, middle, at, away, light.disc[3])
+    if bounds is None:
         flux, none = 4.0 * np.pi * intensity, np.zeros(3)
         weight = float(flux.mean()) * light.mean_share
         return [PhotonAim(position, middle, none, none, flux, weight, light.cone, inside, light.disc[3])]
     aims, across = [], _across((middle - at) / away)
-    for low, high in _apart(seen):
+    for low, high in _apart(bounds):
         aimed, right, up, area = _rectangle(low, high, middle, across)
         flux = intensity * area
         weight = float(flux.mean()) * away / float(np.linalg.norm(aimed - at)) ** 3
@@ -327,7 +329,7 @@ def _point_aims(
     return aims
 
 
-def _seen(clouds: list[Array], middle: Array, at: Array, away: float, radius: float) -> list[Array] | None:
+def _visible_bounds(clouds: list[Array], middle: Array, at: Array, away: float, radius: float) -> list[Array] | None:
     """Bounds (2, 2) of bodies, as seen from a ball around `at` on the plane across the way to their `middle`; None if
     they are all around.
     """
@@ -357,12 +359,12 @@ def _apart(boxes: list[Array]) -> list[Array]:
     waiting = list(boxes)
     while waiting:
         box = waiting.pop()
-        met = [i for i, other in enumerate(found) if (box[0] < other[1]).all() and (other[0] < box[1]).all()]
-        if not met:
+        overlapping = [i for i, other in enumerate(found) if (box[0] < other[1]).all() and (other[0] < box[1]).all()]
+        if not overlapping:
             found.append(box)
             continue
-        parts = np.stack([box, *(found[i] for i in met)])
-        found = [other for i, other in enumerate(found) if i not in met]
+        parts = np.stack([box, *(found[i] for i in overlapping)])
+        found = [other for i, other in enumerate(found) if i not in overlapping]
         waiting.append(np.stack([parts[:, 0].min(axis=0), parts[:, 1].max(axis=0)]))
     return found
 

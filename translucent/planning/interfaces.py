@@ -24,10 +24,10 @@ DRAW_COST = 4.0
 #: Time of shading both, likewise, beside 90,000 triangles.
 SHADE_COST = 8.0
 
-#: Time of drawing one interface of each body, as a share of that of two; measured likewise.
+#: Time of drawing one interface of each body, as a fraction of that of two; measured likewise.
 ONE_DRAWN = 0.4
 
-#: Time of shading one interface, as a share of that of two; measured likewise.
+#: Time of shading one interface, as a fraction of that of two; measured likewise.
 ONE_SHADED = 0.45
 
 #: Note of a plan in which rays meet interfaces as far as the first interval shows them.
@@ -247,8 +247,9 @@ TRACE_COST = 50.0
 class TracedInterfaces(InterfaceMode):
     """All interfaces that a ray meets, found by rays through the meshes: a tree of reflected and refracted ones.
 
-    The tree of Whitted 1980: at an interface the reflected ray takes Fresnel's share, the refracted one the rest (Born
-    & Wolf 1999, section 1.5). Bodies see themselves, each other and opaque objects, and may touch or hold the eye.
+    The tree of Whitted 1980: at an interface the reflected ray takes the Fresnel reflectance, the refracted one the
+    rest (Born & Wolf 1999, section 1.5). Bodies see themselves, each other and opaque objects, and may touch or hold
+    the eye.
 
     Parameters
     ----------

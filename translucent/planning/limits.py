@@ -28,7 +28,7 @@ MAX_SCATTER_LIGHTS = 8
 DENSE = 1e5
 
 
-#: Share of the scene's diagonal by which a visible sheet may lie behind an opaque surface.
+#: Fraction of the scene's diagonal by which a visible sheet may lie behind an opaque surface.
 SHEET_ON_OPAQUE = 1e-6
 
 
@@ -192,8 +192,8 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: InterfaceM
 
 def with_ambient(notes: Iterable[Note]) -> tuple[Note, ...]:
     """Notes of a plan in which media emit the ambient radiance that they would scatter."""
-    way = Note(NoteKind.DIMMED_AMBIENT, "what dims ambient light on its way to a place in the media")
-    return (*(note for note in notes if note.kind is not NoteKind.ONLY_REMOVES), way)
+    dimmed = Note(NoteKind.DIMMED_AMBIENT, "what dims ambient light on its way to a place in the media")
+    return (*(note for note in notes if note.kind is not NoteKind.ONLY_REMOVES), dimmed)
 
 
 def layers_instead(scene: Scene, refusals: Iterable[tuple[int, str]]) -> tuple[Note, ...]:
@@ -230,8 +230,8 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
             "ahead, as around lights behind media that scatter ahead"
         )
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
-    shown = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
-    if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in shown]:
+    rendered = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
+    if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in rendered]:
         if followed:
             densest = max(float(np.max(np.asarray(medium.scattering))) for medium in media)
             text = (
@@ -313,17 +313,17 @@ def black_bodies(scene: Scene) -> tuple[Note, ...]:
         if medium is None or medium.emits or _passes(medium, scene.diagonal) + scattered_back(scene, medium) >= BLACK:
             continue
         with np.errstate(under="ignore"):
-            shares = luminance(medium.transmittance([_chord(body) for body in bodies])).tolist()
-        black += [(share, body) for share, body in zip(shares, bodies, strict=True) if share < BLACK]
+            fractions = luminance(medium.transmittance([_chord(body) for body in bodies])).tolist()
+        black += [(fraction, body) for fraction, body in zip(fractions, bodies, strict=True) if fraction < BLACK]
     if not black:
         return ()
     passed, clearest = max(black, key=lambda found: found[0])
     assert clearest.medium is not None
-    chord, shown = _chord(clearest), _distance(clearest.medium, SHOWN)
+    chord, distance = _chord(clearest), _distance(clearest.medium, SHOWN)
     text = (
         f"{object_names(body for _, body in black)}: black: {passed:.1e} of white light passes "
         f"{_text(chord)}, the mean thickness{'' if len(black) == 1 else f' of {clearest.mesh.name!r}'}, and a "
-        f"fifth passes {_text(shown)}; a medium {chord / shown:.2g} times as dilute (a color at a distance so "
+        f"fifth passes {_text(distance)}; a medium {chord / distance:.2g} times as dilute (a color at a distance so "
         "much longer) shows its color"
     )
     return (Note(NoteKind.BLACK, text),)
@@ -352,11 +352,11 @@ def _passes(medium: Medium, distance: float) -> float:
         return float(luminance(medium.transmittance(distance)))
 
 
-def _distance(medium: Medium, share: float) -> float:
-    """Distance in metres that this share of the luminance of white light passes."""
+def _distance(medium: Medium, fraction: float) -> float:
+    """Distance in metres that this fraction of the luminance of white light passes."""
     # Of the clearest channel alone so much would pass no sooner, and of the densest no later.
-    low, high = (-math.log(share) / sigma for sigma in (medium.extinction.max(), medium.extinction.min()))
+    low, high = (-math.log(fraction) / sigma for sigma in (medium.extinction.max(), medium.extinction.min()))
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _passes(medium, middle) > share else (low, middle)
+        low, high = (middle, high) if _passes(medium, middle) > fraction else (low, middle)
     return float(np.mean((low, high)))

@@ -437,11 +437,11 @@ def _map_plans(scene: Scene, found: RenderPlan, machine: Capabilities) -> tuple[
     key = tuple(map(weakref.ref, scene.objects)), scene.overlap, method, found.opaque_to_shadows, machine.shader_storage
     known = _MAPS.get(scene.objects[0])
     if known is None or known[0] != key:
-        seen = [scene] if not found.opaque_to_shadows else [darkened(scene, found.opaque_to_shadows), scene]
+        rendered = [scene] if not found.opaque_to_shadows else [darkened(scene, found.opaque_to_shadows), scene]
         storage = Capabilities(shader_storage=machine.shader_storage)
         plans = (
             _thickness(occluder_scene(each, occluders(each)), RenderRequest(method), storage, ambient=False)
-            for each in seen
+            for each in rendered
         )
         known = key, tuple(MapPlan(each.method, each.passes, each.spectral) for each in plans)
         _MAPS[scene.objects[0]] = known

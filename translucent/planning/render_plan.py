@@ -152,13 +152,15 @@ class RenderPlan:
     @property
     def multiple_scattering(self) -> str:
         """How light that is scattered many times is shown, and in how many bodies; empty if it is not."""
-        ways = (
+        modes = (
             (Treatment.DIFFUSION, f"diffuses ({self.diffusion})"),
             (Treatment.VOLUME, f"is scattered on ({self.diffusion})"),
             (Treatment.LAYER, "leaves as from layers"),
         )
-        counts = ((len(self.treated(treatment)), way) for treatment, way in ways)
-        return ", and ".join(f"{way} in {count} {'body' if count == 1 else 'bodies'}" for count, way in counts if count)
+        counts = ((len(self.treated(treatment)), mode) for treatment, mode in modes)
+        return ", and ".join(
+            f"{mode} in {count} {'body' if count == 1 else 'bodies'}" for count, mode in counts if count
+        )
 
     @property
     def exact(self) -> bool:
@@ -223,8 +225,8 @@ class RenderPlan:
         cost = f", at about the cost of {self.cost:.1f} depth-only draws" if self.cost else ""
         lines = [f"{self.runs}: {'exact' if self.exact else 'not exact everywhere'}{cost}"]
         lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
-        if shown := self.multiple_scattering:
-            lines.append(f"  light scattered many times {shown}")
+        if mode := self.multiple_scattering:
+            lines.append(f"  light scattered many times {mode}")
         lines += [f"  limit: {limit}" for limit in self.limits]
         lines += [f"  not modelled: {effect}" for effect in self.unmodelled]
         lines += [f"  remark: {remark}" for remark in self.remarks]

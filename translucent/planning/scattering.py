@@ -47,7 +47,7 @@ LEAST_CORRECTED = 16
 #: Cells in the bounds of a body, most of them empty; each takes about 150 bytes.
 MOST_IN_BOX = 2_000_000
 
-#: Bytes that a cell takes, with its share of samples on the surface and of what they see.
+#: Bytes that a cell takes, with its part of samples on the surface and of what they see.
 CELL_BYTES = 4000
 
 
@@ -162,7 +162,8 @@ LEAST_DEPTH = 0.01
 #: Optical depth across a cell from which on light of a body of one density leaves through its surface.
 MOST_CELL_DEPTH = 1.0
 
-#: Bodies in which light diffuses unless it is requested: each takes its tenths of a second and its share of a texture.
+#: Bodies in which light diffuses unless it is requested: each takes its tenths of a second and its part of a
+#: texture.
 MOST_DIFFUSED = 32
 
 #: Reason against light scattered again where density varies.

@@ -154,7 +154,7 @@ def emission_of_mixtures(volume: Volume, rays: Rays, segments: Segments, filling
     length = segments.length[found, None]
     emission = segments.emission.copy()
     with np.errstate(over="ignore", under="ignore"):
-        share = optics.mean_transmittance(segments.extinction[found] * length)
-    # Of a medium so deep that the share vanishes, nothing is seen either.
-    emission[found] = exact / (length * np.maximum(share, np.finfo(np.float64).tiny))
+        mean_transmittance = optics.mean_transmittance(segments.extinction[found] * length)
+    # Of a medium so deep that the fraction vanishes, nothing is seen either.
+    emission[found] = exact / (length * np.maximum(mean_transmittance, np.finfo(np.float64).tiny))
     return replace(segments, emission=emission)

@@ -248,8 +248,8 @@ def cross_triangles(corners: Array, weight: Array, points: Array, perspective: b
     Returns the indices of the pairs that do, and for each its distance, sign and barycentric weights.
     """
     # Seen along the ray, relative to it. Only this step rounds, and alike for all faces at a vertex.
-    seen = corners[..., :2] - weight[..., None] * points[:, None, :]
-    a, b = seen[:, (1, 2, 0)], seen[:, (2, 0, 1)]
+    relative = corners[..., :2] - weight[..., None] * points[:, None, :]
+    a, b = relative[:, (1, 2, 0)], relative[:, (2, 0, 1)]
     with np.errstate(under="ignore"):
         rough = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
         maybe = np.flatnonzero((rough >= 0).all(axis=1) | (rough <= 0).all(axis=1))
@@ -313,7 +313,7 @@ LINES_AT_A_TIME = 1 << 12
 #: Pairs of a line and a node that are tested together: what NumPy keeps of them stays in the caches of a processor.
 PAIRS = 1 << 10
 
-#: Enlargement of boxes as a share of the distances, so that rounding loses no triangle.
+#: Enlargement of boxes as a fraction of the distances, so that rounding loses no triangle.
 BOX_MARGIN = 1e-13
 
 #: Half size of an empty box, which no line meets.
@@ -387,12 +387,12 @@ class BoxTree:
             np.abs(lines.origins).sum(axis=1) + np.abs(self.levels[-1][0]).max(where=self._real, initial=0)
         )
         for level in reversed(self.levels):
-            met = [np.empty((2, 0), np.int64)]
+            hit = [np.empty((2, 0), np.int64)]
             for begin in range(0, len(line), PAIRS):
                 some, nodes = line[begin : begin + PAIRS], node[begin : begin + PAIRS]
-                pair, child = np.nonzero(_meets(lines.where(some), level[nodes], slack[some]))
-                met.append(np.array([some[pair], nodes[pair] * BRANCHES + child]))
-            line, node = np.concatenate(met, axis=1)
+                pair, child = np.nonzero(_overlaps(lines.where(some), level[nodes], slack[some]))
+                hit.append(np.array([some[pair], nodes[pair] * BRANCHES + child]))
+            line, node = np.concatenate(hit, axis=1)
         return line, self.order[node]
 
     @property
@@ -401,18 +401,18 @@ class BoxTree:
         return np.broadcast_to(self.levels[-1][0, 3] != _NOTHING, (6, BRANCHES))
 
 
-def _meets(lines: Lines, boxes: Array, slack: Array) -> npt.NDArray[np.bool_]:
+def _overlaps(lines: Lines, boxes: Array, slack: Array) -> npt.NDArray[np.bool_]:
     """(k, 8): whether lines may meet boxes (k, 6, 8), by the axes that could separate them (Gottschalk et al. 1996)."""
     x, y, z = (boxes[:, i] - lines.origins[:, i, None] for i in range(3))
     a, b, c = (boxes[:, i] for i in range(3, 6))
     u, v, w = (lines.directions[:, i, None] for i in range(3))
     p, q, r, s = np.abs(u), np.abs(v), np.abs(w), slack[:, None]
     along, reach = x * u + y * v + z * w, a * p + b * q + c * r + s
-    meets = (along + reach >= lines.start[:, None]) & (along - reach <= lines.end[:, None])
-    meets &= np.abs(y * w - z * v) <= b * r + c * q + s
-    meets &= np.abs(z * u - x * w) <= c * p + a * r + s
-    meets &= np.abs(x * v - y * u) <= a * q + b * p + s
-    return np.asarray(meets)
+    overlaps = (along + reach >= lines.start[:, None]) & (along - reach <= lines.end[:, None])
+    overlaps &= np.abs(y * w - z * v) <= b * r + c * q + s
+    overlaps &= np.abs(z * u - x * w) <= c * p + a * r + s
+    overlaps &= np.abs(x * v - y * u) <= a * q + b * p + s
+    return np.asarray(overlaps)
 
 
 def _grouped(center: Array, half: Array, nodes: int) -> Array:
@@ -423,7 +423,7 @@ def _grouped(center: Array, half: Array, nodes: int) -> Array:
     return np.ascontiguousarray(children.reshape(nodes, BRANCHES, 6).transpose(0, 2, 1))
 
 
-#: Enlargement of the scene's bounding sphere, as a share.
+#: Enlargement of the scene's bounding sphere, as a fraction.
 MARGIN = 1e-6
 
 
@@ -463,8 +463,10 @@ class TracedObject:
         """Intersections of candidate pairs (k,), (k,) of a line and a face, anywhere on the line."""
         parts = []
         for line, face in candidates:
-            seen = _sheared(self.corners[face] - lines.origins[line, None], lines.directions[line])
-            keep, *found = cross_triangles(seen, np.ones(seen.shape[:2]), np.zeros((len(seen), 2)), perspective=False)
+            sheared = _sheared(self.corners[face] - lines.origins[line, None], lines.directions[line])
+            keep, *found = cross_triangles(
+                sheared, np.ones(sheared.shape[:2]), np.zeros((len(sheared), 2)), perspective=False
+            )
             parts.append((line[keep], face[keep], *found))
         return sorted_hits(parts, -1 if self.body.faces_inwards else 1)
 

@@ -68,12 +68,12 @@ class LiveRays:
         )
 
     def turned(
-        self, directions: Array, share: Array, inside: Inside, *, bent: bool, reflected: Mask | bool
+        self, directions: Array, weight: Array, inside: Inside, *, bent: bool, reflected: Mask | bool
     ) -> LiveRays:
-        """Ray segments from the same origins in other directions (k, 3), with a share (k, 3) of the light."""
+        """Ray segments from the same origins in other directions (k, 3), with a weight (k, 3)."""
         rays = Rays(self.rays.origins, directions, self.rays.backdrop)
         with np.errstate(under="ignore"):
-            throughput = self.throughput * share
+            throughput = self.throughput * weight
         return LiveRays(rays, self.owner, throughput, inside, self.bent | bent, self.reflected | reflected)
 
 
@@ -155,7 +155,7 @@ class Interactions:
     def outcome(self) -> Outcome:
         """Outcome of all ray segments."""
         rough = (self.alpha > 0) & (self.ior != 1.0)
-        ways = (
+        methods = (
             (~self.is_sheet & (~rough if self.rng is None else np.ones_like(rough)), self._at_interfaces),
             (self.is_sheet & ~rough, self._at_sheets),
             (self.is_sheet & rough, self._at_rough_sheets),
@@ -163,7 +163,7 @@ class Interactions:
         self.radiance = np.zeros((len(self.live), 3))
         self._add_highlights(np.flatnonzero(rough & (self.is_sheet | (self.lights is None))))
         branches: list[LiveRays] = []
-        for mask, method in ways:
+        for mask, method in methods:
             chosen = np.flatnonzero(mask)
             if chosen.size:
                 found, passed = method(chosen)
@@ -177,37 +177,44 @@ class Interactions:
         ]
 
     def _passing(self, chosen: Integers) -> Array:
-        """(k, 3): share of light that continues past the interface: the base color tints light that enters a body."""
+        """(k, 3): fraction of light continuing past the interface: the base color tints light that enters a body."""
         enters = self.is_sheet[chosen] | (self.interfaces.item[chosen] == self.interfaces.after[chosen])
         return self.transmission[chosen] * np.where(enters[:, None], self.color[chosen], 1.0)
 
     def _at_interfaces(self, chosen: Integers) -> tuple[list[LiveRays], Array]:
-        """Branches at interfaces of solids, and the share (k, 1) of light that passes."""
+        """Branches at interfaces of solids, and the fraction (k, 1) of light that passes."""
         live, here, there = self.live.where(chosen), self.interfaces.here, self.interfaces.there
         directions, normals = live.rays.directions, self.normals[chosen]
-        back_way = reflected_direction(directions, normals)
-        on_way = refracted_direction(directions, normals, self.ior[chosen])
-        share_back = self._under_coat(chosen, self.reflectance[chosen])
-        share_on = 1.0 - share_back
+        reflected_directions = reflected_direction(directions, normals)
+        refracted_directions = refracted_direction(directions, normals, self.ior[chosen])
+        reflectance = self._under_coat(chosen, self.reflectance[chosen])
+        transmittance = 1.0 - reflectance
         if self.rng is not None:
-            chance = share_back.mean(axis=1)
+            chance = reflectance.mean(axis=1)
             passed = self.rng.random(len(chosen)) >= chance
             rough = np.flatnonzero((self.alpha[chosen] > 0) & (self.ior[chosen] != 1.0))
             coated = self.coated[chosen[rough], 0]
             mirrored = self.rng.random(len(rough)) < coated if coated.any() else np.zeros(len(rough), dtype=bool)
             passed[rough], weight = False, np.ones((len(rough), 3))
             walking = rough[~mirrored]
-            back_way[walking], passed[walking], weight[~mirrored] = self._at_microfacets(chosen[walking], self.rng)
-            on_way[rough] = back_way[rough]
-            share_back, share_on = _by_chance(share_back, chance, passed, rough, weight)
-        back, on = np.flatnonzero((share_back > 0.0).any(axis=1)), np.flatnonzero((share_on > 0.0).any(axis=1))
-        passing = (share_on * self._passing(chosen))[on]
-        back_way, on_way = _towards(back_way, self.faces[chosen]), _towards(on_way, -self.faces[chosen])
-        reflected = live.where(back).turned(
-            back_way[back], share_back[back], here.where(chosen[back]), bent=True, reflected=True
+            reflected_directions[walking], passed[walking], weight[~mirrored] = self._at_microfacets(
+                chosen[walking], self.rng
+            )
+            refracted_directions[rough] = reflected_directions[rough]
+            reflectance, transmittance = _by_chance(reflectance, chance, passed, rough, weight)
+        back, on = np.flatnonzero((reflectance > 0.0).any(axis=1)), np.flatnonzero((transmittance > 0.0).any(axis=1))
+        passing = (transmittance * self._passing(chosen))[on]
+        reflected_directions, refracted_directions = (
+            _towards(reflected_directions, self.faces[chosen]),
+            _towards(refracted_directions, -self.faces[chosen]),
         )
-        refracted = live.where(on).turned(on_way[on], passing, there.where(chosen[on]), bent=True, reflected=False)
-        return [reflected, refracted], share_on
+        reflected = live.where(back).turned(
+            reflected_directions[back], reflectance[back], here.where(chosen[back]), bent=True, reflected=True
+        )
+        refracted = live.where(on).turned(
+            refracted_directions[on], passing, there.where(chosen[on]), bent=True, reflected=False
+        )
+        return [reflected, refracted], transmittance
 
     def _at_microfacets(self, chosen: Integers, rng: np.random.Generator) -> tuple[Array, Mask, Array]:
         """Directions from rough interfaces, whether they pass, and weights (k, 3); adds what lights emit."""
@@ -221,7 +228,7 @@ class Interactions:
 
         found = directions, normals, self.ior[chosen], self.alpha[chosen]
         filmed = films if self._table("iridescence")[chosen].any() else None
-        way, passed, weight, seen = lit_at_interface(*found, lights, rng, filmed)
+        scattered, passed, weight, densities = lit_at_interface(*found, lights, rng, filmed)
         for number, to_light in enumerate(lights):
             across, by_face = (np.einsum("ki,ki->k", to_light, n) for n in (normals, self.faces[chosen]))
             for side, passing, inside in (
@@ -229,19 +236,19 @@ class Interactions:
                 (-1.0, self._passing(chosen), self.interfaces.there),
             ):
                 # Light that comes from the other side of the face than of the smooth surface does not exist.
-                some = np.flatnonzero((seen[number] > 0).any(axis=1) & (side * across > 0) & (side * by_face > 0))
-                to_eye = passing[some] * seen[number, some]
+                some = np.flatnonzero((densities[number] > 0).any(axis=1) & (side * across > 0) & (side * by_face > 0))
+                to_eye = passing[some] * densities[number, some]
                 self.radiance[chosen[some]] += self._arriving(number, chosen[some], inside, to_eye)
-        return way, passed, weight
+        return scattered, passed, weight
 
-    def _arriving(self, number: int, chosen: Integers, inside: Inside, share: Array) -> Array:
-        """(k, 3): radiance by one light: its irradiance times a bsdf `share` (k, 3)."""
+    def _arriving(self, number: int, chosen: Integers, inside: Inside, weight: Array) -> Array:
+        """(k, 3): radiance by one light: its irradiance times a bsdf `weight` (k, 3)."""
         assert self.lights is not None
         arriving = self.lights.irradiance(
             number, self.live.rays.origins[chosen], inside.where(chosen), self.own.tolerance
         )
         with np.errstate(under="ignore"):
-            return arriving * share
+            return arriving * weight
 
     def _at_sheets(self, chosen: Integers) -> tuple[list[LiveRays], Array]:
         """Branches at polished sheets, as `_at_interfaces`: both sides of each at once."""
@@ -272,33 +279,33 @@ class Interactions:
         live, inside, normals = self.live.where(chosen), self.interfaces.here.where(chosen), self.normals[chosen]
         metres, extinction, emission = self._matter(chosen)
         ior, alpha = self.ior[chosen], self.alpha[chosen]
-        way, entered = scattered_at_interface(live.rays.directions, normals, ior, alpha, self.rng)
+        scattered, entered = scattered_at_interface(live.rays.directions, normals, ior, alpha, self.rng)
         weight, emitted = np.ones((len(chosen), 3)), np.zeros((len(chosen), 3))
         within = np.flatnonzero(entered)
         for _ in range(MOST_PASSAGES):
             if not within.size:
                 break
-            across = np.einsum("ki,ki->k", way[within], normals[within])
+            across = np.einsum("ki,ki->k", scattered[within], normals[within])
             path = (metres[within] / np.maximum(np.abs(across), optics.MIN_THIN_LAYER_COSINE))[:, None]
             with np.errstate(over="ignore", under="ignore"):
                 emitted[within] += weight[within] * optics.emitted_radiance(emission[within], extinction[within], path)
                 weight[within] *= optics.transmittance(extinction[within] * path)
             facing = np.where(across[:, None] < 0, normals[within], -normals[within])
-            way[within], leaves = scattered_at_interface(
-                way[within], facing, 1.0 / ior[within], alpha[within], self.rng
+            scattered[within], leaves = scattered_at_interface(
+                scattered[within], facing, 1.0 / ior[within], alpha[within], self.rng
             )
-            within = within[~leaves & way[within].any(axis=1)]
-        way[within] = 0.0
+            within = within[~leaves & scattered[within].any(axis=1)]
+        scattered[within] = 0.0
         self.radiance[chosen] += emitted
-        passed = np.einsum("ki,ki->k", way, normals) < 0
-        way = _towards(way, np.where(passed[:, None], -1.0, 1.0) * self.faces[chosen])
+        passed = np.einsum("ki,ki->k", scattered, normals) < 0
+        scattered = _towards(scattered, np.where(passed[:, None], -1.0, 1.0) * self.faces[chosen])
         with np.errstate(under="ignore"):
-            share = weight * np.where(passed[:, None], self._passing(chosen), 1.0)
-        return [live.turned(way, share, inside, bent=True, reflected=~passed)], weight * passed[:, None]
+            throughput = weight * np.where(passed[:, None], self._passing(chosen), 1.0)
+        return [live.turned(scattered, throughput, inside, bent=True, reflected=~passed)], weight * passed[:, None]
 
-    def _under_coat(self, chosen: Integers, share: Array) -> Array:
+    def _under_coat(self, chosen: Integers, reflectance: Array) -> Array:
         """(k, 3): reflectance of interfaces with their clear coats, from the reflectance (k, 3) below these."""
-        return np.asarray(share + self.coated[chosen] * (1.0 - share))
+        return np.asarray(reflectance + self.coated[chosen] * (1.0 - reflectance))
 
     def _matter(self, chosen: Integers) -> tuple[Array, Array, Array]:
         """Thickness (k,) in metres, extinction and emission (k, 3) of sheets."""
@@ -309,10 +316,10 @@ class Interactions:
         return metres[item], rows[item, 0], rows[item, 1]
 
     def _add_diffuse(self, chosen: Integers, passed: Array) -> None:
-        """Add diffuse reflection of the share `passed` (k, 1 or 3) of the light."""
-        share = passed * (1.0 - self.transmission[chosen])
-        diffuse_hits = np.flatnonzero((share > 0.0).any(axis=1))
-        chosen, share = chosen[diffuse_hits], share[diffuse_hits]
+        """Add diffuse reflection of the fraction `passed` (k, 1 or 3) of the light."""
+        fraction = passed * (1.0 - self.transmission[chosen])
+        diffuse_hits = np.flatnonzero((fraction > 0.0).any(axis=1))
+        chosen, fraction = chosen[diffuse_hits], fraction[diffuse_hits]
         if not chosen.size:
             return
         points, normals = self.live.rays.origins[chosen], self.normals[chosen]
@@ -320,7 +327,7 @@ class Interactions:
         front, back = (self.light.on_interfaces(points, side * normals) for side in (1.0, -1.0))
         behind = through * self._table("diffuse_transmission_color")[chosen] * back
         with np.errstate(under="ignore"):
-            self.radiance[chosen] += share / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
+            self.radiance[chosen] += fraction / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
 
     def _add_highlights(self, rough: Integers) -> None:
         """Add highlights of `Scene.lights` in rough interfaces, by single reflection."""
@@ -334,17 +341,19 @@ class Interactions:
                 to_light = np.broadcast_to(-np.asarray(light.direction), points.shape)
             half = to_eye + to_light
             half = half / np.maximum(np.linalg.norm(half, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-            cos_half, cos_light = (np.clip(np.einsum("ki,ki->k", normals, way), 0.0, 1.0) for way in (half, to_light))
+            cos_half, cos_light = (
+                np.clip(np.einsum("ki,ki->k", normals, direction), 0.0, 1.0) for direction in (half, to_light)
+            )
             cos_facet = np.clip(np.einsum("ki,ki->k", half, to_eye), 0.0, 1.0)
-            share = optics.fresnel_dielectric(cos_facet, self.ior[rough])[:, None] * np.ones(3)
+            reflectance = optics.fresnel_dielectric(cos_facet, self.ior[rough])[:, None] * np.ones(3)
             sheet = np.flatnonzero(self.is_sheet[rough])
             metres, extinction, _ = self._matter(rough[sheet])
             path = optics.thin_layer_thickness(metres, cos_facet[sheet], self.ior[rough[sheet]])[:, None]
-            share[sheet] = slab_reflectance(share[sheet], extinction * path)
+            reflectance[sheet] = slab_reflectance(reflectance[sheet], extinction * path)
             density = ggx_distribution(cos_half, self.alpha[rough])
             visible = ggx_visibility(cos_light, self.cosine[rough], self.alpha[rough])
             with np.errstate(under="ignore"):
-                mirrored = share * (density * visible)[:, None] * light.irradiance_on(points, normals)
+                mirrored = reflectance * (density * visible)[:, None] * light.irradiance_on(points, normals)
                 lit = np.flatnonzero(mirrored.any(axis=1))
                 self.radiance[rough[lit]] += mirrored[lit] * self.light.to_interfaces(light, points[lit])
 
@@ -354,10 +363,10 @@ def _by_chance(back: Array, chance: Array, passed: Mask, rough: Integers, weight
 
     Walks at `rough` interfaces have a `weight` (rough, 3).
     """
-    share_back = np.where(passed[:, None], 0.0, back / np.where(chance > 0.0, chance, 1.0)[:, None])
-    share_on = np.where(passed[:, None], (1.0 - back) / np.where(chance < 1.0, 1.0 - chance, 1.0)[:, None], 0.0)
-    share_back[rough], share_on[rough] = weight * ~passed[rough, None], weight * passed[rough, None]
-    return share_back, share_on
+    reflectance = np.where(passed[:, None], 0.0, back / np.where(chance > 0.0, chance, 1.0)[:, None])
+    transmittance = np.where(passed[:, None], (1.0 - back) / np.where(chance < 1.0, 1.0 - chance, 1.0)[:, None], 0.0)
+    reflectance[rough], transmittance[rough] = weight * ~passed[rough, None], weight * passed[rough, None]
+    return reflectance, transmittance
 
 
 def _towards(directions: Array, side: Array) -> Array:
@@ -384,7 +393,7 @@ class StraightLight:
 
     def at_interfaces(self, points: Array) -> Array:
         """(lights, k, 3): unit vectors from points (k, 3) to all lights."""
-        found = [_way(light, points)[0] for light in self.light.lights]
+        found = [_towards_light(light, points)[0] for light in self.light.lights]
         return np.array(found).reshape(len(found), len(points), 3)
 
     def scattered(self, live: LiveRays, weights: Array, channel: int) -> Array:
@@ -422,37 +431,37 @@ class StraightLight:
             Distance in metres from the points within which no surface counts: that they lie on.
         """
         light, found = self.light.lights[number], np.zeros((len(points), 3))
-        share = self._share(light, points, inside, start)
-        some = np.flatnonzero(share.any(axis=1))
+        transmittance = self._transmittance(light, points, inside, start)
+        some = np.flatnonzero(transmittance.any(axis=1))
         with np.errstate(under="ignore"):
-            found[some] = share[some] * self.light.arrival(light, points[some]).irradiance
+            found[some] = transmittance[some] * self.light.arrival(light, points[some]).irradiance
         return found
 
-    def _share(self, light: Light, points: Array, inside: Inside, start: float) -> Array:
+    def _transmittance(self, light: Light, points: Array, inside: Inside, start: float) -> Array:
         """(k, 3): fraction of a light that all interfaces on its way transmit; media are not counted."""
-        directions, distance = _way(light, points)
+        directions, distance = _towards_light(light, points)
         lines = Lines(points, directions, np.full(len(points), start), distance)
-        hits, share = self.light.tracer.hits(lines), np.ones((len(points), 3))
+        hits, transmittance = self.light.tracer.hits(lines), np.ones((len(points), 3))
         while True:
             interfaces = self.own.first_interfaces(hits, inside)
-            met = np.flatnonzero(np.isfinite(interfaces.distance))
-            if not met.size:
-                return share
-            before, after, item = (column[met] for column in (interfaces.before, interfaces.after, interfaces.item))
+            hit = np.flatnonzero(np.isfinite(interfaces.distance))
+            if not hit.size:
+                return transmittance
+            before, after, item = (column[hit] for column in (interfaces.before, interfaces.after, interfaces.item))
             sheet = before == after
             bends = self.own.iors[before] != self.own.iors[np.where(sheet, item, after)]
             tint = np.where((sheet | (item == after))[:, None], self.color[item], 1.0)
-            share[met] *= np.where(bends[:, None], 0.0, self.transmission[item, None] * tint)
+            transmittance[hit] *= np.where(bends[:, None], 0.0, self.transmission[item, None] * tint)
             passed = np.full(len(points), np.inf)
-            passed[met] = np.where(bends, np.inf, interfaces.distance[met] + self.own.tolerance)
+            passed[hit] = np.where(bends, np.inf, interfaces.distance[hit] + self.own.tolerance)
             hits = [line.where(line.distance > passed[line.pixel]) for line in hits]
             inside = interfaces.there
 
 
-def _way(light: Light, points: Array) -> tuple[Array, Array]:
+def _towards_light(light: Light, points: Array) -> tuple[Array, Array]:
     """Unit vectors (k, 3) from points (k, 3) to a light, and how far it is (k,)."""
     if not isinstance(light, PositionalLight):
         return np.tile(-np.asarray(light.direction), (len(points), 1)), np.full(len(points), np.inf)
-    way = np.asarray(light.position) - points
-    distance = np.linalg.norm(way, axis=1)
-    return way / np.where(distance > 0, distance, 1.0)[:, None], distance
+    to_light = np.asarray(light.position) - points
+    distance = np.linalg.norm(to_light, axis=1)
+    return to_light / np.where(distance > 0, distance, 1.0)[:, None], distance

@@ -23,7 +23,7 @@ from translucent.reference.hits import Hits, world_normals
 from translucent.scene.scene import Scene
 from translucent.scene.surface import Surface
 
-#: Distance within which surfaces coincide, as a share of the scene's diagonal.
+#: Distance within which surfaces coincide, as a fraction of the scene's diagonal.
 TOGETHER = 1e-9
 
 #: Smallest cosine between an interface's normal and a ray that meets it.
@@ -125,7 +125,7 @@ class Optics:
         self._films = np.array(
             [(s.iridescence, s.iridescence_ior, s.iridescence_thickness) for s in self.surfaces], dtype=np.float64
         )
-        #: (objects,): share of each that has a clear coat.
+        #: (objects,): fraction of each that has a clear coat.
         self.coats = np.array([s.clearcoat for s in self.surfaces])
         self._corner_normals: dict[int, Array] = {}
 
@@ -141,14 +141,14 @@ class Optics:
         `before` are the objects that light comes from, or `AIR`; the cosine of incidence and the relative index
         `ior` are (k,).
         """
-        share = np.repeat(bare[:, None], 3, axis=1)
+        reflectance = np.repeat(bare[:, None], 3, axis=1)
         some = np.flatnonzero(self._films[item, 0])
         if some.size:
             covered, film, metres = self._films[item[some]].T
             inside = film / self.iors[before[some]]
             colored = thin_film_reflectance(cosine[some], ior[some], inside, film * metres)
-            share[some] += covered[:, None] * (colored - share[some])
-        return share
+            reflectance[some] += covered[:, None] * (colored - reflectance[some])
+        return reflectance
 
     def coated(self, item: Integers, outside: Mask, cosine: Array) -> Array:
         """(k,): reflectance of clear coats, for light that comes from outside."""
@@ -255,7 +255,7 @@ class _InterfaceWalk:
             crossings = crossings.where(going)
             sheet = is_wall[crossings.item]
             self._cross(crossings.where(np.flatnonzero(~sheet)))
-            self._meet_sheet(crossings.where(np.flatnonzero(sheet)))
+            self._cross_sheet(crossings.where(np.flatnonzero(sheet)))
             stopped[crossings.pixel[sheet]] = True
         return self._interfaces()
 
@@ -275,7 +275,7 @@ class _InterfaceWalk:
         self.here.windings[ray], self.here.since[ray] = self.inside.windings[ray], self.inside.since[ray]
         self.face[ray] = -1
 
-    def _meet_sheet(self, crossings: _Crossings) -> None:
+    def _cross_sheet(self, crossings: _Crossings) -> None:
         ray = crossings.pixel
         # With a wall of a body at the same point, the wall goes first.
         free = ~self._changed(ray)

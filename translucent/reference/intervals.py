@@ -12,7 +12,7 @@ from translucent.reference.hits import Hits, Rays
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 
-#: Share of the scene's diagonal on which rounding may wind a body's surface negatively.
+#: Fraction of the scene's diagonal on which rounding may wind a body's surface negatively.
 ROUNDING = 1e-9
 
 

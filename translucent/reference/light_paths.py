@@ -20,8 +20,9 @@ from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PointLight,
 from translucent.scene.scene import Light, Scene
 from translucent.scene.shadow_directions import shadow_directions
 
-#: Distance, as a share of the scene's size, within which opaque surfaces do not shadow a light or a lit point: it lies
-#: on them. Light on a closed opaque body shines outwards all the same, since the other side of the body stops the rest.
+#: Distance, as a fraction of the scene's size, within which opaque surfaces do not shadow a light or a lit point: it
+#: lies on them. Light on a closed opaque body shines outwards all the same, since the other side of the body stops the
+#: rest.
 CONTACT = 1e-9
 
 #: Rounding errors of a point's largest coordinate that are in contact, too: the way meets its surface at an angle.
@@ -81,7 +82,7 @@ class LightPaths:
         return Arrival(*(np.concatenate([getattr(part, name) for part in parts]) for name in Arrival.__match_args__))
 
     def _arrival(self, light: Light, points: Array) -> Arrival:
-        travel, distance = way_of(light, points)
+        travel, distance = direction_and_distance(light, points)
         transmittance, sound = self.transmittance(points, travel, distance)
         irradiance = light.irradiance_on(points, -travel)
         # So bright is only the light itself, and no sum over it converges.
@@ -185,14 +186,14 @@ def _from_eye(light: Light, eye: Array) -> Light:
     return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PositionalLight) else light
 
 
-def way_of(light: Light, points: Array) -> tuple[Array, Array]:
+def direction_and_distance(light: Light, points: Array) -> tuple[Array, Array]:
     """Unit vectors (k, 3) in which light travels to points (k, 3), and how far (k,)."""
     if isinstance(light, DirectionalLight):
         return np.broadcast_to(np.asarray(light.direction), points.shape), np.full(len(points), np.inf)
-    way = points - np.asarray(light.position)
+    direction = points - np.asarray(light.position)
     with np.errstate(under="ignore"):
-        distance = np.linalg.norm(way, axis=1)
-    return way / np.where(distance > 0, distance, 1.0)[:, None], distance
+        distance = np.linalg.norm(direction, axis=1)
+    return direction / np.where(distance > 0, distance, 1.0)[:, None], distance
 
 
 class SurfaceLight:
@@ -219,12 +220,12 @@ class SurfaceLight:
 
     def to_interfaces(self, light: Light, points: Array) -> Array:
         """(k, 3): transmittance of the ways from one of `LightPaths.lights` to points (k, 3) of interfaces."""
-        return self.passed(points, *way_of(light, points), self._before)
+        return self.passed(points, *direction_and_distance(light, points), self._before)
 
     def _irradiance(self, points: Array, normals: Array, before: float) -> Array:
         irradiance = self.scene.environment.irradiance_on(normals)
         if self.scene.environment_shadows:
-            irradiance = irradiance * self._share_of_sky(points, normals, before)
+            irradiance = irradiance * self._sky_fraction(points, normals, before)
         for light in self.paths.lights:
             arriving = np.array(light.irradiance_on(points, normals))
             lit = np.flatnonzero(arriving.any(axis=1))
@@ -235,10 +236,10 @@ class SurfaceLight:
 
     def straight(self, light: Light, points: Array, before: float) -> Array:
         """(k, 3): transmittance of straight ways from one of `LightPaths.lights` that end `before` points (k, 3)."""
-        return self.passed(points, *way_of(light, points), before)
+        return self.passed(points, *direction_and_distance(light, points), before)
 
-    def _share_of_sky(self, points: Array, normals: Array, before: float) -> Array:
-        """(k, 3): share of the environment's irradiance that is left, by its `shadow_directions`."""
+    def _sky_fraction(self, points: Array, normals: Array, before: float) -> Array:
+        """(k, 3): fraction of the environment's irradiance that is left, by its `shadow_directions`."""
         sky = shadow_directions(self.scene.environment, self.scene.environment_shadows)
         left, total = np.zeros((2, *points.shape))
         for towards, irradiance in zip(*sky, strict=True):
@@ -292,4 +293,4 @@ def light_transmittance(scene: Scene, light: int, points: npt.ArrayLike) -> Arra
         raise InputError("points in a scene", f"shape {places.shape}, or not finite", "give an array (k, 3) in metres")
     paths = LightPaths(scene, sheet_thicknesses(scene))
     from_eye = places - scene.camera.eye
-    return SurfaceLight(paths).passed(from_eye, *way_of(paths.lights[light], from_eye))
+    return SurfaceLight(paths).passed(from_eye, *direction_and_distance(paths.lights[light], from_eye))

@@ -22,7 +22,7 @@ from translucent.reference.compositing import ColorLayer, _layers
 from translucent.reference.hits import Rays, pixel_rays
 from translucent.reference.light_paths import LightPaths, SurfaceLight
 from translucent.reference.quadrature import MarchSteps, even_steps, gauss_steps, hashed
-from translucent.reference.render import CrossedMedia, crossed_media, scene_hits, seen_behind
+from translucent.reference.render import CrossedMedia, crossed_media, radiance_behind, scene_hits
 from translucent.reference.scattering import light_source, light_variable
 from translucent.reference.volume import points_on
 from translucent.scene.camera import check_size
@@ -168,7 +168,7 @@ class _March:
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Flat arrays of a frame by their names."""
         first, *others = (self._composited(terms) for terms in self._all_terms())
-        behind = seen_behind(SurfaceLight(self.paths), self.rays, self.media.wall)
+        behind = radiance_behind(SurfaceLight(self.paths), self.rays, self.media.wall)
         with np.errstate(under="ignore"):
             left = np.where(self._stopped(first)[:, None], 0.0, first.transmittance)
             radiance = first.color + sum((layer.color for layer in others), left * behind)

@@ -77,42 +77,48 @@ def lit_at_interface(
         See `Films`.
     """
     axes = _axes(normals)
-    found, seen = np.zeros_like(directions), np.zeros(to_lights.shape)
+    found, densities = np.zeros_like(directions), np.zeros(to_lights.shape)
     weight = np.ones_like(directions)
     lights = np.einsum("kij,lkj->lki", axes, to_lights)
     above = np.ones(len(directions), dtype=bool)
     ray = np.arange(len(directions))
-    way = np.einsum("kij,kj->ki", axes, directions)
+    direction = np.einsum("kij,kj->ki", axes, directions)
     height = np.ones(len(directions))
     for _ in range(MOST_INTERACTIONS):
         # Below the surface everything is as above it, turned upside down.
         side = np.where(above[ray], 1.0, -1.0)[:, None]
-        height, leaves = _next_height(side * way, height, alpha[ray], rng)
-        found[ray[leaves]] = way[leaves]
-        ray, way, height, side = ray[~leaves], way[~leaves], height[~leaves], side[~leaves]
+        height, leaves = _next_height(side * direction, height, alpha[ray], rng)
+        found[ray[leaves]] = direction[leaves]
+        ray, direction, height, side = ray[~leaves], direction[~leaves], height[~leaves], side[~leaves]
         if not ray.size:
             break
         relative = np.where(above[ray], ior[ray], 1.0 / ior[ray])
-        for light, own in zip(lights, seen, strict=True):
-            density, reflects, cosine = _turned_to(side * light[ray], side * way, height, relative, alpha[ray])
-            share = _reflectance(ray, above, cosine, relative, films)
+        for light, own in zip(lights, densities, strict=True):
+            density, reflects, cosine = _density_towards(
+                side * light[ray], side * direction, height, relative, alpha[ray]
+            )
+            reflectance = _reflectance(ray, above, cosine, relative, films)
             with np.errstate(under="ignore"):
-                own[ray] += weight[ray] * density[:, None] * np.where(reflects[:, None], share, 1.0 - share)
-        facet = side * _visible_normals(-side * way, alpha[ray], rng)
-        cosine = np.clip(-np.einsum("ki,ki->k", way, facet), 0.0, 1.0)
-        share = _reflectance(ray, above, cosine, relative, films)
+                own[ray] += weight[ray] * density[:, None] * np.where(reflects[:, None], reflectance, 1.0 - reflectance)
+        facet = side * _visible_normals(-side * direction, alpha[ray], rng)
+        cosine = np.clip(-np.einsum("ki,ki->k", direction, facet), 0.0, 1.0)
+        reflectance = _reflectance(ray, above, cosine, relative, films)
         # As likely as the mean of all colors, each of which counts for as much as there is of it.
-        chance = share.mean(axis=1)
-        passed = rng.random(len(way)) >= chance
+        chance = reflectance.mean(axis=1)
+        passed = rng.random(len(direction)) >= chance
         if films is not None:
-            passing = (1.0 - share) / np.where(chance < 1.0, 1.0 - chance, 1.0)[:, None]
-            weight[ray] *= np.where(passed[:, None], passing, share / np.where(chance > 0.0, chance, 1.0)[:, None])
-        way = np.where(passed[:, None], refracted_direction(way, facet, relative), reflected_direction(way, facet))
-        way /= np.linalg.norm(way, axis=1, keepdims=True)
+            passing = (1.0 - reflectance) / np.where(chance < 1.0, 1.0 - chance, 1.0)[:, None]
+            weight[ray] *= np.where(
+                passed[:, None], passing, reflectance / np.where(chance > 0.0, chance, 1.0)[:, None]
+            )
+        direction = np.where(
+            passed[:, None], refracted_direction(direction, facet, relative), reflected_direction(direction, facet)
+        )
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         above[ray] ^= passed
         # Heights count upwards on either side.
         height = np.where(passed, 1.0 - height, height)
-    return np.einsum("kji,kj->ki", axes, found), ~above, weight, seen
+    return np.einsum("kji,kj->ki", axes, found), ~above, weight, densities
 
 
 def _reflectance(ray: Integers, above: Mask, cosine: Array, ior: Array, films: Films | None) -> Array:
@@ -122,38 +128,40 @@ def _reflectance(ray: Integers, above: Mask, cosine: Array, ior: Array, films: F
 
 
 @np.errstate(under="ignore")
-def _turned_to(light: Array, way: Array, height: Array, ior: Array, alpha: Array) -> tuple[Array, Mask, Array]:
-    """Density (n,) in 1/sr with which microfacets at `height` may turn light on its `way` (n, 3) to `light` (n, 3).
+def _density_towards(
+    light: Array, direction: Array, height: Array, ior: Array, alpha: Array
+) -> tuple[Array, Mask, Array]:
+    """Density (n,) in 1/sr with which microfacets at `height` may turn light from `direction` (n, 3) to `light` (n, 3).
 
     It is to be multiplied by what they reflect, where they do (n,), or let pass, at a cosine of incidence (n,).
 
     Visible normals have the density (m.w) D / (Lambda w_z); Walter et al. 2007, eq. 13 to 17, make one of directions.
     """
     back, across = light[:, 2] > 0, np.where(light[:, 2] > 0, 1.0, ior)
-    half = -way + across[:, None] * light
+    half = -direction + across[:, None] * light
     length = np.linalg.norm(half, axis=1)
     half *= (np.where(half[:, 2] < 0, -1.0, 1.0) / np.where(length > 0, length, 1.0))[:, None]
-    cos_way, cos_light = -np.einsum("ki,ki->k", way, half), np.einsum("ki,ki->k", light, half)
-    area = _lambda(way[:, 2], alpha) * way[:, 2]
-    turns = (cos_way > 0) & ((cos_light > 0) == back) & (length > LEVEL) & (area > 0)
-    stretch = across * across * np.abs(cos_light) / np.where(turns, length, 1.0) ** 2
-    density = cos_way * ggx_distribution(np.abs(half[:, 2]), alpha) * stretch
+    cos_incident, cos_light = -np.einsum("ki,ki->k", direction, half), np.einsum("ki,ki->k", light, half)
+    area = _lambda(direction[:, 2], alpha) * direction[:, 2]
+    valid = (cos_incident > 0) & ((cos_light > 0) == back) & (length > LEVEL) & (area > 0)
+    stretch = across * across * np.abs(cos_light) / np.where(valid, length, 1.0) ** 2
+    density = cos_incident * ggx_distribution(np.abs(half[:, 2]), alpha) * stretch
     leaves = np.where(back, height, 1.0 - height) ** _lambda(np.maximum(np.abs(light[:, 2]), LEVEL), alpha)
-    return np.where(turns, density * leaves / np.where(turns, area, 1.0), 0.0), back, np.clip(cos_way, 0.0, 1.0)
+    return np.where(valid, density * leaves / np.where(valid, area, 1.0), 0.0), back, np.clip(cos_incident, 0.0, 1.0)
 
 
 @np.errstate(under="ignore", over="ignore", divide="ignore")
-def _next_height(way: Array, height: Array, alpha: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
+def _next_height(direction: Array, height: Array, alpha: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
     """Heights (n,) of the next microfacets on light's way, and whether it leaves the surface instead.
 
-    Heights are evenly spread from 0 to 1: of all facets, the share `height` is lower.
+    Heights are evenly spread from 0 to 1: of all facets, the fraction `height` is lower.
     """
-    chance = 1.0 - rng.random(len(way))
-    slope = _lambda(way[:, 2], alpha)
-    level = np.abs(way[:, 2]) < LEVEL
-    upwards = (way[:, 2] > 0) & ~level
+    chance = 1.0 - rng.random(len(direction))
+    slope = _lambda(direction[:, 2], alpha)
+    level = np.abs(direction[:, 2]) < LEVEL
+    upwards = (direction[:, 2] > 0) & ~level
     leaves = upwards & (chance <= height**slope)
-    # G1 = C1(h)^Lambda: the share of light still under way at height h', C1(h)^Lambda / C1(h')^Lambda, is `chance`.
+    # G1 = C1(h)^Lambda: the fraction of light still in flight at height h', C1(h)^Lambda / C1(h')^Lambda, is `chance`.
     moved = height * chance ** (-1.0 / np.where(slope == 0.0, 1.0, slope))
     return np.where(level, height, np.clip(moved, 0.0, 1.0)), leaves
 
@@ -173,8 +181,8 @@ def _visible_normals(towards: Array, alpha: Array, rng: np.random.Generator) -> 
     first, second, _ = np.moveaxis(_axes(stretched), 1, 0)
     radius, angle = np.sqrt(rng.random(len(towards))), 2.0 * np.pi * rng.random(len(towards))
     x, y = radius * np.cos(angle), radius * np.sin(angle)
-    share = 0.5 * (1.0 + stretched[:, 2])
-    y = (1.0 - share) * np.sqrt(np.maximum(1.0 - x * x, 0.0)) + share * y
+    fraction = 0.5 * (1.0 + stretched[:, 2])
+    y = (1.0 - fraction) * np.sqrt(np.maximum(1.0 - x * x, 0.0)) + fraction * y
     z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
     on_sphere = x[:, None] * first + y[:, None] * second + z[:, None] * stretched
     normals = on_sphere * np.stack([alpha, alpha, np.ones_like(alpha)], axis=1)

@@ -1,6 +1,6 @@
 """Monte Carlo path tracing through media and interfaces: all light that finds its way, with error bars.
 
-At each interface a path takes one branch, chosen by its share of the light: by Fresnel and Snell at polished
+At each interface a path takes one branch, chosen by its fraction of the light: by Fresnel and Snell at polished
 interfaces, by a walk among visible microfacets at rough ones, as `translucent.reference.interactions` says. Free paths
 are found by delta tracking of what media scatter (Woodcock et al. 1965). Absorption and emission are integrated along
 each segment (Novak et al. 2018, section 5), so that paths without scattering have no noise of it.
@@ -35,7 +35,7 @@ from translucent.reference.volume import Segments, Volume, multiplicities, point
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene
 
-#: Share of light below which paths end by Russian roulette, or go on with this share.
+#: Fraction of light below which paths end by Russian roulette, or go on with this fraction.
 ROULETTE = 0.1
 
 #: Number of interfaces after which paths end by Russian roulette whatever they carry, and their chance to go on each
@@ -106,7 +106,7 @@ class InterfacePaths:
         """(n, c): radiance of a path along each ray."""
         count = len(rays)
         self.found, self.start = np.zeros((count, 3)), np.zeros(count)
-        self.events, self.interfaces_met = np.zeros((2, count), dtype=np.int64)
+        self.events, self.interfaces_hit = np.zeros((2, count), dtype=np.int64)
         carried = np.zeros((count, 3))
         carried[:, self.channels] = 1.0
         never = np.zeros(count, dtype=bool)
@@ -130,13 +130,13 @@ class InterfacePaths:
         live, event, weights = self._through_media(live, flight)
         collided = np.isfinite(event)
         walled = ~collided & (flight.wall.distance <= flight.end)
-        met = ~collided & (flight.interfaces.distance <= flight.end)
-        self._add_ends(live, flight, np.flatnonzero(walled | (~collided & ~met & flight.leaves)))
-        further = np.flatnonzero(~collided & ~met & ~walled & ~flight.leaves)
+        hit = ~collided & (flight.interfaces.distance <= flight.end)
+        self._add_ends(live, flight, np.flatnonzero(walled | (~collided & ~hit & flight.leaves)))
+        further = np.flatnonzero(~collided & ~hit & ~walled & ~flight.leaves)
         return joined(
             (
                 self._moved(live.where(further), flight.end[further], flight.interfaces.there.where(further)),
-                self._interact(live, flight, np.flatnonzero(met)),
+                self._interact(live, flight, np.flatnonzero(hit)),
                 self._scatter(live, flight, event, weights),
             )
         )
@@ -240,16 +240,16 @@ class InterfacePaths:
             points = live.rays.origins + distance[:, None] * live.rays.directions
         return replace(live, rays=replace(live.rays, origins=points), inside=inside)
 
-    def _interact(self, live: LiveRays, flight: _Flight, met: Integers) -> LiveRays:
+    def _interact(self, live: LiveRays, flight: _Flight, hit: Integers) -> LiveRays:
         """Interact paths with interfaces, and return the paths that continue."""
-        interfaces = flight.interfaces.where(met)
-        live = self._moved(live.where(met), interfaces.distance, interfaces.here, self.own.tolerance)
+        interfaces = flight.interfaces.where(hit)
+        live = self._moved(live.where(hit), interfaces.distance, interfaces.here, self.own.tolerance)
         if not len(live):
             return live
         outcome = Interactions(self.own, live, interfaces, self.surface, self.rng, self.straight).outcome()
         self._add(live, outcome.radiance)
         live = self._one_branch(joined(outcome.branches))
-        self.interfaces_met[live.owner] += 1
+        self.interfaces_hit[live.owner] += 1
         return self._roulette(live)
 
     def _one_branch(self, live: LiveRays) -> LiveRays:
@@ -259,10 +259,10 @@ class InterfacePaths:
         first = np.flatnonzero(np.diff(live.owner, prepend=-1) != 0)
         total = np.add.reduceat(carried, first)
         double = np.diff(first, append=len(live)) == 2
-        share = np.where(total > 0, carried[first] / np.where(total > 0, total, 1.0), 1.0)
-        second = double & (self.rng.random(len(first)) >= share)
+        fraction = np.where(total > 0, carried[first] / np.where(total > 0, total, 1.0), 1.0)
+        second = double & (self.rng.random(len(first)) >= fraction)
         chosen = first + second
-        chance = np.where(double, np.where(second, 1.0 - share, share), 1.0)
+        chance = np.where(double, np.where(second, 1.0 - fraction, fraction), 1.0)
         live = live.where(chosen)
         return replace(live, throughput=live.throughput / chance[:, None])
 
@@ -291,14 +291,14 @@ class InterfacePaths:
 
     def _chosen_phases(self, weights: Array) -> Integers:
         """(k,): numbers of the phase functions of one of the media at each place, chosen by how much they scatter."""
-        shares = np.cumsum(weights * self.scattering, axis=1)
-        chosen = (shares < self.rng.random((len(weights), 1)) * shares[:, -1:]).sum(axis=1)
+        fractions = np.cumsum(weights * self.scattering, axis=1)
+        chosen = (fractions < self.rng.random((len(weights), 1)) * fractions[:, -1:]).sum(axis=1)
         return np.asarray(self.light.volume.phase[np.minimum(chosen, len(self.scattering) - 1)])
 
     def _roulette(self, live: LiveRays) -> LiveRays:
         """Paths that survive Russian roulette, with the light of the others (Arvo & Kirk 1990)."""
         chance = np.minimum(live.throughput.max(axis=1) / ROULETTE, 1.0)
-        chance = np.where(self.interfaces_met[live.owner] > MANY_INTERFACES, np.minimum(chance, GOES_ON), chance)
+        chance = np.where(self.interfaces_hit[live.owner] > MANY_INTERFACES, np.minimum(chance, GOES_ON), chance)
         # Without a direction light is lost.
         lives = (self.rng.random(len(live)) < chance) & live.rays.directions.any(axis=1)
         live = live.where(lives)

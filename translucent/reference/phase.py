@@ -80,7 +80,7 @@ def _henyey_greenstein(cosine: Array, g: float) -> Array:
 
 
 def _droplets(diameter: float) -> tuple[tuple[HenyeyGreenstein, Draine], float]:
-    """The two parts of light that water droplets scatter, and the share of the second: Jendersie and d'Eon 2023."""
+    """The two parts of light that water droplets scatter, and the fraction of the second: Jendersie and d'Eon 2023."""
     um = diameter / 1e-6
     g_hg, g_d = np.exp(-0.0990567 / (um - 1.67154)), np.exp(-2.20679 / (um + 3.91029) - 0.428934)
     alpha, w_d = np.exp(3.62489 - 8.29288 / (um + 5.52825)), np.exp(-0.599085 / (um - 0.641583) - 0.665888)

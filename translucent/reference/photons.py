@@ -24,7 +24,7 @@ from translucent.scene.camera import check_size
 from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Scene
 
-#: Share of the way to a photon within which nothing hides it from the eye: it lies on a surface itself.
+#: Fraction of the way to a photon within which nothing hides it from the eye: it lies on a surface itself.
 _CONTACT = 1e-7
 
 
@@ -114,12 +114,12 @@ class PhotonPaths(InterfacePaths):
         self.radiance(rays)
         return _joined(self.parts)
 
-    def _interact(self, live: LiveRays, flight: _Flight, met: Integers) -> LiveRays:
-        interfaces = flight.interfaces.where(met)
+    def _interact(self, live: LiveRays, flight: _Flight, hit: Integers) -> LiveRays:
+        interfaces = flight.interfaces.where(hit)
         solid = interfaces.before != interfaces.after
         stepped = np.zeros(len(self.turned), dtype=bool)
-        stepped[live.owner[met]] = solid & (self.own.iors[interfaces.before] != self.own.iors[interfaces.after])
-        found = super()._interact(live, flight, met)
+        stepped[live.owner[hit]] = solid & (self.own.iors[interfaces.before] != self.own.iors[interfaces.after])
+        found = super()._interact(live, flight, hit)
         self.turned[found.owner] |= stepped[found.owner] | found.reflected
         return found
 
@@ -194,12 +194,12 @@ def photon_irradiance(scene: Scene, size: tuple[int, int], landed: LandedPhotons
         towards = points / spread[:, None] if perspective else np.tile(camera.forward, (len(points), 1))
         facing = -np.einsum("ki,ki->k", landed.normals, towards)
         density = facing / (pixel * spread**2)
-    seen = (spread > 0) & (facing > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    seen[seen] = _visible(scene, points[seen])
+    visible = (spread > 0) & (facing > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    visible[visible] = _visible(scene, points[visible])
     picture = np.zeros((height, width, 3))
-    at = row[seen].astype(np.int64), column[seen].astype(np.int64)
+    at = row[visible].astype(np.int64), column[visible].astype(np.int64)
     with np.errstate(under="ignore"):
-        np.add.at(picture, at, landed.power[seen] * density[seen, None])
+        np.add.at(picture, at, landed.power[visible] * density[visible, None])
     return picture
 
 

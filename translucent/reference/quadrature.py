@@ -19,7 +19,7 @@ ROUNDS = 45
 #: Largest number of intervals of a sum: beyond it, rounding, not the rule, sets the error.
 MOST_INTERVALS = 4096
 
-#: Share of the brightest channel of a sum below which a channel need not be as accurate.
+#: Fraction of the brightest channel of a sum below which a channel need not be as accurate.
 DIM = 1e-3
 
 # Kronrod 1965: values of Piessens et al. 1983 (QUADPACK), for -1 to 1; from the outermost point to the middle.
@@ -94,7 +94,7 @@ def integrate(
     groups : int
         Number of sums.
     tolerance : float
-        Relative to the sum; for a dim channel to a share of its brightest one.
+        Relative to the sum; for a dim channel to a fraction of its brightest one.
 
     Returns
     -------
@@ -107,9 +107,9 @@ def integrate(
         total, doubt = _sums(value, group[index], groups), _sums(error, group[index], groups)
         allowed = tolerance * np.maximum(total, DIM * total.max(axis=1, keepdims=True))
         count = np.bincount(group[index], minlength=groups)
-        share = allowed / np.maximum(count, 1)[:, None]
+        fraction = allowed / np.maximum(count, 1)[:, None]
         open_groups = (doubt > allowed).any(axis=1) & (count < MOST_INTERVALS)
-        split = open_groups[group[index]] & (error > share[group[index]]).any(axis=1)
+        split = open_groups[group[index]] & (error > fraction[group[index]]).any(axis=1)
         if not split.any():
             break
         middle = 0.5 * (low[split] + high[split])
@@ -139,7 +139,7 @@ def _sums(values: Array, group: Integers, groups: int) -> Array:
     return np.stack([np.bincount(group, values[:, c], groups) for c in range(3)], axis=-1)
 
 
-#: Smallest distance of a light from the line, as a share of its distance from the ends. Any distance makes a valid
+#: Smallest distance of a light from the line, as a fraction of its distance from the ends. Any distance makes a valid
 #: variable; with this one it keeps its digits where the light is on the line, beyond the ends.
 CLOSEST = 1e-6
 

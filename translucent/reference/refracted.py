@@ -58,19 +58,19 @@ class RayEnds:
 
     def radiance(self, live: LiveRays, wall: OpaqueHits) -> Array:
         """(k, 3): of the opaque surfaces that stop ray segments, or where none does of the environment."""
-        seen = reflected_radiance(self.scene, live.rays, wall, self.light.on_opaque)
+        radiance = reflected_radiance(self.scene, live.rays, wall, self.light.on_opaque)
         free = np.flatnonzero(np.isinf(wall.distance))
-        seen[free] = self._environment(live.where(free))
-        return seen
+        radiance[free] = self._environment(live.where(free))
+        return radiance
 
     def _environment(self, live: LiveRays) -> Array:
         """(k, 3): radiance of unblocked ray segments: the environment's light in reflections, else its background."""
         environment, rays = self.scene.environment, live.rays
         place, ahead = places_on_backdrop(self.scene, self.aspect, rays)
-        seen = environment.radiance(rays.directions, np.where(live.bent[:, None], place, rays.backdrop))
+        radiance = environment.radiance(rays.directions, np.where(live.bent[:, None], place, rays.backdrop))
         if environment.seen.kind == "checkerboard":
-            seen[live.bent & ~ahead] = environment.seen.mean
-        return np.where(live.reflected[:, None], environment.lighting(rays.directions), seen)
+            radiance[live.bent & ~ahead] = environment.seen.mean
+        return np.where(live.reflected[:, None], environment.lighting(rays.directions), radiance)
 
 
 def places_on_backdrop(scene: Scene, aspect: float, rays: Rays) -> tuple[Array, Mask]:
@@ -104,7 +104,7 @@ def places_on_backdrop(scene: Scene, aspect: float, rays: Rays) -> tuple[Array, 
     return across + (0.5 * aspect, 0.5), ahead
 
 
-#: Smallest share of each color that a ray must carry to be followed, by default.
+#: Smallest fraction of each color that a ray must carry to be followed, by default.
 FAINTEST = 1e-5
 
 #: Number of rays of the picture that are followed together: the working arrays stay below 500 MB.
@@ -119,7 +119,7 @@ class RefractedLight:
     ----------
     radiance : (n, 3) float64
     residual : (n, 3) float64
-        Share of each ray not not followed to its end; times the largest radiance in the scene it bounds the error.
+        Fraction of each ray not not followed to its end; times the largest radiance in the scene it bounds the error.
     valid : (n,) bool
         No part of the ray went through a hole of a body, or missed the tolerance of scattered light.
     """
@@ -145,7 +145,7 @@ class RefractedRays:
     rng : Generator, optional
         Chooses between reflection and refraction. Without it both are followed, and all interfaces are polished.
     faintest : float
-        Smallest share of each color that a ray must carry to be followed.
+        Smallest fraction of each color that a ray must carry to be followed.
     """
 
     def __init__(
@@ -222,8 +222,8 @@ class _BranchTree:
         live = self._through_media(live, hits, interfaces.distance, wall.distance)
         ends = np.isinf(interfaces.distance)
         self._add(live.where(ends), self.refracted.ends.radiance(live.where(ends), wall.where(np.flatnonzero(ends))))
-        met = np.flatnonzero(~ends)
-        interfaces, live = interfaces.where(met), live.where(met)
+        hit = np.flatnonzero(~ends)
+        interfaces, live = interfaces.where(hit), live.where(hit)
         with np.errstate(under="ignore"):
             points = live.rays.origins + interfaces.distance[:, None] * live.rays.directions
         return replace(live, rays=replace(live.rays, origins=points)), interfaces
@@ -267,8 +267,8 @@ BOUNCES = 8
 #: Default number of rays per pixel before rough interfaces.
 PATHS = 64
 
-#: Smallest share of each color that one of several rays over a pixel must carry to be followed: behind a row of lenses
-#: that leaves out 0.07 % of the light, in half of the time that the default of one ray takes.
+#: Smallest fraction of each color that one of several rays over a pixel must carry to be followed: behind a row of
+#: lenses that leaves out 0.07 % of the light, in half of the time that the default of one ray takes.
 FAINTEST_OF_MANY = 1e-4
 
 #: Number of rays that are averaged together: the working arrays stay below 500 MB.

@@ -103,8 +103,8 @@ def render(
         Of float64 arrays; `shade_hits` tells what is valid. Also invalid is a pixel whose scattered light misses the
         tolerance, since its ray meets a point light inside a medium, or comes through the hole of a body. With
         scattered light, ``provenance["scattering error"]`` is the largest estimated error of a valid pixel, relative to
-        its brightest channel. With refracted rays, ``provenance["residual"]`` is the largest share of a valid pixel's
-        light that was not followed to its end, and ``provenance["standard error"]`` the largest one of a valid pixel.
+        its brightest channel. With refracted rays, ``provenance["residual"]`` is the largest fraction of light in a
+        valid pixel that was not followed to its end, and ``provenance["standard error"]`` the largest of a valid pixel.
 
     Raises
     ------
@@ -142,9 +142,9 @@ def render(
         error = arrays.pop("error")[arrays["valid"]]
         provenance["scattering error"] = f"{error.max(initial=0.0):.1e}"
     if bent:
-        seen, noise = refracted_light(scene, size, method, tolerance, bounces, paths, seed)
-        arrays["radiance"], arrays["valid"] = seen.radiance, arrays["valid"] & seen.valid
-        for name, array in (("residual", seen.residual), ("standard error", noise)):
+        refracted, noise = refracted_light(scene, size, method, tolerance, bounces, paths, seed)
+        arrays["radiance"], arrays["valid"] = refracted.radiance, arrays["valid"] & refracted.valid
+        for name, array in (("residual", refracted.residual), ("standard error", noise)):
             provenance[name] = f"{array[arrays['valid']].max(initial=0.0):.1e}"
     end = time.perf_counter()
     return Frame(
@@ -199,7 +199,7 @@ def shade_hits(
     segments, defective = media.segments, media.defective
     emitted, depth = composite(segments, len(rays))
     transmittance = optics.transmittance(depth)
-    behind = seen_behind(light, rays, media.wall)
+    behind = radiance_behind(light, rays, media.wall)
     coverage = defective.copy()
     coverage[segments.pixel] = True
     with np.errstate(under="ignore"):
@@ -249,7 +249,7 @@ def crossed_media(
     return CrossedMedia(wall, segments, filling, defective)
 
 
-def seen_behind(light: SurfaceLight, rays: Rays, wall: OpaqueHits) -> npt.NDArray[np.float64]:
+def radiance_behind(light: SurfaceLight, rays: Rays, wall: OpaqueHits) -> npt.NDArray[np.float64]:
     """(n, 3): radiance behind all media, of the environment or of the opaque surface."""
     return np.where(
         np.isinf(wall.distance)[:, None],

@@ -59,8 +59,8 @@ def cone_edges(rays: Rays, light: Light) -> tuple[Integers, Array]:
     if not isinstance(light, SpotLight):
         return np.empty(0, np.int64), np.empty(0)
     axis, from_light = np.asarray(light.direction), rays.origins - np.asarray(light.position)
-    along = [way @ axis for way in (from_light, rays.directions)]
-    across = [way - s[:, None] * axis for way, s in zip((from_light, rays.directions), along, strict=True)]
+    along = [vector @ axis for vector in (from_light, rays.directions)]
+    across = [vector - s[:, None] * axis for vector, s in zip((from_light, rays.directions), along, strict=True)]
     found = []
     for angle in np.radians((light.inner_cone, light.outer_cone)):
         # On the cone, or on its mirror image behind: (sin * along)^2 = (cos * across)^2. For an angle of 0, where the
@@ -81,19 +81,19 @@ def cone_edges(rays: Rays, light: Light) -> tuple[Integers, Array]:
 def _shadow_edges(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
     """`shadow_edges` of few rays. Rays towards the light itself have no plane with it, and no edges."""
     if isinstance(light, DirectionalLight):
-        way = np.broadcast_to(np.asarray(light.direction), rays.directions.shape)
+        light_vector = np.broadcast_to(np.asarray(light.direction), rays.directions.shape)
     else:
-        way = np.asarray(light.position) - rays.origins
+        light_vector = np.asarray(light.position) - rays.origins
     # Each edge has at most one point in the plane of a ray and the light.
-    normal = np.cross(rays.directions, way)
+    normal = np.cross(rays.directions, light_vector)
     above, below = (normal @ (edges[:, i].T) - np.einsum("ki,ki->k", normal, rays.origins)[:, None] for i in (0, 1))
     ray, edge = np.nonzero((above > 0) != (below > 0))
-    share = above[ray, edge] / (above[ray, edge] - below[ray, edge])
-    point = edges[edge, 0] + share[:, None] * (edges[edge, 1] - edges[edge, 0]) - rays.origins[ray]
+    fraction = above[ray, edge] / (above[ray, edge] - below[ray, edge])
+    point = edges[edge, 0] + fraction[:, None] * (edges[edge, 1] - edges[edge, 0]) - rays.origins[ray]
     if isinstance(light, DirectionalLight):
-        source, direction = point, way[ray]
+        source, direction = point, light_vector[ray]
     else:
-        source, direction = way[ray], point - way[ray]
+        source, direction = light_vector[ray], point - light_vector[ray]
     across = np.cross(rays.directions[ray], direction)
     t = np.einsum("ki,ki->k", np.cross(source, direction), across) / np.einsum("ki,ki->k", across, across)
     # The light passes the edge first.
@@ -152,8 +152,8 @@ def scattered_once(paths: LightPaths, rays: Rays, segments: Segments, filling: A
     result = integrate(lambda index, u: work(span[index], u), start, end, group, len(rays), tolerance)
     with np.errstate(under="ignore", over="ignore"):
         error = result.error + np.minimum(rounding, 1.0)[:, None] * result.value
-    met = (error <= 2.0 * tolerance * result.value.max(axis=1, keepdims=True)).all(axis=1)
-    return Scattered(result.value, error, met & work.sound & (rounding <= 2.0 * tolerance))
+    accurate = (error <= 2.0 * tolerance * result.value.max(axis=1, keepdims=True)).all(axis=1)
+    return Scattered(result.value, error, accurate & work.sound & (rounding <= 2.0 * tolerance))
 
 
 @np.errstate(over="ignore", under="ignore")
@@ -263,9 +263,9 @@ def light_variable(
     if not isinstance(light, PositionalLight):
         length = (end - start)[:, None]
         return start[:, None] + u * length, np.broadcast_to(length, u.shape)
-    way, direction = np.asarray(light.position) - rays.origins[ray], rays.directions[ray]
-    middle = np.einsum("ki,ki->k", way, direction)
-    return equiangular(start, end, middle, np.linalg.norm(way - middle[:, None] * direction, axis=1), u)
+    to_light, direction = np.asarray(light.position) - rays.origins[ray], rays.directions[ray]
+    middle = np.einsum("ki,ki->k", to_light, direction)
+    return equiangular(start, end, middle, np.linalg.norm(to_light - middle[:, None] * direction, axis=1), u)
 
 
 @np.errstate(over="ignore")
@@ -281,13 +281,13 @@ def depths_before(segments: Segments, pixels: int) -> Array:
 
 def _spans(paths: LightPaths, number: int, rays: Rays, segments: Segments, chosen: Integers) -> _LightSpans:
     """Spans of some segments, cut at the edges of shadows and cones."""
-    seen = np.unique(segments.pixel[chosen])
+    pixels = np.unique(segments.pixel[chosen])
     light = paths.lights[number]
     edges = np.concatenate([outline_edges(traced, light) for traced in paths.tracer.objects])
-    cuts = shadow_edges(rays.where(seen), edges, light), cone_edges(rays.where(seen), light)
+    cuts = shadow_edges(rays.where(pixels), edges, light), cone_edges(rays.where(pixels), light)
     ray, t = (np.concatenate(parts) for parts in zip(*cuts, strict=True))
     # In the order along each ray, a cut belongs to the segment that began last, if it has not ended.
-    pixel = np.concatenate([segments.pixel[chosen], seen[ray]])
+    pixel = np.concatenate([segments.pixel[chosen], pixels[ray]])
     t = np.concatenate([segments.t_enter[chosen], t])
     begins = np.arange(len(pixel)) < len(chosen)
     order = np.lexsort((~begins, t, pixel))

@@ -69,23 +69,23 @@ def _phases(mu: Array, anisotropy: float, peak: float) -> tuple[Array, Array]:
     return (values * moments * (-1.0) ** order) @ values.T, (values * moments) @ values.T
 
 
-def shares(albedo: float, depth: float, ior: float, anisotropy: float = 0.0) -> tuple[float, float]:
+def scattered_fractions(albedo: float, depth: float, ior: float, anisotropy: float = 0.0) -> tuple[float, float]:
     """Reflectance and transmittance of a slab for diffuse light that has entered, scattered light alone."""
     if albedo == 0:
         return 0.0, 0.0
-    (r, t), (r0, t0) = whole_shares(albedo, depth, ior, anisotropy), unscattered_shares(depth, ior)
+    (r, t), (r0, t0) = total_fractions(albedo, depth, ior, anisotropy), unscattered_fractions(depth, ior)
     return r - r0, t - t0
 
 
 @np.errstate(under="ignore")
-def whole_shares(albedo: float, depth: float, ior: float, anisotropy: float = 0.0) -> tuple[float, float]:
+def total_fractions(albedo: float, depth: float, ior: float, anisotropy: float = 0.0) -> tuple[float, float]:
     """Reflectance and transmittance of a slab for diffuse light that has entered at the top."""
     mu, weight = cosines(ior)
     return _between_interfaces(mu, weight, ior, *bare(albedo, depth, mu, weight, anisotropy))
 
 
 @np.errstate(under="ignore")
-def unscattered_shares(depth: float, ior: float) -> tuple[float, float]:
+def unscattered_fractions(depth: float, ior: float) -> tuple[float, float]:
     """Reflectance and transmittance of a slab for diffuse light that has entered, unscattered light alone."""
     mu, weight = cosines(ior)
     return _between_interfaces(mu, weight, ior, np.zeros((len(mu), len(mu))), np.diag(np.exp(-depth / mu)))

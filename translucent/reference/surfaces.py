@@ -107,9 +107,9 @@ def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits, irradiance
     """
     radiance = np.zeros((len(rays), 3))
     for i, body in enumerate(scene.objects):
-        seen = np.flatnonzero(nearest.item == i)
-        if seen.size:
-            radiance[seen] = _lambert(body, nearest.where(seen), rays.where(seen), irradiance)
+        visible = np.flatnonzero(nearest.item == i)
+        if visible.size:
+            radiance[visible] = _lambert(body, nearest.where(visible), rays.where(visible), irradiance)
     return radiance
 
 
@@ -190,8 +190,8 @@ class Crossings:
         Index into `Scene.objects`.
     covered : (k,) float64
         Optical depth of a layer there, besides that of a medium.
-    shown : (k, 3) float64
-        Radiance that the layer shows.
+    radiance : (k, 3) float64
+        Radiance of the layer.
     """
 
     pixel: Integers
@@ -199,7 +199,7 @@ class Crossings:
     path: Array
     body: Integers
     covered: Array
-    shown: Array
+    radiance: Array
 
 
 def sheet_thicknesses(scene: Scene, method: Method | None = None) -> tuple[float | None, ...]:
@@ -248,10 +248,14 @@ def scene_crossings(
     parts = [none]
     for i, (body, metres) in enumerate(zip(scene.objects, sheets, strict=True)):
         if metres is not None and (irradiance is not None or not body.covers):
-            seen = sheet_hits(scene, body, hits[i], end)
-            path = _paths(body, metres, seen, rays.directions[seen.pixel])
-            shown = np.zeros((len(path), 3)) if irradiance is None else layer_radiance(body, seen, rays, irradiance)
-            parts.append((seen.pixel, seen.distance, path, np.full(len(path), i), layer_depth(body, seen), shown))
+            crossed = sheet_hits(scene, body, hits[i], end)
+            path = _paths(body, metres, crossed, rays.directions[crossed.pixel])
+            radiance = (
+                np.zeros((len(path), 3)) if irradiance is None else layer_radiance(body, crossed, rays, irradiance)
+            )
+            parts.append(
+                (crossed.pixel, crossed.distance, path, np.full(len(path), i), layer_depth(body, crossed), radiance)
+            )
     return Crossings(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 

@@ -207,7 +207,7 @@ def volume_segments(
         source = order[row] - len(solid)
         covered = (crossings.covered[source] / crossings.path[source])[:, None]
         extinction[row] += covered
-        emission[row] += covered * crossings.shown[source]
+        emission[row] += covered * crossings.radiance[source]
     return Segments(pixel, t_enter, t_exit, length, extinction, emission, count), filling
 
 

@@ -37,7 +37,7 @@ class Backdrop(Frozen):
     ambient : str, float or (3,), optional
         Radiance that lit the picture evenly from all around; default: the environment of the scene. With the lights of
         the scene it is taken for all the light that the picture shows: bodies throw shadows onto it, which leave the
-        share of its radiance that reaches it of this light.
+        fraction of its radiance that reaches it of this light.
 
     Raises
     ------

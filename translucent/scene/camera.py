@@ -131,16 +131,16 @@ class Camera(Frozen):
         up : array_like (3,)
             Upwards in the picture.
         """
-        seen = np.asarray(points, dtype=np.float64)
-        if seen.ndim != 2 or seen.shape[1] != 3 or not len(seen):
-            raise InputError(f"camera framing points of shape {seen.shape}", "no points", "give an array (n, 3)")
+        framed = np.asarray(points, dtype=np.float64)
+        if framed.ndim != 2 or framed.shape[1] != 3 or not len(framed):
+            raise InputError(f"camera framing points of shape {framed.shape}", "no points", "give an array (n, 3)")
         size = check_size(size)
-        low, high = extent(seen)
+        low, high = extent(framed)
         reach = float(np.linalg.norm(high - low)) or 1.0
         pose, half, axes = _framing_axes(size, direction, fov_y, up)
         middle, farthest = 0.5 * (low + high), np.full(5, -np.inf)
-        for begin in range(0, len(seen), FRAMED_AT_ONCE):  # millions of points would take room
-            part = (seen[begin : begin + FRAMED_AT_ONCE] - middle) @ axes
+        for begin in range(0, len(framed), FRAMED_AT_ONCE):  # millions of points would take room
+            part = (framed[begin : begin + FRAMED_AT_ONCE] - middle) @ axes
             farthest = np.maximum(farthest, extent(part)[1])
         upper, lower = farthest[:2], farthest[2:4]
         center, distance = (upper - lower) / 2, float(((upper + lower) / (2 * half)).max())

@@ -208,10 +208,13 @@ class Environment(Frozen):
         backdrop : array_like (..., 2)
             Position in the picture, right and down from the top left corner, in heights of the picture.
         """
-        seen = self.seen
-        if seen.kind != "checkerboard":
-            return seen.lighting(directions)
-        return seen.first + (seen.second - seen.first) * checkerboard_share(backdrop, seen.tiles)[..., None]
+        background = self.seen
+        if background.kind != "checkerboard":
+            return background.lighting(directions)
+        return (
+            background.first
+            + (background.second - background.first) * checkerboard_share(backdrop, background.tiles)[..., None]
+        )
 
     @checked
     def lighting(self, directions: npt.ArrayLike) -> Array:
@@ -222,10 +225,10 @@ class Environment(Frozen):
         if self.map is not None:
             return self.scale * self.map.at(equirectangular_uv(directions, self.turn))
         if self.kind == "gradient":
-            share = gradient_share(directions)
+            fraction = gradient_share(directions)
         else:
-            share = np.full(np.asarray(directions).shape[:-1], 0.5)
-        return self.first + (self.second - self.first) * share[..., None]
+            fraction = np.full(np.asarray(directions).shape[:-1], 0.5)
+        return self.first + (self.second - self.first) * fraction[..., None]
 
     @checked
     def irradiance_on(self, normals: npt.ArrayLike) -> Array:
@@ -239,11 +242,11 @@ class Environment(Frozen):
 
             return self.scale * irradiance_map(self.map).at(equirectangular_uv(normals, self.turn))
         if self.kind == "gradient":
-            share = gradient_irradiance_share(normals)
+            fraction = gradient_irradiance_share(normals)
         else:
-            share = np.full(np.asarray(normals).shape[:-1], 0.5)
+            fraction = np.full(np.asarray(normals).shape[:-1], 0.5)
         with np.errstate(under="ignore"):
-            return np.asarray(np.pi * (self.first + (self.second - self.first) * share[..., None]))
+            return np.asarray(np.pi * (self.first + (self.second - self.first) * fraction[..., None]))
 
     def harmonics(self) -> Array:
         """Coefficients (9, 3) of its light in real spherical harmonics of the bands 0 to 2.
@@ -273,12 +276,12 @@ def _uniform_map(radiance: tuple[float, ...]) -> EnvironmentMap:
 
 
 def gradient_share(direction: npt.ArrayLike) -> Array:
-    """Share of a gradient's top in direction (..., 3): (1 + y) / 2."""
+    """Fraction of a gradient's top in direction (..., 3): (1 + y) / 2."""
     return np.asarray(0.5 + 0.5 * np.asarray(direction, dtype=np.float64)[..., 1])
 
 
 def gradient_irradiance_share(normal: npt.ArrayLike) -> Array:
-    """Share of a gradient's top in what a surface with unit normal (..., 3) receives.
+    """Fraction of a gradient's top in what a surface with unit normal (..., 3) receives.
 
     The cosine-weighted mean of `gradient_share` over the hemisphere: the mean of y there is 2/3 of the normal's y.
     """

@@ -135,15 +135,15 @@ def texel_directions(height: int, width: int) -> Array:
 
 
 def _overlaps(fine: Array, coarse: Array) -> Array:
-    """(coarse cells, fine cells): the share of each coarse cell that a fine one covers; rows sum to 1."""
+    """(coarse cells, fine cells): the fraction of each coarse cell that a fine one covers; rows sum to 1."""
     low = np.maximum(coarse[:-1, None], fine[None, :-1])
     high = np.minimum(coarse[1:, None], fine[None, 1:])
     return np.asarray(np.maximum(high - low, 0.0) / np.diff(coarse)[:, None])
 
 
-def _held(shares: Array) -> slice:
+def _held(fractions: Array) -> slice:
     """From the first to the last of the shares that are not 0."""
-    found = np.flatnonzero(shares)
+    found = np.flatnonzero(fractions)
     return slice(found[0], found[-1] + 1)
 
 
@@ -152,8 +152,8 @@ def _split(position: Array) -> tuple[npt.NDArray[np.intp], Array]:
     return whole.astype(np.intp), (position - whole)[..., None]
 
 
-def _mix(first: npt.NDArray[Any], second: npt.NDArray[Any], share: Array) -> Array:
-    return np.asarray(first * (1.0 - share) + second * share)
+def _mix(first: npt.NDArray[Any], second: npt.NDArray[Any], fraction: Array) -> Array:
+    return np.asarray(first * (1.0 - fraction) + second * fraction)
 
 
 def _usable(given: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float32], list[str]]:

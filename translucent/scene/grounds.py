@@ -17,10 +17,10 @@ from translucent.scene.surface import Surface
 #: Roughness above which a coat mirrors a blur and no more.
 MOST_ROUGHNESS = 0.4
 
-#: Largest distance of a ground's vertices from its plane, as a share of its size.
+#: Largest distance of a ground's vertices from its plane, as a fraction of its size.
 FLAT = 1e-6
 
-#: Share of the scene's size by which what stands on a ground may be below it, by rounding.
+#: Fraction of the scene's size by which what stands on a ground may be below it, by rounding.
 SUNK = 1e-5
 
 

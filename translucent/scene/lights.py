@@ -51,7 +51,7 @@ class PositionalLight(Frozen):
 
     @property
     def mean_share(self) -> float:
-        """Mean over all directions of the share of its intensity with which it shines there."""
+        """Mean over all directions of the fraction of its intensity with which it shines there."""
         return 1.0
 
     def intensity_along(self, travel: npt.ArrayLike) -> Array:
@@ -150,7 +150,7 @@ class SpotLight(PositionalLight):
 
     @property
     def mean_share(self) -> float:
-        """Mean over all directions of the share of its intensity with which it shines there."""
+        """Mean over all directions of the fraction of its intensity with which it shines there."""
         within, without = (2.0 * math.sin(0.5 * math.radians(a)) ** 2 for a in (self.inner_cone, self.outer_cone))
         return 0.5 * (within + (without - within) / 3.0)
 
@@ -202,17 +202,17 @@ class SphereLight(PositionalLight):
     def points(self, count: int) -> tuple[PointLight, ...]:
         """Point lights of the same intensity in all: of `SPREADS` the largest with at most `count`, 1 at least.
 
-        Each looks like a disc of its share of the area.
+        Each looks like a disc of its fraction of the area.
         """
         spread = next(spread for spread in SPREADS if len(spread) <= count)
-        share = 1.0 / len(spread)
+        fraction = 1.0 / len(spread)
         # With what the discs add, the variance is that of the whole disc.
-        offsets = self.radius * math.sqrt(1.0 - share) * spread
+        offsets = self.radius * math.sqrt(1.0 - fraction) * spread
         return tuple(
             _PointOfSphere(
                 self.position + offset,
-                share * np.asarray(self.intensity),
-                math.sqrt(share) * self.radius,
+                fraction * np.asarray(self.intensity),
+                math.sqrt(fraction) * self.radius,
                 (*-offset, self.radius),
             )
             for offset in offsets

@@ -380,8 +380,8 @@ class Scene(Frozen):
     @cached_property
     def shown_bounds(self) -> Array:
         """(2, 3): smallest and largest world coordinates of what is shown."""
-        seen = ~np.array([item.shadow_catcher for item in self.objects])
-        boxes = self.boxes[seen] if seen.any() else self.boxes
+        rendered = ~np.array([item.shadow_catcher for item in self.objects])
+        boxes = self.boxes[rendered] if rendered.any() else self.boxes
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     @cached_property

@@ -15,7 +15,7 @@ from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, 
 #: Rows and columns of the picture whose pixels the directions share out: 1.4 degrees each.
 SIZE = (128, 256)
 
-#: Share of the directions that are spread evenly, wherever the light comes from.
+#: Fraction of the directions that are spread evenly, wherever the light comes from.
 EVEN = 0.25
 
 #: Rounds that spread the directions. Errors of shadows fall by a quarter, and no further with more rounds.
@@ -33,7 +33,7 @@ def shadow_directions(environment: Environment, count: int) -> tuple[Array, Arra
 
     The directions are the centers of a Voronoi diagram of the sphere (Lloyd 1982), from Sobol points that fall by
     luminance and, a quarter of them, evenly; each has the light of its cell, so that all of it is counted. Of
-    the light that reaches a surface with normal n where T_i of each direction gets through, the share is ::
+    the light that reaches a surface with normal n where T_i of each direction gets through, the fraction is ::
 
         sum_i w_i max(n . l_i, 0) T_i  /  sum_i w_i max(n . l_i, 0)
 
@@ -63,9 +63,9 @@ def shadow_directions(environment: Environment, count: int) -> tuple[Array, Arra
     return turned, bright
 
 
-def _turn(turns: float) -> Array:
+def _turn(rotation: float) -> Array:
     """(3, 3): rotation of row vectors about +Y, counterclockwise as seen from above."""
-    cosine, sine = np.cos(2.0 * np.pi * turns), np.sin(2.0 * np.pi * turns)
+    cosine, sine = np.cos(2.0 * np.pi * rotation), np.sin(2.0 * np.pi * rotation)
     return np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]])
 
 
@@ -75,30 +75,30 @@ def _shared_out(source: EnvironmentMap, count: int) -> tuple[Array, Array]:
     from translucent.scene.environment_map import sized  # scenes without shadows of the environment need no SciPy
 
     solid_angles = np.repeat(row_solid_angles(*SIZE), SIZE[1])
-    ways = texel_directions(*SIZE).reshape(-1, 3)
+    texels = texel_directions(*SIZE).reshape(-1, 3)
     with np.errstate(under="ignore"):
         flux = sized(source, SIZE).reshape(-1, 3) * solid_angles[:, None]
-        share = _shares(luminance(flux), solid_angles)
-        directions = ways[_drawn(share, count)]
+        fractions = _fractions(luminance(flux), solid_angles)
+        directions = texels[_drawn(fractions, count)]
         for _ in range(ROUNDS):
-            directions = _centered(directions, ways, share)
-        cell, _ = _nearest(directions, ways)
+            directions = _centered(directions, texels, fractions)
+        cell, _ = _nearest(directions, texels)
         irradiance = _sums(cell, flux, count)
     for values in (directions, irradiance):
         values.setflags(write=False)
     return directions, irradiance
 
 
-def _shares(light: Array, solid_angles: Array) -> Array:
-    """(n,): share of the directions for each pixel; they sum to 1."""
+def _fractions(light: Array, solid_angles: Array) -> Array:
+    """(n,): fraction of the directions for each pixel; they sum to 1."""
     even, total = solid_angles / solid_angles.sum(), light.sum()
     return np.asarray(EVEN * even + (1.0 - EVEN) * light / total if total > 0 else even)
 
 
-def _drawn(share: Array, count: int) -> Integers:
+def _drawn(fractions: Array, count: int) -> Integers:
     """(count,): pixels by their shares, row first and then column, from low-discrepancy points."""
     points = sobol_points(count, scrambled=True)[_strided(count)]
-    table = share.reshape(SIZE)
+    table = fractions.reshape(SIZE)
     rows = np.cumsum(table.sum(axis=1))
     row = np.minimum(np.searchsorted(rows, points[:, 0] * rows[-1], side="right"), SIZE[0] - 1)
     columns = np.cumsum(table[row], axis=1)
@@ -120,24 +120,26 @@ def _strided(count: int) -> Integers:
     return reverse[reverse < count]
 
 
-def _centered(directions: Array, ways: Array, share: Array) -> Array:
+def _centered(directions: Array, texels: Array, fractions: Array) -> Array:
     """The centers of the cells of directions; those of empty cells go where others are farthest from what they have."""
-    cell, apart = _nearest(directions, ways)
-    middle = _sums(cell, ways * share[:, None], len(directions))
+    cell, apart = _nearest(directions, texels)
+    middle = _sums(cell, texels * fractions[:, None], len(directions))
     length = np.linalg.norm(middle, axis=1)
     # All directions of a lone cell may cancel.
     centers = np.where(length[:, None] > 1e-9, middle / np.maximum(length, 1e-9)[:, None], directions)
     empty = np.flatnonzero(np.bincount(cell, minlength=len(directions)) == 0)
     if empty.size:
-        centers[empty] = ways[np.argsort(-share * apart * apart, kind="stable")[: len(empty)]]
+        centers[empty] = texels[np.argsort(-fractions * apart * apart, kind="stable")[: len(empty)]]
     return np.asarray(centers)
 
 
-def _nearest(directions: Array, ways: Array) -> tuple[Integers, Array]:
-    """Number (n,) of the direction nearest to each of `ways` (n, 3), and the distance (n,)."""
+def _nearest(directions: Array, texels: Array) -> tuple[Integers, Array]:
+    """Number (n,) of the direction nearest to each of `texels` (n, 3), and the distance (n,)."""
     # Few directions: their products with blocks that stay in a cache are found faster than a tree is gone through.
-    cell = np.concatenate([(ways[i : i + _BLOCK] @ directions.T).argmax(axis=1) for i in range(0, len(ways), _BLOCK)])
-    return cell, np.linalg.norm(ways - directions[cell], axis=1)
+    cell = np.concatenate(
+        [(texels[i : i + _BLOCK] @ directions.T).argmax(axis=1) for i in range(0, len(texels), _BLOCK)]
+    )
+    return cell, np.linalg.norm(texels - directions[cell], axis=1)
 
 
 def _sums(cell: Integers, values: Array, count: int) -> Array:

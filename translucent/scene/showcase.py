@@ -92,8 +92,8 @@ def showcase(
     lights = tuple(lights)
     own = environment is not None or len(lights) > 0
     chosen = stage_named(stage or (NO_STAGE if own else DEFAULT_STAGE))
-    shown = Object(mesh, medium=medium or default_medium(mesh, chosen))
-    scene = Scene([shown], camera or framing([shown], size, stage=chosen), lights, environment or LIGHT_TABLE)
+    model = Object(mesh, medium=medium or default_medium(mesh, chosen))
+    scene = Scene([model], camera or framing([model], size, stage=chosen), lights, environment or LIGHT_TABLE)
     return scene if chosen is None else staged(scene, chosen, environment)
 
 
@@ -155,8 +155,8 @@ def framing(
         return Camera.framing(points, size, fov_y=fov_y, up=up)
     lights, directions = stage_lights(stage), framing_directions(size, stage.view, fov_y, up)
     # Shadows are where linear functions of points are: each of what turns unit vectors into those of its shadow.
-    turns = with_shadows(np.eye(4, 3, -1), lights).reshape(-1, 4, 3)[:, 1:]
-    points = farthest_vertices(objects, (directions @ turns.transpose(0, 2, 1)).reshape(-1, 3))
+    maps = with_shadows(np.eye(4, 3, -1), lights).reshape(-1, 4, 3)[:, 1:]
+    points = farthest_vertices(objects, (directions @ maps.transpose(0, 2, 1)).reshape(-1, 3))
     points = with_shadows(points, lights)
     middle = extent(points).mean(axis=0)
     return Camera.framing(middle + ROOM * (points - middle), size, stage.view, fov_y, up)
@@ -217,7 +217,7 @@ def objects_named(scene: Scene, name: str) -> tuple[Object, ...]:
 def fillable(scene: Scene) -> tuple[Object, ...]:
     """Objects to fill with a medium if none is named: all that light enters, or else all.
 
-    Layers that cover a share of what is behind them are among them only where there is nothing else.
+    Layers that cover a fraction of what is behind them are among them only where there is nothing else.
     """
     bodies = tuple(body for body in scene.bodies if not body.covers)
     return bodies or tuple(item for item in scene.objects if not item.covers) or tuple(scene.objects)

@@ -139,7 +139,7 @@ def stage_named(name: str) -> Stage | None:
     return STAGES[name]
 
 
-#: Air between model and ground, as a share of the model's diagonal: rays resolve surfaces that are so far apart.
+#: Air between model and ground, as a fraction of the model's diagonal: rays resolve surfaces that are so far apart.
 GAP = 1e-3
 
 #: How far the ground reaches, in diagonals of the model.
@@ -151,7 +151,7 @@ BRIGHT, DARK = 0.8, 9.0
 #: Directions of the environment that throw shadows onto the ground.
 ENVIRONMENT_SHADOWS = 128
 
-#: Share of the length of shadows that the default camera makes room for.
+#: Fraction of the length of shadows that the default camera makes room for.
 SHADOW_SEEN = 0.7
 
 #: Sine of the elevation of lights below which shadows have no end to make room for.
@@ -239,8 +239,12 @@ def with_shadows(points: Array, lights: Sequence[Light]) -> Array:
     """(n, 3): points, and places on the ground below them most of the way to where lights throw their shadows."""
     height = points[:, 1:2] - points[:, 1].min()
     feet = points - height * (0.0, 1.0, 0.0)
-    ways = [np.asarray(light.direction) for light in lights if isinstance(light, DirectionalLight)]
-    shadows = [feet - SHADOW_SEEN * height * way * (1.0, 0.0, 1.0) / way[1] for way in ways if way[1] < -LOWEST]
+    directions = [np.asarray(light.direction) for light in lights if isinstance(light, DirectionalLight)]
+    shadows = [
+        feet - SHADOW_SEEN * height * direction * (1.0, 0.0, 1.0) / direction[1]
+        for direction in directions
+        if direction[1] < -LOWEST
+    ]
     return np.concatenate([points, *shadows])
 
 

@@ -27,9 +27,9 @@ class Panel(NamedTuple):
     radiance : (r, g, b)
         In its middle.
     falloff : float
-        How much darker it is at its corners, as a share.
+        How much darker it is at its corners, as a fraction.
     softness : float
-        Width of its edges, as a share of its half width and half height.
+        Width of its edges, as a fraction of its half width and half height.
     """
 
     azimuth: float
@@ -89,8 +89,8 @@ def _with_panels(radiance: Array, towards: Array, panels: tuple[Panel, ...]) -> 
     for panel in panels:
         # Of most directions a panel covers nothing.
         on = towards @ _center(panel) > np.cos(np.radians(0.5 * np.hypot(panel.width, panel.height)))
-        share, brightness = _panel(towards[on], panel)
-        radiance[on] += share * (np.asarray(panel.radiance) * brightness - radiance[on])
+        fraction, brightness = _panel(towards[on], panel)
+        radiance[on] += fraction * (np.asarray(panel.radiance) * brightness - radiance[on])
     return radiance
 
 
@@ -127,11 +127,11 @@ def _edge(x: Array, softness: float) -> Array:
     return _smooth((1.0 - np.abs(x)) / softness)
 
 
-def _smooth(share: Array) -> Array:
+def _smooth(fraction: Array) -> Array:
     """The cubic from 0 at 0 to 1 at 1 that is flat at both ends."""
-    t = np.clip(share, 0.0, 1.0)
+    t = np.clip(fraction, 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
-def _mixed(first: Array, second: Array, share: Array) -> Array:
-    return first + (second - first) * share
+def _mixed(first: Array, second: Array, fraction: Array) -> Array:
+    return first + (second - first) * fraction

@@ -70,7 +70,7 @@ class Surface(Frozen):
         Tints what passes the surface, once for each body; albedo of the diffuse base: 0 to 1, a color as text or
         linear RGB.
     transmission : float
-        Share of the light that enters by refraction, 0 to 1; the rest meets the diffuse base.
+        Fraction of the light that enters by refraction, 0 to 1; the rest meets the diffuse base.
     diffuse_transmission : float
         Fraction of the light on the diffuse base that passes to the other side, 0 to 1.
     diffuse_transmission_color : str or array_like (3,)
@@ -83,7 +83,7 @@ class Surface(Frozen):
     occlusion_texture : Texture, optional
         R multiplies the light of the environment, and not that of lights.
     metallic : float
-        Of an opaque object, 0 to 1: share of it that is metal, whose mirror images have the color.
+        Of an opaque object, 0 to 1: fraction of it that is metal, whose mirror images have the color.
     ior : float
         Of the coat of an opaque object, >= 1. With 1 it is Lambert's: nothing is mirrored but by metal.
     emissive : str or array_like (3,)
@@ -94,21 +94,21 @@ class Surface(Frozen):
         0 to 1: where the opacity of `color_texture`, times that of the vertices, is less, an opaque object or a thin
         sheet has a hole. A solid has none: what is inside would be open.
     opacity : float, optional
-        Makes of a thin sheet a layer that covers this share of what is behind it, 0 to 1, whatever the angle, times the
-        opacity of `color_texture` and of the vertices. It shows what an opaque object with this surface would,
+        Makes of a thin sheet a layer that covers this fraction of what is behind it, 0 to 1, whatever the angle, times
+        the opacity of `color_texture` and of the vertices. It shows what an opaque object with this surface would,
         over what is behind (Porter and Duff's ``over``). Its medium should be clear, and its interfaces bend nothing.
     double_sided : bool
         Whether an opaque object is seen from the inside, too.
     iridescence : float
-        Share of the surface that has a thin film on it, 0 to 1, whose interference colors what is mirrored. A sheet has
-        it on the side that light comes from: a soap bubble is a sheet with a medium of ior 1 and such a film.
+        Fraction of the surface that has a thin film on it, 0 to 1, whose interference colors what is mirrored. A sheet
+        has it on the side that light comes from: a soap bubble is a sheet with a medium of ior 1 and such a film.
     iridescence_ior : float
         Of the film, >= 1: soapy water 1.33, oxides up to 2.7.
     iridescence_thickness : float
         Of the film, in metres, up to 1e-4: 100e-9 to 1000e-9 show colors.
     clearcoat : float
-        Share of the surface that has a clear coat of ior 1.5 on it, 0 to 1. It mirrors light that comes from outside,
-        and what is below gets the rest.
+        Fraction of the surface that has a clear coat of ior 1.5 on it, 0 to 1. It mirrors light that comes from
+        outside, and what is below gets the rest.
     clearcoat_roughness : float
         Of the clear coat, 0 to 1.
 

@@ -82,12 +82,12 @@ class Texture(Frozen):
         at = vectors("uv", uv, 2, "texture coordinates") @ self.rows[:, :2].T + self.rows[:, 2]
         column, row = at[..., 0] * width - 0.5, (1.0 - at[..., 1]) * height - 0.5
         left, top = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
-        right_share, low_share = (column - left)[..., None], (row - top)[..., None]
+        right_weight, low_weight = (column - left)[..., None], (row - top)[..., None]
         columns = [_wrapped(left + i, width, self.wrap[0]) for i in (0, 1)]
         rows = [_wrapped(top + i, height, self.wrap[1]) for i in (0, 1)]
-        upper = self.pixels[rows[0], columns[0]] * (1 - right_share) + self.pixels[rows[0], columns[1]] * right_share
-        lower = self.pixels[rows[1], columns[0]] * (1 - right_share) + self.pixels[rows[1], columns[1]] * right_share
-        return np.asarray(upper * (1 - low_share) + lower * low_share)
+        upper = self.pixels[rows[0], columns[0]] * (1 - right_weight) + self.pixels[rows[0], columns[1]] * right_weight
+        lower = self.pixels[rows[1], columns[0]] * (1 - right_weight) + self.pixels[rows[1], columns[1]] * right_weight
+        return np.asarray(upper * (1 - low_weight) + lower * low_weight)
 
     def _freeze(self, field: str, array: npt.NDArray[Any]) -> None:
         array.setflags(write=False)
@@ -104,7 +104,7 @@ SIZE = 64
 
 @dataclass(frozen=True, eq=False)
 class Falloff(Texture):
-    """Texture of a share of gray: 1 around its middle, `far` at the radius of its edges and beyond.
+    """Texture of a fraction of gray: 1 around its middle, `far` at the radius of its edges and beyond.
 
     Attributes
     ----------
@@ -119,8 +119,8 @@ class Falloff(Texture):
 
     @classmethod
     def around(cls, start: float, far: float) -> Falloff:
-        """Falloff from a radius on, to a share."""
+        """Falloff from a radius on, to a fraction."""
         place = (np.arange(SIZE) + 0.5) / SIZE - 0.5
-        share = np.clip((np.hypot(place[:, None], place) - start) / (0.5 - start), 0.0, 1.0)
-        values = 1.0 + (far - 1.0) * share * share * (3.0 - 2.0 * share)
+        fraction = np.clip((np.hypot(place[:, None], place) - start) / (0.5 - start), 0.0, 1.0)
+        values = 1.0 + (far - 1.0) * fraction * fraction * (3.0 - 2.0 * fraction)
         return cls(np.repeat(values[..., None], 3, axis=-1), wrap=("clamp", "clamp"), start=start, far=far)

@@ -47,7 +47,7 @@ class RayMarched(Method):
         Through each interval between neighboring surfaces, 1 to 65536; at most 256 Gauss-Legendre points.
     quadrature : {"left", "midpoint", "exponential", "jittered", "equiangular", "gauss"}
     jitter : bool
-        Moves all samples of a pixel by one random share of a step: bands turn into noise. For quadratures with steps
+        Moves all samples of a pixel by one random fraction of a step: bands turn into noise. For quadratures with steps
         and fixed places in them: not for ``jittered`` and ``gauss``.
     seed : int
         Of the random numbers, 0 to 2^32 - 1.
