@@ -1,4 +1,4 @@
-// Vertices of a sheet with holes: as in body.vert, flat, with what tells where the holes are.
+// Vertices of a sheet with holes: as in body.vert, flat, with what decides where the holes are.
 
 #include <Body>
 

@@ -30,7 +30,7 @@ float last_axial_depth() {
 }
 
 // Where a list keeps a crossing at this axial depth; false where it needs none, since an opaque surface hides it. Of a body that
-// may be open before that surface, what is hidden tells whether the ray has rightly come to be in it: it is kept, moved onto it.
+// may be open before that surface, what is hidden decides whether the ray has rightly come to be in it: it is kept, moved onto it.
 bool is_kept(inout float axial_depth) {
 #if OPAQUE
     float last = last_axial_depth();

@@ -1,4 +1,4 @@
-// Passes where the last pass has found a crossing: an occlusion query around it tells whether to go on.
+// Passes where the last pass has found a crossing: an occlusion query around it decides whether to go on.
 
 #include <constants>
 

@@ -1,4 +1,4 @@
-// The two walks of a peel: how they begin, wait in textures, and meet. Needs intervals/resolve.glsl.
+// The two walks of a peel: how they begin, wait in textures, and join. Needs intervals/resolve.glsl.
 
 struct Peel {
     Walk near;      // from the start of the ray
@@ -24,7 +24,7 @@ layout(location = 5) out uvec4 out_near_winding;
 layout(location = 6) out uvec4 out_far_winding;
 #endif
 
-// The walks before the first crossing; alpha of the first pass tells what is ahead, blue how steep it is at most.
+// The walks before the first crossing; alpha of the first pass is what is ahead, blue how steep it is at most.
 Peel begin_peel(float steepest, float alpha, float advance) {
     float excess = floor(alpha / PEEL_UNIT);
     int excesses[SLOTS];

@@ -6,7 +6,7 @@
 #include "volume/density.glsl"
 #endif
 
-int slot_turns(int winding[SLOTS], int slot) {
+int slot_weight(int winding[SLOTS], int slot) {
     if (winding[slot] <= 0) { return 0; }
 #if PRIORITY
     // Slots are sorted by priority.
@@ -32,8 +32,8 @@ int slot_turns(int winding[SLOTS], int slot) {
 }
 
 // The same for all slots, as numbers: how much of each medium there is where its density is 1.
-float[SLOTS] all_turns(int winding[SLOTS]) {
-    float turns[SLOTS];
-    for (int slot = 0; slot < SLOTS; ++slot) { turns[slot] = float(slot_turns(winding, slot)); }
-    return turns;
+float[SLOTS] slot_weights(int winding[SLOTS]) {
+    float weights[SLOTS];
+    for (int slot = 0; slot < SLOTS; ++slot) { weights[slot] = float(slot_weight(winding, slot)); }
+    return weights;
 }

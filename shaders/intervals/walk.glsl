@@ -36,13 +36,13 @@ Contents contents(int winding[SLOTS]) {
     Contents mix = Contents(vec3(0.0), vec3(0.0), 0.0, false);
     for (int slot = 0; slot < SLOTS; ++slot) {
         mix.inside_out = mix.inside_out || winding[slot] < 0;
-        float turns = float(slot_turns(winding, slot));
-        mix.extinction += turns * slot_extinction[slot].rgb;
-        mix.emission += turns * slot_emission[slot].rgb;
+        float weight = float(slot_weight(winding, slot));
+        mix.extinction += weight * slot_extinction[slot].rgb;
+        mix.emission += weight * slot_emission[slot].rgb;
 #if UNION
-        mix.count = max(mix.count, turns);
+        mix.count = max(mix.count, weight);
 #else
-        mix.count += turns;
+        mix.count += weight;
 #endif
     }
     return mix;
@@ -56,13 +56,13 @@ void add_segment(inout Walk walk, float metres, bool backwards) {
 #if SCATTER
     if (mix.count > 0.0) {
         ViewRay ray = ray_from(float(walk.axial_step) / float(axial_steps()));
-        float turns[SLOTS] = all_turns(walk.winding);
+        float weights[SLOTS] = slot_weights(walk.winding);
 #if MARCH
-        Marched march = marched(turns, ray, metres, mix.extinction, mix.emission, transmittance(walk.optical_depth));
+        Marched march = marched(weights, ray, metres, mix.extinction, mix.emission, transmittance(walk.optical_depth));
         added = march.color;
         depth = march.depth;
 #else
-        added += in_scattered(turns, ray, metres, mix.extinction);
+        added += in_scattered(weights, ray, metres, mix.extinction);
 #endif
     }
 #endif
@@ -85,16 +85,16 @@ void cross_surface(inout Walk walk, uint word, int times, bool backwards, float 
         add_segment(walk, float(steps) * metres_per_step, backwards);
     }
     walk.axial_step = axial_step;
-    int turns = crossing_leaves(word) == backwards ? times : -times;
+    int change = crossing_leaves(word) == backwards ? times : -times;
     int crossed = crossing_slot(word);
     for (int slot = 0; slot < SLOTS; ++slot) {
-        walk.winding[slot] += slot == crossed ? turns : 0;
+        walk.winding[slot] += slot == crossed ? change : 0;
     }
 }
 
 // A walk that starts with the given excess of exits over entries ahead, from which an unknown start is found. As many
 // metres as the rasterizer may have misplaced a surface are no surface inside out: next to a silhouette, the two faces that
-// meet there change their order.
+// join there change their order.
 Walk walk_from_start(int excess[SLOTS], float misplaced) {
     Walk walk;
     walk.axial_step = 0u;

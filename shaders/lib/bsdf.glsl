@@ -15,7 +15,7 @@ struct Lobes {
     vec3 transmission;
 };
 
-// Reflectance of an interface that reflects `bare` without the film on it. film: share of the interface that has it, its index
+// Reflectance of an interface that reflects `bare` without the film on it. film: fraction of the interface that has it, its index
 // of refraction, and metres; ior_before: index of the side that light comes from.
 vec3 filmed_reflectance(float bare, float cosine, float ior, vec3 film, float ior_before) {
     if (film.x == 0.0) { return vec3(bare); }
@@ -65,7 +65,7 @@ float masking_ratio(float cos_in, float cos_out, float alpha) {
     return (1.0 + into) / (1.0 + into + smith_lambda(cos_out, alpha));
 }
 
-// A direction that a smooth normal turns to the wrong side of a face, mirrored to the right one.
+// A direction that a smooth normal moves to the wrong side of a face, mirrored to the right one.
 vec3 kept_on_side(vec3 direction, vec3 side) {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
 }

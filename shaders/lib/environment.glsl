@@ -1,4 +1,4 @@
-// The procedural environments, as shares between two radiances, and texture coordinates in pictures of all directions. Pure.
+// The procedural environments, as fractions between two radiances, and texture coordinates in pictures of all directions. Pure.
 // Each function is the float32 twin of the same name in translucent/scene/environment.py.
 
 #include <constants>
@@ -22,7 +22,7 @@ float checkerboard_share(vec2 backdrop, float tiles) {
 }
 
 // Texture coordinates of a direction in an equirectangular picture, right and down, 0 to 1; u wraps around. Straight up (+Y) is v = 0,
-// -Z is u = 1/2. turn: of the picture about +Y, as a share of a full turn, counterclockwise as seen from above.
+// -Z is u = 1/2. turn: of the picture about +Y, as a fraction of a full turn, counterclockwise from above.
 vec2 equirectangular_uv(vec3 direction, float turn) {
     float away = length(direction.xz);
     float longitude = away > 0.0 ? atan(direction.x, -direction.z) : 0.0;

@@ -42,14 +42,14 @@ float ggx_visibility(float cos_light, float cos_view, float alpha) {
     return light + view > 0.0 ? 0.5 / (light + view) : 0.0;
 }
 
-// Smith's Lambda of GGX: 1 / (1 + Lambda) of the microfacets are seen from a direction.
+// Smith's Lambda of GGX: 1 / (1 + Lambda) of the microfacets are visible from a direction.
 float smith_lambda(float cosine, float alpha) {
     float up = max(cosine, 1e-6);
     float slope = alpha * alpha * (1.0 - up) * (1.0 + up);
     return 0.5 * slope / (up * (sqrt(up * up + slope) + up));
 }
 
-// Normal of a microfacet as it is seen from a direction, at random: towards and the result in a frame whose z axis is the
+// Normal of a microfacet that is visible from a direction, at random: towards and the result in a frame whose z axis is the
 // normal of the surface, shares (0 to 1) are the random numbers.
 vec3 ggx_visible_normal(vec3 towards, float alpha, vec2 shares) {
     vec3 stretched = normalize(vec3(alpha * towards.xy, max(towards.z, 1e-6)));
@@ -58,8 +58,8 @@ vec3 ggx_visible_normal(vec3 towards, float alpha, vec2 shares) {
     vec3 second = cross(stretched, first);
     float radius = sqrt(shares.x);
     float x = radius * cos(2.0 * PI * shares.y);
-    float seen = 0.5 * (1.0 + stretched.z);
-    float y = mix(sqrt(max(1.0 - x * x, 0.0)), radius * sin(2.0 * PI * shares.y), seen);
+    float blend = 0.5 * (1.0 + stretched.z);
+    float y = mix(sqrt(max(1.0 - x * x, 0.0)), radius * sin(2.0 * PI * shares.y), blend);
     vec3 normal = x * first + y * second + sqrt(max(1.0 - x * x - y * y, 0.0)) * stretched;
     return normalize(vec3(alpha * normal.xy, max(normal.z, 1e-6)));
 }

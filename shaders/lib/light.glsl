@@ -32,9 +32,9 @@ float cone_attenuation(vec3 travel, vec4 cone) {
 // Point in a sphere of radius 1 that looks like an even disc from everywhere, given three random numbers: the projection of a
 // point on the sphere in four dimensions.
 vec3 sphere_point(vec3 shares) {
-    vec2 turns = 2.0 * PI * shares.yz;
+    vec2 angles = 2.0 * PI * shares.yz;
     float across = sqrt(shares.x);
-    return vec3(across * cos(turns.x), across * sin(turns.x), sqrt(1.0 - shares.x) * cos(turns.y));
+    return vec3(across * cos(angles.x), across * sin(angles.x), sqrt(1.0 - shares.x) * cos(angles.y));
 }
 
 // Where a disc is nearest to a direction: all of its light in a highlight comes as if from there (Karis 2013, "Real shading in
@@ -47,8 +47,8 @@ vec3 nearest_on_disc(vec4 disc, vec3 direction) {
 // Fraction of a highlight's peak that is left when it is spread over a disc, of a radius over its distance: that of the
 // distribution of microfacets (GGX) around the half vectors that mirror the disc, so that no light comes or goes.
 float disc_peak(float alpha, float radius, float cos_view) {
-    float half_way = 0.5 * radius / sqrt(cos_view);
-    return alpha * alpha / (alpha * alpha + half_way * (0.5 * PI * alpha + half_way));
+    float middle = 0.5 * radius / sqrt(cos_view);
+    return alpha * alpha / (alpha * alpha + middle * (0.5 * PI * alpha + middle));
 }
 
 // Direction from which microfacets mirror a light, and w: by what their value is multiplied. Polished ones show a disc; for
@@ -56,20 +56,20 @@ float disc_peak(float alpha, float radius, float cos_view) {
 vec4 highlight_from(vec3 towards, vec4 disc, vec3 mirrored, float alpha, float cos_view) {
     if (disc.w == 0.0) { return vec4(towards, 1.0); }
     float rough = clamp(8.0 * alpha / disc.w - 1.0, 0.0, 1.0);
-    vec4 shown = vec4(normalize(mix(disc.xyz, towards, rough)), (1.0 - rough) * disc.w);
-    return vec4(nearest_on_disc(shown, mirrored), disc_peak(alpha, shown.w, cos_view));
+    vec4 highlight = vec4(normalize(mix(disc.xyz, towards, rough)), (1.0 - rough) * disc.w);
+    return vec4(nearest_on_disc(highlight, mirrored), disc_peak(alpha, highlight.w, cos_view));
 }
 
 // Sample a light from a point. Divided by the distance twice: no square overflows.
 LightSample light_sample(Light light, vec3 point) {
-    vec3 way = light.position.xyz - light.position.w * point;
-    float distance_m = max(length(way), 1e-18);
-    vec3 towards = way / distance_m;
+    vec3 offset = light.position.xyz - light.position.w * point;
+    float distance_m = max(length(offset), 1e-18);
+    vec3 towards = offset / distance_m;
     if (light.position.w == 0.0) { return LightSample(towards, NOTHING, light.power, vec4(0.0)); }
     vec3 irradiance = light.power * cone_attenuation(-towards, light.cone) / distance_m / distance_m;
     vec4 disc = vec4(0.0);
     if (light.disc.w > 0.0) {
-        vec3 to_disc = way + light.disc.xyz;
+        vec3 to_disc = offset + light.disc.xyz;
         float away = max(length(to_disc), 1e-18);
         disc = vec4(to_disc / away, min(light.disc.w / away, 0.9));
     }

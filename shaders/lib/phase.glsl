@@ -1,6 +1,6 @@
 // Phase functions: how a medium spreads the light that it scatters. Pure. Inputs: cos_scatter, the cosine between the directions
 // of travel before and after an event, 1 straight on; phase: the four parameters of a phase function, which is a mixture: x: g of
-// Henyey and Greenstein, the mean cosine, -1 < g < 1; y, z: g and alpha of Draine; w: the share of the light that the latter scatters.
+// Henyey and Greenstein, the mean cosine, -1 < g < 1; y, z: g and alpha of Draine; w: the fraction of the light that the latter scatters.
 // Each function is the float32 twin of the same name in translucent/formulas/phase.py, where the sources are cited: Henyey &
 // Greenstein 1941; Witt 1977; Draine 2003; Jendersie & d'Eon 2023.
 
@@ -16,7 +16,7 @@ float henyey_greenstein(float cos_scatter, float anisotropy) {
     return (1.0 - g) * (1.0 + g) / (4.0 * PI * base * sqrt(base));
 }
 
-// Cosine of the angle that light turns by, at random: share is a random number, 0 to 1.
+// Cosine of the angle by which light is deflected, at random: share is a random number, 0 to 1.
 float henyey_greenstein_cosine(float share, float anisotropy) {
     float g = anisotropy;
     float a = 2.0 * share - 1.0;
@@ -30,17 +30,18 @@ float draine(float cos_scatter, float anisotropy, float alpha) {
     return henyey_greenstein(cos_scatter, anisotropy) * (1.0 + alpha * cos_scatter * cos_scatter) / (1.0 + alpha * squares);
 }
 
-// Cosine of the angle that light turns by, at random. As many events turn further by Draine's as the integral of 1 + alpha cos^2 over
-// the shares t of Henyey and Greenstein says, a polynomial over powers of q = 1 - g + 2 g t; it is solved by Newton's method in a bracket.
+// Cosine of the angle by which light is deflected, at random. The distribution of Draine is that of Henyey and Greenstein times
+// 1 + alpha cos^2: its integral over their numbers t is a polynomial over powers of q = 1 - g + 2 g t, divided by such powers. It is
+// solved for t by Newton's method in a bracket.
 float draine_cosine(float share, float anisotropy, float alpha) {
     float g = anisotropy;
-    float wanted = share * (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0);
+    float integral = share * (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0);
     float low = 0.0, high = 1.0, t = share;
     for (int i = 0; i < DRAINE_STEPS; ++i) {
         float q = 1.0 - g + 2.0 * g * t;
         float middle = (t * (1.0 + g * g) - (1.0 - g)) / q;
         float squares = middle * middle + t * t * (1.0 - g) * (1.0 + g) * (1.0 + g) * (1.0 + g) * (1.0 + g) / (3.0 * q * q * q);
-        float beyond = t * (1.0 + alpha * squares) - wanted;
+        float beyond = t * (1.0 + alpha * squares) - integral;
         low = beyond > 0.0 ? low : t;
         high = beyond > 0.0 ? t : high;
         float cosine = henyey_greenstein_cosine(t, g);

@@ -20,8 +20,8 @@ vec3 scattered_radiance(vec3 transfer[9], vec3 light[9]) {
     return max(found, vec3(0.0));
 }
 
-// Radiance in a direction as a share of that mean. cosine: with the normal, outside; entering: as the bake states it, the
-// share of diffuse light that the interface lets through.
+// Radiance in a direction as a fraction of that mean. cosine: with the normal, outside; entering: as the bake states it, the
+// fraction of diffuse light that the interface lets through.
 float exit_lobe(float cosine, float ior, float entering) {
     return (1.0 - fresnel_dielectric(cosine, ior)) / entering;
 }

@@ -28,8 +28,8 @@ vec3 thin_film_reflectance(float cos_incident, float ior, float film_ior, float 
     vec2 both = (film - first) / near_sum * ((film - last) / far_sum);
     vec2 passed = 4.0 * first * film / (near_sum * near_sum) * (4.0 * film * last / (far_sum * far_sum));
     vec3 wave = film_interference(path);
-    vec3 seen = clamp(wave, -1.0, 1.0);
-    vec3 together = passed.x / (1.0 - 2.0 * both.x * seen + both.x * both.x) + passed.y / (1.0 - 2.0 * both.y * seen + both.y * both.y);
+    vec3 cosine = clamp(wave, -1.0, 1.0);
+    vec3 together = passed.x / (1.0 - 2.0 * both.x * cosine + both.x * both.x) + passed.y / (1.0 - 2.0 * both.y * cosine + both.y * both.y);
     vec2 each = passed / ((1.0 - both) * (1.0 + both));
     vec3 colored = vec3(each.x + each.y);
     for (int order = 1; order <= FILM_ORDERS; ++order) {

@@ -17,9 +17,9 @@ vec3 tone_neutral(vec3 linear) {
     if (peak <= NEUTRAL_START) {
         return color;
     }
-    float shown = 1.0 - (1.0 - NEUTRAL_START) * (1.0 - NEUTRAL_START) / (peak + 1.0 - 2.0 * NEUTRAL_START);
-    float kept = 1.0 / (NEUTRAL_DESATURATION * (peak - shown) + 1.0);
-    return mix(vec3(shown), color * (shown / peak), kept);
+    float compressed = 1.0 - (1.0 - NEUTRAL_START) * (1.0 - NEUTRAL_START) / (peak + 1.0 - 2.0 * NEUTRAL_START);
+    float kept = 1.0 / (NEUTRAL_DESATURATION * (peak - compressed) + 1.0);
+    return mix(vec3(compressed), color * (compressed / peak), kept);
 }
 
 // From 0 at 0 to 1 at 1: middle gray becomes 1/2, and the slope there is AGX_SLOPE.
@@ -38,8 +38,8 @@ vec3 tone_agx(vec3 linear) {
     float own = 1.0 - dot(AGX_MIX, vec3(1.0));
     vec3 narrowed = own * color + dot(AGX_MIX, color);
     vec3 stops = log2(clamp(narrowed / AGX_MIDDLE_GRAY, exp2(AGX_LOW), exp2(AGX_HIGH)));
-    vec3 shares = (stops - AGX_LOW) / (AGX_HIGH - AGX_LOW);
-    vec3 encoded = vec3(agx_sigmoid(shares.r), agx_sigmoid(shares.g), agx_sigmoid(shares.b));
+    vec3 fractions = (stops - AGX_LOW) / (AGX_HIGH - AGX_LOW);
+    vec3 encoded = vec3(agx_sigmoid(fractions.r), agx_sigmoid(fractions.g), agx_sigmoid(fractions.b));
     vec3 widened = (encoded - dot(AGX_MIX, encoded)) / own;
     return pow(clamp(widened, 0.0, 1.0), vec3(AGX_DISPLAY));
 }

@@ -21,15 +21,15 @@ vec3 two_stream_depth(vec3 absorption_depth, vec3 scattering_depth) {
     return sqrt(absorption_depth) * sqrt(absorption_depth + 2.0 * scattering_depth);
 }
 
-// What both shares have below: ((K + S) sinh(gamma d) / gamma + cosh(gamma d)) exp(-gamma d), without overflow.
+// The common denominator of both fractions: ((K + S) sinh(gamma d) / gamma + cosh(gamma d)) exp(-gamma d), without overflow.
 vec3 two_stream_denominator(vec3 absorption_depth, vec3 scattering_depth) {
-    vec3 both_ways = 2.0 * two_stream_depth(absorption_depth, scattering_depth);
-    return (absorption_depth + scattering_depth) * mean_transmittance(both_ways) + 0.5 * (1.0 + transmittance(both_ways));
+    vec3 round_trip = 2.0 * two_stream_depth(absorption_depth, scattering_depth);
+    return (absorption_depth + scattering_depth) * mean_transmittance(round_trip) + 0.5 * (1.0 + transmittance(round_trip));
 }
 
 vec3 two_stream_reflectance(vec3 absorption_depth, vec3 scattering_depth) {
-    vec3 both_ways = 2.0 * two_stream_depth(absorption_depth, scattering_depth);
-    return scattering_depth * mean_transmittance(both_ways) / two_stream_denominator(absorption_depth, scattering_depth);
+    vec3 round_trip = 2.0 * two_stream_depth(absorption_depth, scattering_depth);
+    return scattering_depth * mean_transmittance(round_trip) / two_stream_denominator(absorption_depth, scattering_depth);
 }
 
 vec3 two_stream_transmittance(vec3 absorption_depth, vec3 scattering_depth) {
@@ -43,7 +43,7 @@ vec3 multiple_reflectance(vec3 absorption_depth, vec3 scattering_depth) {
     return max(two_stream_reflectance(absorption_depth, scattering_depth) - once, vec3(0.0));
 }
 
-// A layer between two interfaces that mirror the share r of diffuse light from inside, any number of times.
+// A layer between two interfaces that mirror the fraction r of diffuse light from inside, any number of times.
 vec3 mirrored_reflectance(vec3 reflectance, vec3 transmittance, float mirrored) {
     vec3 alike = 1.0 - mirrored * (reflectance + transmittance);
     vec3 opposite = 1.0 - mirrored * (reflectance - transmittance);

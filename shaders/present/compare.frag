@@ -23,7 +23,7 @@ uniform float thickest;      // thickness of the last false color, in m
 uniform float worst;         // largest difference of thickness with a color of its own, in m
 uniform float stops;
 uniform vec3 empty_color;    // sRGB: no medium
-uniform vec3 seen_color;     // valid
+uniform vec3 valid_color;     // valid
 uniform vec3 wrong_color;    // not valid
 
 layout(location = 0) out vec4 encoded;
@@ -32,11 +32,11 @@ bool has(vec4 trust, float flag) {
     return mod(floor(trust.r / flag), 2.0) == 1.0;
 }
 
-vec3 shown(ivec2 texel, sampler2D light, vec4 depths, vec4 trust) {
+vec3 view_color(ivec2 texel, sampler2D light, vec4 depths, vec4 trust) {
     bool covered = has(trust, FLAG_COVERED), valid = has(trust, FLAG_VALID);
 #if MODE == 1
-    float share = clamp(depths.a / thickest, 0.0, 1.0) * 255.0;
-    vec3 color = covered ? texelFetch(false_colors, ivec2(round(share), 0), 0).rgb : empty_color;
+    float fraction = clamp(depths.a / thickest, 0.0, 1.0) * 255.0;
+    vec3 color = covered ? texelFetch(false_colors, ivec2(round(fraction), 0), 0).rgb : empty_color;
     return valid ? color : wrong_color;
 #elif MODE == 2
     return linear_to_srgb(exp(-min(depths.rgb, 80.0)));
@@ -45,7 +45,7 @@ vec3 shown(ivec2 texel, sampler2D light, vec4 depths, vec4 trust) {
     vec3 picture = develop(summed.rgb / max(summed.a, 1.0), stops);
 #if MODE == 3
     vec3 dimmed = vec3(0.35 * luminance(picture));
-    return valid ? (covered ? mix(dimmed, seen_color, 0.6) : dimmed) : wrong_color;
+    return valid ? (covered ? mix(dimmed, valid_color, 0.6) : dimmed) : wrong_color;
 #else
     return picture;
 #endif
@@ -60,9 +60,9 @@ vec3 difference(vec4 depths, vec4 trust, vec4 other_depths, vec4 other_trust) {
     if (!has(trust, FLAG_COVERED) && !has(other_trust, FLAG_COVERED)) {
         return empty_color;
     }
-    float share = clamp((depths.a - other_depths.a) / worst, -1.0, 1.0);
-    vec3 end = share < 0.0 ? vec3(0.13, 0.40, 0.80) : vec3(0.80, 0.15, 0.18);
-    return mix(vec3(0.95), end, sqrt(abs(share)));
+    float fraction = clamp((depths.a - other_depths.a) / worst, -1.0, 1.0);
+    vec3 end = fraction < 0.0 ? vec3(0.13, 0.40, 0.80) : vec3(0.80, 0.15, 0.18);
+    return mix(vec3(0.95), end, sqrt(abs(fraction)));
 }
 
 ivec2 kept(ivec2 pixel, ivec2 size, int shift, int known) {
@@ -90,10 +90,10 @@ void main() {
 #if RIGHT == 2
         encoded = vec4(difference(depths, trust, other, other_trust), 1.0);
 #else
-        encoded = vec4(shown(there, light_b, other, other_trust), 1.0);
+        encoded = vec4(view_color(there, light_b, other, other_trust), 1.0);
 #endif
         return;
     }
 #endif
-    encoded = vec4(shown(here, light_a, depths, trust), 1.0);
+    encoded = vec4(view_color(here, light_a, depths, trust), 1.0);
 }

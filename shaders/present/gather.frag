@@ -1,4 +1,4 @@
-// A sample of a larger picture, put where it is kept: radiance to be summed, and what the pixel centers tell.
+// A sample of a larger picture, put where it is kept: radiance to be summed, and data of the pixel centers.
 // Row 0 is the top row.
 
 uniform sampler2D radiance;

@@ -1,4 +1,4 @@
-// A triangle that covers a part of a window, with places in the picture that is shown there. Interpolated, they let a
+// A triangle that covers a part of a window, with places in the displayed picture. Interpolated, they let a
 // software rasterizer read texels in rows: it takes two thirds of the time that places by pixel take.
 
 out vec2 place;

@@ -15,18 +15,18 @@ uniform sampler2D seen_map;
 #define seen_map light_map
 #endif
 
-// The environment as it is seen. at: position in the picture, right and down, in its heights; ray: unit vector.
-vec3 seen_environment(vec2 at, vec3 ray) {
+// Radiance of the environment as the background. at: position in the picture, right and down, in its heights; ray: unit vector.
+vec3 background_radiance(vec2 at, vec3 ray) {
 #if SEEN_MAP
     return seen_scale * textureLod(seen_map, equirectangular_uv(ray, seen_turn), 0.0).rgb;
 #else
-    float share = 0.0;
+    float fraction = 0.0;
     if (seen_kind == ENVIRONMENT_GRADIENT) {
-        share = gradient_share(ray);
+        fraction = gradient_share(ray);
     } else if (seen_kind == ENVIRONMENT_CHECKERBOARD) {
-        share = checkerboard_share(at, seen_tiles);
+        fraction = checkerboard_share(at, seen_tiles);
     }
-    return seen_scale * mix(seen_first.rgb, seen_second.rgb, share);
+    return seen_scale * mix(seen_first.rgb, seen_second.rgb, fraction);
 #endif
 }
 
@@ -35,12 +35,12 @@ vec2 in_heights(vec2 pixel) {
     return (pixel + beyond.xy) / (frame_size.y + beyond.w);
 }
 
-// What a straight ray meets.
+// Radiance along a straight ray behind the media.
 vec3 background(vec2 pixel, vec3 ray, ivec2 texel) {
 #if OPAQUE
     if (texelFetch(opaque_axial_depth, texel, 0).r < NOTHING) {
         return texelFetch(opaque_radiance, texel, 0).rgb;
     }
 #endif
-    return seen_environment(in_heights(pixel), normalize(ray));
+    return background_radiance(in_heights(pixel), normalize(ray));
 }

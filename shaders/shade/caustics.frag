@@ -8,7 +8,7 @@
 
 uniform sampler2D photon_spread;
 uniform sampler2D receiver_base;
-uniform float share;  // that each photon counts for, of the mean of several rounds
+uniform float photon_weight;  // in the mean of several rounds
 
 layout(location = 0) out vec4 radiance;
 
@@ -29,5 +29,5 @@ void main() {
             if ((x == 0 && y == 0) || same_surface(own, receiver_at(there))) { irradiance += found.rgb * spread.y; }
         }
     }
-    radiance = vec4(min(share * irradiance * texelFetch(receiver_base, here, 0).rgb / PI, vec3(NOTHING)), 0.0);
+    radiance = vec4(min(photon_weight * irradiance * texelFetch(receiver_base, here, 0).rgb / PI, vec3(NOTHING)), 0.0);
 }

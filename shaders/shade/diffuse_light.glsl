@@ -12,8 +12,8 @@ vec3 environment_irradiance(vec3 normal) {
     return light_scale * textureLod(light_irradiance, equirectangular_uv(normal, light_turn), 0.0).rgb;
 #else
     // A backdrop fixed to the picture lights like the mean of its squares.
-    float share = light_kind == ENVIRONMENT_GRADIENT ? gradient_irradiance_share(normal) : 0.5;
-    return light_scale * PI * mix(light_first.rgb, light_second.rgb, share);
+    float fraction = light_kind == ENVIRONMENT_GRADIENT ? gradient_irradiance_share(normal) : 0.5;
+    return light_scale * PI * mix(light_first.rgb, light_second.rgb, fraction);
 #endif
 }
 

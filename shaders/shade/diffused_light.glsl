@@ -6,7 +6,7 @@
 uniform sampler3D diffused_light;    // grids of all bodies: below, the fluence at the surface; above, what enters there
 
 // Basic radiance L / n^2 inside an object, below a point of its surface and towards it; cosine: of the direction there;
-// optical_depth: of the way back through the object, on which it has been scattered.
+// optical_depth: of the path back through the object, on which it has been scattered.
 vec3 subsurface_exitance(int object, vec3 point, float cosine, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
     if (row.diffuses < 0.5) { return vec3(0.0); }
@@ -17,19 +17,19 @@ vec3 subsurface_exitance(int object, vec3 point, float cosine, vec3 optical_dept
     vec3 entering = textureLod(diffused_light, at + vec3(0.0, 0.0, row.grid_size.z / texels.z), 0.0).rgb;
     // Light that has entered just now can darken the rest no more than to a fifth: where the two do not fit together, as
     // beside the edge of a shadow.
-    vec4 shares = row.emergent_fluxes;
-    float steady = shares.x + row.conductance * shares.y;
-    entering = min(entering, 0.8 * steady / shares.w * fluence);
+    vec4 fluxes = row.emergent_fluxes;
+    float steady = fluxes.x + row.conductance * fluxes.y;
+    entering = min(entering, 0.8 * steady / fluxes.w * fluence);
     vec3 emergent = emergent_radiance(fluence, entering, row.albedo, row.conductance, row.mean_cosine, cosine);
     // Scaled so that the flux that leaves is that of the diffusion.
-    vec3 flux = row.albedo * (fluence * steady - entering * shares.w) + entering * shares.z;
+    vec3 flux = row.albedo * (fluence * steady - entering * fluxes.w) + entering * fluxes.z;
     vec3 scale = row.exit_share * fluence / max(flux, vec3(1e-30));
     return max(emergent * scale, vec3(0.0)) * opacity((1.0 - row.ahead) * optical_depth) / (4.0 * PI * row.ior * row.ior);
 }
 
 // Radiance that comes along a ray, in a direction inside, by light that is scattered ahead in an object, and which diffusion
 // takes for unscattered: of the optical depth on the ray the part by such events does not count. From the environment
-// behind, blurred, and as much as is mirrored on its way out from the other side.
+// behind, blurred, and as much as is mirrored where it leaves on the other side.
 vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
     vec3 in_scattered = transmittance((1.0 - row.ahead) * optical_depth) - transmittance(optical_depth);

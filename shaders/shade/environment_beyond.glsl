@@ -4,7 +4,7 @@
 #include "shade/in_picture.glsl"
 
 // The squares of a checkerboard, averaged over a box of this width in squares.
-float blurred_checkerboard_share(vec2 at, float tiles, float width) {
+float blurred_checkerboard_fraction(vec2 at, float tiles, float width) {
     vec2 cell = at * tiles;
     vec2 to_edge = 0.5 - abs(fract(cell) - 0.5);
     vec2 side = 1.0 - 2.0 * mod(floor(cell), 2.0);
@@ -17,15 +17,15 @@ vec3 environment_beyond(vec3 point, vec3 direction, float roughness) {
 #if SEEN_LIGHTS
     return environment_light(direction, roughness);
 #else
-    if (seen_kind != ENVIRONMENT_CHECKERBOARD) { return seen_environment(vec2(0.0), direction); }
+    if (seen_kind != ENVIRONMENT_CHECKERBOARD) { return background_radiance(vec2(0.0), direction); }
     float towards = metres_ahead_of(direction);
     if (towards < 1e-2) { return seen_scale * mix(seen_first.rgb, seen_second.rgb, 0.5); }
     float path = max(surface_ahead.w - metres_ahead_of(point), 0.0) / towards;
-    vec3 wall = seen_at(point + path * direction);
+    vec3 wall = picture_position(point + path * direction);
     float whole = (frame_size.y + beyond.w) / frame_size.y;
     float heights = roughness * roughness * path / (whole * length(surface_up.xyz) * (surface_right.w == 1.0 ? surface_ahead.w + surface_ahead.z : 1.0));
-    float share = blurred_checkerboard_share(in_heights(wall.xy), seen_tiles, heights * seen_tiles);
-    return seen_scale * mix(seen_first.rgb, seen_second.rgb, share);
+    float fraction = blurred_checkerboard_fraction(in_heights(wall.xy), seen_tiles, heights * seen_tiles);
+    return seen_scale * mix(seen_first.rgb, seen_second.rgb, fraction);
 #endif
 }
 
@@ -42,7 +42,7 @@ vec4 blurred_opaque(vec2 pixel, float width) {
         + textureLod(opaque_radiance, at + vec2(-aside.x, aside.y), level));
 }
 
-// Width in pixels of the blur of what a ray meets at a point, some metres behind a mirror with microfacets of this alpha.
+// Width in pixels of the blur of what a ray hits at a point, some metres behind a mirror with microfacets of this alpha.
 float blur_width(float alpha, float path, vec3 point) {
     float spread = surface_right.w == 1.0 ? metres_ahead_of(point) + surface_ahead.z : 1.0;
     float pixel = 2.0 * length(surface_up.xyz) * spread / frame_size.y;

@@ -1,4 +1,4 @@
-// Where a ray first meets a body: layers beyond it are seen through media.
+// Where a ray first hits a body: layers beyond it are behind media.
 
 #include <constants>
 #include <Body>

@@ -24,7 +24,7 @@ vec3 point_at(vec2 pixel, float axial_depth) {
 
 // Where a point is in the picture: pixels right and down from the top left corner, and axial depth. Behind the eye: outside
 // of it, and nearer than all.
-vec3 seen_at(vec3 point) {
+vec3 picture_position(vec3 point) {
     float ahead = metres_ahead_of(point);
     bool perspective = surface_right.w == 1.0;
     float spread = perspective ? ahead + surface_ahead.z : 1.0;

@@ -37,7 +37,7 @@ uniform float hole_below;
 layout(location = 0) out vec4 out_normal;  // unit; w: axial depth
 layout(location = 1) out vec4 out_surface;  // object, roughness, transmission, variance of normals
 #if !BACK
-layout(location = 2) out vec4 out_color;  // w: share of the light of the environment that reaches it
+layout(location = 2) out vec4 out_color;  // w: fraction of the light of the environment that reaches it
 #endif
 
 void main() {
@@ -67,7 +67,7 @@ void main() {
     gl_FragDepth = clamp(axial_depth, 0.0, 1.0);
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
     vec3 ray = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
-    // Interpolated normals may look away from the eye where the faces do not: then the interface is seen edge-on.
+    // Interpolated normals may look away from the eye where the faces do not: then the interface is viewed edge-on.
     normal = (gl_FrontFacing ? normal : -normal);
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;

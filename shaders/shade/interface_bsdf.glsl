@@ -22,7 +22,7 @@ vec3 film_over(vec3 film, float bare, float cosine, float ior, float ior_before)
 #endif
 }
 
-// Fraction of the light that a clear coat reflects. clearcoat: share of the interface that has it, and its roughness.
+// Fraction of the light that a clear coat reflects. clearcoat: fraction of the interface that has it, and its roughness.
 float coat_reflectance(vec2 clearcoat, float cosine) {
 #if CLEAR_COAT
     return clearcoat.x * interface_reflectance(cosine, CLEARCOAT_IOR, clearcoat.y);
@@ -31,7 +31,7 @@ float coat_reflectance(vec2 clearcoat, float cosine) {
 #endif
 }
 
-// Fraction of the light that a polished clear coat reflects. clearcoat: share of the interface that has it.
+// Fraction of the light that a polished clear coat reflects. clearcoat: fraction of the interface that has it.
 float polished_coat_reflectance(float clearcoat, float cosine) {
 #if CLEAR_COAT
     return clearcoat * fresnel_dielectric(cosine, CLEARCOAT_IOR);

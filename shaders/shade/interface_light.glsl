@@ -25,8 +25,8 @@ struct Surface {
     float transmission;
     vec3 color;
     float unoccluded;     // fraction of the light of the environment that reaches it
-    vec3 film;            // share of the interface that has it, its ior, and metres
-    vec2 clearcoat;       // share of the interface that has it, and its roughness
+    vec3 film;            // fraction of the interface that has it, its ior, and metres
+    vec2 clearcoat;       // fraction of the interface that has it, and its roughness
 };
 
 // parameters: object, roughness, transmission.
@@ -44,7 +44,7 @@ vec3 reflected_by_facets(Surface surface, float cosine) {
     return vec3(surface.thin_walled ? 2.0 * bare : bare) + (filmed - bare);
 }
 
-// An interface that turns microfacets by small angles turns reflections by twice these, and refracted light by (ior - 1)
+// An interface that tilts microfacets by small angles deflects reflections by twice these, and refracted light by (ior - 1)
 // times them at each of two interfaces.
 float refraction_roughness(float roughness, float ior) {
     return roughness * sqrt(min(abs(ior - 1.0) * 0.70710678, 1.0));
@@ -68,9 +68,9 @@ vec3 highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float alpha)
         float cos_light = dot(normal, arriving.towards);
         if (cos_light <= 0.0) { continue; }
         vec4 from = highlight_from(arriving.towards, arriving.disc, reflected_direction(ray, normal), alpha, cos_view);
-        vec3 half_way = normalize(from.xyz - ray);
-        vec3 reflected = reflected_by_facets(surface, max(dot(half_way, from.xyz), 0.0))
-            * microfacet_value(dot(half_way, normal), cos_light, cos_view, alpha);
+        vec3 half_vector = normalize(from.xyz - ray);
+        vec3 reflected = reflected_by_facets(surface, max(dot(half_vector, from.xyz), 0.0))
+            * microfacet_value(dot(half_vector, normal), cos_light, cos_view, alpha);
         reflected *= cos_light * from.w;
         if (max(reflected.r, max(reflected.g, reflected.b)) > FAINTEST_HIGHLIGHT) { sum += reflected * irradiance_reaching(light, arriving, point, normal); }
     }
@@ -112,7 +112,7 @@ TwoSides irradiance_on(vec3 point, vec3 normal, float unoccluded) {
 }
 
 // Radiance of diffuse light out of the body: as a layer reflects it, and lets it through from behind. What passes without an
-// event is seen as it is, and left out here.
+// event is visible as it is, and left out here.
 vec3 layer_exitance(Surface surface, vec3 point, vec3 normal, float thickness, vec3 passed) {
     vec3 absorbed = surface.stream_absorption * thickness;
     vec3 turned = surface.stream_scattering * thickness;
@@ -122,9 +122,9 @@ vec3 layer_exitance(Surface surface, vec3 point, vec3 normal, float thickness, v
     vec3 all_through = mirrored_transmittance(bare_back, bare_through, mirror);
     vec3 all_back = mirrored_reflectance(bare_back, bare_through, mirror);
     // Of what enters behind or is mirrored there, the rays see what passes without an event.
-    vec3 seen = min(passed, bare_through);
-    vec3 through = max(all_through - seen * (1.0 - mirror + mirror * all_back), vec3(0.0));
-    vec3 back = max(all_back - seen * mirror * all_through, vec3(0.0));
+    vec3 unscattered = min(passed, bare_through);
+    vec3 through = max(all_through - unscattered * (1.0 - mirror + mirror * all_back), vec3(0.0));
+    vec3 back = max(all_back - unscattered * mirror * all_through, vec3(0.0));
     vec3 sum = environment_irradiance(normal) * back + environment_irradiance(-normal) * through;
 #if SINGLE_SCATTERING
     // Light of lights that is scattered once is in the emitted radiance.

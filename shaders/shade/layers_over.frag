@@ -1,5 +1,5 @@
-// Layers over the picture of all else, by blending: RADIANCE: their light, and as alpha the share of the picture that
-// they leave; SHARE: that share; DEPTH: minus its logarithm; SUM: what there is now, to be averaged over samples.
+// Layers over the picture of all else, by blending: RADIANCE: their light, and as alpha the fraction of the picture that
+// they leave; SHARE: that fraction; DEPTH: minus its logarithm; SUM: what there is now, to be averaged over samples.
 // Row 0 of the output is the top row.
 
 #include <constants>
@@ -14,7 +14,7 @@ uniform sampler2D straight_transmittance;
 #endif
 #if SUM
 uniform sampler2D shaded_radiance;
-uniform sampler2D shaded_transmittance;  // alpha: share of the light that can be trusted
+uniform sampler2D shaded_transmittance;  // alpha: fraction of the light that can be trusted
 #endif
 
 layout(location = 0) out vec4 first;

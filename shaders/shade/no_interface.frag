@@ -1,4 +1,4 @@
-// Where a ray meets no interface: what is behind, through the media there. Row 0 of the output is the top row.
+// Where a ray hits no interface: what is behind, through the media there. Row 0 of the output is the top row.
 // REST: beyond the part of the picture that media may cover. In that part, depth lets shade/surfaces.frag pass where there
 // is an interface, and nothing is added to a sum there; APART: but for transmittance.
 
@@ -25,7 +25,7 @@ void main() {
     vec2 pixel = gl_FragCoord.xy + frame_size.zw;
     ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
     vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
-    // The same operations as before a ray is refracted: the picture must not tell the two shaders apart.
+    // The same operations as before a ray is refracted: the two shaders must give one picture.
     vec3 behind = background(pixel, ray / length(ray), texel);
 #if REST
     out_radiance = vec4(behind, 1.0);

@@ -64,7 +64,7 @@ void main() {
     vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
 #if SURFACE
     ray = normalize(ray);
-    // Interpolated normals may look away from the eye where the faces do not: then the surface is seen edge-on.
+    // Interpolated normals may look away from the eye where the faces do not: then the surface is viewed edge-on.
     vec3 normal = gl_FrontFacing ? surface.normal : -surface.normal;
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;

@@ -23,11 +23,11 @@ struct OpaqueSurface {
     float opacity;      // of texture and vertices
     float unoccluded;   // fraction of the light of the environment that reaches it
     bool is_hole;
-    vec3 film;          // share of the surface that has it, its ior, and metres
-    vec2 clearcoat;     // share of the surface that has it, and its roughness
+    vec3 film;          // fraction of the surface that has it, its ior, and metres
+    vec2 clearcoat;     // fraction of the surface that has it, and its roughness
 };
 
-// Its bsdf, as it is seen from a direction.
+// Its bsdf for a direction to the eye.
 struct OpaqueBsdf {
     Layer dielectric;
     Layer metal;
@@ -38,7 +38,7 @@ struct OpaqueBsdf {
     vec3 passed;         // fraction of light on the other side
     float alpha;         // of the microfacets in which lights are mirrored,
     float coat_alpha;    // and of those of the clear coat
-    float coat_share;
+    float coat_weight;
 };
 
 vec3 filmed_layer(OpaqueSurface surface, vec3 facing, float cos_view) {
@@ -67,12 +67,12 @@ OpaqueBsdf opaque_bsdf(OpaqueSurface surface, float cos_view) {
     bsdf.alpha = highlight_alpha(surface.roughness, surface.variance);
 #if CLEAR_COAT
     bsdf.coat = clearcoat_layer(surface.clearcoat, cos_view);
-    bsdf.coat_share = surface.clearcoat.x;
+    bsdf.coat_weight = surface.clearcoat.x;
     bsdf.coated = surface.clearcoat.x * bsdf.coat.albedo.r;
     bsdf.coat_alpha = highlight_alpha(surface.clearcoat.y, surface.variance);
 #else
     bsdf.coat = bsdf.dielectric;
-    bsdf.coat_share = bsdf.coated = bsdf.coat_alpha = 0.0;
+    bsdf.coat_weight = bsdf.coated = bsdf.coat_alpha = 0.0;
 #endif
     return bsdf;
 }
@@ -80,9 +80,9 @@ OpaqueBsdf opaque_bsdf(OpaqueSurface surface, float cos_view) {
 // Evaluate its microfacets without Fresnel's reflectance. away: (1 - cos)^5 of the angle to facets that mirror the light.
 float facets_value(LightSample arriving, vec3 normal, vec3 to_eye, float cos_view, float cos_light, float alpha, out float away) {
     vec4 from = highlight_from(arriving.towards, arriving.disc, reflected_direction(-to_eye, normal), alpha, cos_view);
-    vec3 half_way = normalize(from.xyz + to_eye);
-    away = pow(1.0 - clamp(dot(half_way, from.xyz), 0.0, 1.0), 5.0);
-    return microfacet_value(dot(half_way, normal), cos_light, cos_view, alpha) * from.w;
+    vec3 half_vector = normalize(from.xyz + to_eye);
+    away = pow(1.0 - clamp(dot(half_vector, from.xyz), 0.0, 1.0), 5.0);
+    return microfacet_value(dot(half_vector, normal), cos_light, cos_view, alpha) * from.w;
 }
 
 // Evaluate it for light from the front. to_eye: unit vector to the eye.
@@ -93,7 +93,7 @@ vec3 opaque_value(OpaqueBsdf bsdf, vec3 normal, vec3 to_eye, LightSample arrivin
     vec3 value = reflected * facets + bsdf.base / PI;
 #if CLEAR_COAT
     facets = facets_value(arriving, normal, to_eye, cos_view, cos_light, bsdf.coat_alpha, away);
-    value = (1.0 - bsdf.coated) * value + bsdf.coat_share * layer_reflectance(bsdf.coat, away) * facets;
+    value = (1.0 - bsdf.coated) * value + bsdf.coat_weight * layer_reflectance(bsdf.coat, away) * facets;
 #endif
     return value;
 }

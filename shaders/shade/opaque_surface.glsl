@@ -3,16 +3,16 @@
 #include "shade/surface_textures.glsl"
 
 uniform vec4 opaque_parameters;     // metallic, roughness, ior, alpha below which there is a hole
-uniform vec4 opaque_passed;         // fraction of the light on the base that passes to the other side; w: seen from both
+uniform vec4 opaque_passed;         // fraction of the light on the base that passes to the other side; w: visible from both
 uniform float opaque_passed_share;  // the same without its color: what the base does not reflect
 uniform vec3 opaque_emissive;
 #if THIN_FILM
-uniform vec3 opaque_film;           // share of the surface that has it, its ior, and metres
+uniform vec3 opaque_film;           // fraction of the surface that has it, its ior, and metres
 #else
 const vec3 opaque_film = vec3(0.0, 1.0, 0.0);
 #endif
 #if CLEAR_COAT
-uniform vec2 opaque_clearcoat;      // share of the surface that has it, and its roughness
+uniform vec2 opaque_clearcoat;      // fraction of the surface that has it, and its roughness
 #else
 const vec2 opaque_clearcoat = vec2(0.0);
 #endif

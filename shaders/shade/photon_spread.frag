@@ -9,7 +9,7 @@
 
 uniform float enough;  // photons
 
-layout(location = 0) out vec2 spread;  // pixels to each side; share of its light that each pixel of the square gets
+layout(location = 0) out vec2 spread;  // pixels to each side; fraction of its light that each pixel of the square gets
 
 void main() {
     ivec2 here = ivec2(gl_FragCoord.xy);

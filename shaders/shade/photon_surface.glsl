@@ -5,7 +5,7 @@ uniform sampler2D opaque_axial_depth;
 uniform sampler2D receiver_normal;
 
 const int WIDEST_SPREAD = 3;        // pixels to each side
-const float STEEPEST_SURFACE = 0.1; // sine of the angle between a surface and the way to its neighbors
+const float STEEPEST_SURFACE = 0.1; // sine of the angle between a surface and the direction to its neighbors
 
 struct Receiver {
     vec3 point;
@@ -23,10 +23,10 @@ bool is_in_picture(ivec2 texel) {
     return all(greaterThanEqual(texel, ivec2(0))) && all(lessThan(vec2(texel), frame_size.xy));
 }
 
-// Whether two pixels show one surface; the same either way.
+// Whether two pixels show one surface; the same in either order.
 bool same_surface(Receiver one, Receiver other) {
-    vec3 way = other.point - one.point;
-    float off = max(abs(dot(way, one.normal)), abs(dot(way, other.normal)));
+    vec3 offset = other.point - one.point;
+    float off = max(abs(dot(offset, one.normal)), abs(dot(offset, other.normal)));
     return one.there && other.there && dot(one.normal, other.normal) > 0.9
-        && off <= STEEPEST_SURFACE * length(way) + SURFACE_OFFSET * surface_reach;
+        && off <= STEEPEST_SURFACE * length(offset) + SURFACE_OFFSET * surface_reach;
 }

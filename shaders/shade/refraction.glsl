@@ -27,12 +27,12 @@ float end_of_interval(ivec2 texel) {
 }
 
 bool is_inside(vec3 point) {
-    vec3 seen = seen_at(point);
-    if (!in_picture(seen.xy)) { return false; }
-    ivec2 texel = stored(texel_of(seen.xy));
+    vec3 projected = picture_position(point);
+    if (!in_picture(projected.xy)) { return false; }
+    ivec2 texel = stored(texel_of(projected.xy));
     float first = texelFetch(entered, texel, 0).w;
     float last = end_of_interval(texel);
-    return last < NOTHING && seen.z <= last && (first > last || seen.z >= first);
+    return last < NOTHING && projected.z <= last && (first > last || projected.z >= first);
 }
 
 struct Exit {
@@ -42,8 +42,8 @@ struct Exit {
     vec3 stop;     // whose radiance is this
 };
 
-// Where a ray inside the body leaves it: the first of equal steps outside, halved down, then where the ray meets the
-// plane of the interface seen there.
+// Where a ray inside the body leaves it: the first of equal steps outside, halved down, then where the ray hits the
+// plane of the visible interface there.
 Exit find_exit(vec3 origin, vec3 direction, float longest, vec3 fallback_normal) {
     float inside = 0.0;
     float outside = longest;
@@ -60,18 +60,18 @@ Exit find_exit(vec3 origin, vec3 direction, float longest, vec3 fallback_normal)
         float middle = 0.5 * (inside + outside);
         if (is_inside(origin + middle * direction)) { inside = middle; } else { outside = middle; }
     }
-    vec3 seen = seen_at(origin + inside * direction);
-    ivec2 texel = texel_of(seen.xy);
+    vec3 projected = picture_position(origin + inside * direction);
+    ivec2 texel = texel_of(projected.xy);
     vec4 exit = texelFetch(left, stored(texel), 0);
     Exit result = Exit(0.5 * (inside + outside), fallback_normal, false, vec3(0.0));
 #if OPAQUE
-    result.stopped = in_picture(seen.xy) && end_of_interval(stored(texel)) < exit.w;
+    result.stopped = in_picture(projected.xy) && end_of_interval(stored(texel)) < exit.w;
     if (result.stopped) {
         result.stop = texelFetch(opaque_radiance, stored(texel), 0).rgb;
         return result;
     }
 #endif
-    if (!in_picture(seen.xy) || exit.w >= NOTHING) { return result; }
+    if (!in_picture(projected.xy) || exit.w >= NOTHING) { return result; }
     result.normal = dot(exit.xyz, direction) > 0.0 ? -exit.xyz : exit.xyz;
     vec3 on_interface = point_at(vec2(texel) + 0.5 + frame_size.zw, exit.w);
     float path = dot(on_interface - origin, exit.xyz) / min(dot(direction, result.normal), -1e-3)
@@ -82,32 +82,32 @@ Exit find_exit(vec3 origin, vec3 direction, float longest, vec3 fallback_normal)
 #endif
 
 #if OPAQUE
-bool is_behind_opaque(vec3 seen) {
-    float axial_depth = texelFetch(opaque_axial_depth, stored(texel_of(seen.xy)), 0).r;
-    return axial_depth < NOTHING && seen.z >= axial_depth;
+bool is_behind_opaque(vec3 projected) {
+    float axial_depth = texelFetch(opaque_axial_depth, stored(texel_of(projected.xy)), 0).r;
+    return axial_depth < NOTHING && projected.z >= axial_depth;
 }
 #endif
 
-// What a ray that has left a body meets: opaque surfaces as far as the picture shows them, else the environment.
+// Radiance along a ray that has left a body: opaque surfaces as far as the picture shows them, else the environment.
 // roughness: that of a mirror with the same blur.
 vec3 radiance_beyond(vec3 point, vec3 direction, float roughness) {
 #if OPAQUE
     float before = 0.0;
     for (int i = 1; i <= OPAQUE_STEPS; ++i) {
-        float share = float(i) / float(OPAQUE_STEPS);
-        float path = surface_reach * share * share;
-        vec3 seen = seen_at(point + path * direction);
-        if (!in_picture(seen.xy)) { break; }
-        float opaque = texelFetch(opaque_axial_depth, stored(texel_of(seen.xy)), 0).r;
-        if (opaque < NOTHING && seen.z >= opaque && (seen.z - opaque) * surface_ahead.y <= 2.0 * (path - before)) {
-            for (int half_way = 0; half_way < OPAQUE_HALVINGS; ++half_way) {
+        float fraction = float(i) / float(OPAQUE_STEPS);
+        float path = surface_reach * fraction * fraction;
+        vec3 projected = picture_position(point + path * direction);
+        if (!in_picture(projected.xy)) { break; }
+        float opaque = texelFetch(opaque_axial_depth, stored(texel_of(projected.xy)), 0).r;
+        if (opaque < NOTHING && projected.z >= opaque && (projected.z - opaque) * surface_ahead.y <= 2.0 * (path - before)) {
+            for (int halving = 0; halving < OPAQUE_HALVINGS; ++halving) {
                 float middle = 0.5 * (before + path);
-                if (is_behind_opaque(seen_at(point + middle * direction))) { path = middle; } else { before = middle; }
+                if (is_behind_opaque(picture_position(point + middle * direction))) { path = middle; } else { before = middle; }
             }
-            seen = seen_at(point + path * direction);
-            if (roughness == 0.0) { return texelFetch(opaque_radiance, stored(texel_of(seen.xy)), 0).rgb; }
+            projected = picture_position(point + path * direction);
+            if (roughness == 0.0) { return texelFetch(opaque_radiance, stored(texel_of(projected.xy)), 0).rgb; }
             // Half of the light is within twice the angle of a microfacet, whose tangent is the roughness squared.
-            vec4 blurred = blurred_opaque(seen.xy, blur_width(roughness * roughness, path, point + path * direction));
+            vec4 blurred = blurred_opaque(projected.xy, blur_width(roughness * roughness, path, point + path * direction));
             return blurred.rgb + (1.0 - blurred.a) * environment_beyond(point, direction, roughness);
         }
         before = path;

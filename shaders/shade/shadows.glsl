@@ -1,4 +1,4 @@
-// Light that reaches a point of an opaque surface through everything on the straight way, or an interface past what is opaque: a
+// Light that reaches a point of an opaque surface through everything on the straight path, or an interface past what is opaque: a
 // lookup in maps of paths to the first opaque surface on each ray of a light. Transmittance is interpolated between four texels, and a texel counts only if the surface, made
 // flat, is not behind what is opaque there (receiver plane, Isidoro 2006): so no surface shadows itself, however it is inclined.
 // Needs <constants>. Points count from the center of the media; normals are unit vectors.
@@ -20,7 +20,7 @@ struct ShadowView {
     vec2 corner;
     float size;
     bool perspective;
-    bool ends;  // opaque objects are in the way of some rays
+    bool ends;  // opaque objects block some rays
 };
 
 ShadowView shadow_view(int number) {
@@ -57,14 +57,14 @@ vec3 texel_transmittance(ivec2 at, float end, float advance) {
     return exp(-clamp(optical_depth * advance, 0.0, MAX_OPTICAL_DEPTH));
 }
 
-// Transmittance of the way to a point; 1 beyond the map, where nothing is that throws a shadow. If not dimmed, the share that
+// Transmittance of the path to a point; 1 beyond the map, where nothing is that throws a shadow. If not dimmed, the fraction that
 // nothing opaque blocks. aside: metres by which the light is beside where the map looks from, along its right and up, for what
 // throws shadows so many metres from it.
 vec3 light_through(ShadowView view, vec3 point, vec3 normal, bool dimmed, vec2 aside, float away) {
     vec4 here = vec4(point, 1.0);
-    vec3 seen = vec3(dot(view.right, here), dot(view.up, here), dot(view.ahead, here));
-    float spread = view.perspective ? seen.z : 1.0;
-    vec2 place = seen.xy / spread;
+    vec3 projected = vec3(dot(view.right, here), dot(view.up, here), dot(view.ahead, here));
+    float spread = view.perspective ? projected.z : 1.0;
+    vec2 place = projected.xy / spread;
     vec2 spans = inversesqrt(vec2(dot(view.right.xyz, view.right.xyz), dot(view.up.xyz, view.up.xyz)));
     vec2 shift = aside == vec2(0.0) ? aside : aside / spans * max(1.0 / away - 1.0 / spread, 0.0);
     vec2 looked_up = place + shift;
@@ -77,7 +77,7 @@ vec3 light_through(ShadowView view, vec3 point, vec3 normal, bool dimmed, vec2 a
     float steepest = STEEPEST_SHADOW * (texel_metres + spread * spans.x * length(shift));
     vec2 position = (0.5 * looked_up + 0.5) * view.size - 0.5;
     vec2 corner = floor(position);
-    vec2 share = position - corner;
+    vec2 fraction = position - corner;
     vec3 sum = vec3(0.0);
     for (int i = 0; i < 4; ++i) {
         vec2 step = vec2(i & 1, i >> 1);
@@ -88,14 +88,14 @@ vec3 light_through(ShadowView view, vec3 point, vec3 normal, bool dimmed, vec2 a
         ivec2 at = ivec2(view.corner + texel);
         float end = view.ends ? texelFetch(shadow_ends, at, 0).r : 0.0;
         if (view.ends && ahead + clamp(rise, -steepest, steepest) > end + SHADOW_MARGIN * texel_metres) { continue; }
-        vec2 weights = mix(1.0 - share, share, step);
+        vec2 weights = mix(1.0 - fraction, fraction, step);
         vec3 passed = dimmed ? texel_transmittance(at, end, view.perspective ? length(vec3(there * spans, 1.0)) : 1.0) : vec3(1.0);
         sum += weights.x * weights.y * passed;
     }
     return sum;
 }
 
-// The map of a light that has any in which a point is seen.
+// The map of a light that covers a point, for lights with maps.
 ShadowView light_view(int light, vec3 point) {
     int first = int(shadow_lights[light].x);
     if (int(shadow_lights[light].y) == 1) { return shadow_view(first); }

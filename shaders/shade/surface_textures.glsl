@@ -48,7 +48,7 @@ vec3 mapped_normal(vec3 normal, vec3 position, vec2 uv) {
     vec3 bitangent = across_y * uv_x.y + across_x * uv_y.y;
     float longest = max(dot(tangent, tangent), dot(bitangent, bitangent));
     if (!(longest > 0.0)) { return normal; }  // no texture coordinates to speak of
-    // Where the normal looks away from the eye, the two directions on the picture turn around it the other way.
+    // Where the normal looks away from the eye, the two directions on the picture turn around it in the other sense.
     float scale = inversesqrt(longest) * (dot(cross(along_x, along_y), normal) < 0.0 ? -1.0 : 1.0);
     return normalize(tangent * scale * mapped.x + bitangent * scale * mapped.y + normal * max(mapped.z, 1e-3));
 }

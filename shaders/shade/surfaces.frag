@@ -1,7 +1,7 @@
 // Light at the interfaces of bodies: what they reflect and refract, and the radiance of their diffuse base and of light that
 // scatters many times. What the media absorb and emit on straight rays has been found; the first interval of a refracted ray is as long
 // as it is bent. Row 0 of the output is the top row. ONE_INTERFACE: rays bend where they enter, and leave without bending.
-// Drawn where there is an interface: shade/no_interface.frag shades the rest, and leaves the depth that tells the two apart.
+// Drawn where there is an interface: shade/no_interface.frag shades the rest, and leaves the depth that separates the two.
 
 #include <constants>
 #include <View>
@@ -17,7 +17,7 @@
 #include "shade/diffused_light.glsl"
 #include "shade/refraction.glsl"
 
-// Without hierarchies nobody knows what bodies keep of lights on their way.
+// Without hierarchies nobody knows what bodies keep of lights on their path.
 vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m) { return vec3(1.0); }
 
 uniform sampler2D emitted_radiance_sum;
@@ -47,8 +47,8 @@ struct Straight {
 };
 
 #if ONE_INTERFACE
-// Light that bends where it enters and nowhere else. How far on the body ends changes nothing of its way, and what is
-// absorbed is what the straight ray's path absorbs. A microfacet turns it by (1 - 1 / ior) times its angle, a reflection
+// Light that bends where it enters and nowhere else. How far on the body ends changes nothing of its path, and what is
+// absorbed is what the straight ray's path absorbs. A microfacet deflects it by (1 - 1 / ior) times its angle, a reflection
 // by twice that angle.
 Crossing refracted(Surface surface, vec3 point, vec3 normal, vec3 ray, float ior, bool enters, Straight straight) {
     vec3 passed = transmittance(straight.optical_depth);
@@ -73,8 +73,8 @@ Crossing refracted(Surface surface, vec3 point, vec3 normal, vec3 ray, float ior
     float cosine = clamp(-dot(leaving.normal, inside), 0.0, 1.0);
     vec3 kept = film_over(surface.film, fresnel_dielectric(cosine, 1.0 / ior), cosine, 1.0 / ior, ior);
     float blur = refraction_roughness(surface.roughness, ior);
-    // What the far interface keeps inside leaves after at least one more crossing, taken to be as long as this one: seen
-    // where it is reflected to. Light that scatters on the way leaves all the same as from a layer.
+    // What the far interface keeps inside leaves after at least one more crossing, taken to be as long as this one: visible
+    // where it is reflected to. Light that scatters inside leaves all the same as from a layer.
     vec3 again = surface.scatters_much ? vec3(1.0) : passed;
     result.light = kept * again * environment_light(reflected_direction(inside, leaving.normal), blur);
     vec3 outside = refracted_direction(inside, leaving.normal, 1.0 / ior);
@@ -170,7 +170,7 @@ void main() {
     vec3 light = vec3(0.0);
     if (surface.transmission > 0.0) {
 #if ONE_INTERFACE
-        const float first_interval = 0.0; // nothing asks how long it is
+        const float first_interval = 0.0; // nothing reads its length
 #else
         float first_interval = back.w < NOTHING ? (end_of_interval(texel) - axial_depth) * surface_ahead.y * advance : -1.0;
 #endif

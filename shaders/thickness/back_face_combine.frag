@@ -12,7 +12,7 @@ void main() {
     bool entered = faces.r > -NOTHING;
     bool left = faces.g > -NOTHING;
     if (entered && left) {
-        path_and_count = vec2(faces.g + faces.r, faces.a == 2.0 ? count_with_share(0.0, 2.0 * faces.b) : UNEXPECTED);
+        path_and_count = vec2(faces.g + faces.r, faces.a == 2.0 ? count_with_fraction(0.0, 2.0 * faces.b) : UNEXPECTED);
     } else if (left) {  // the eye is inside, and distances count from it
         path_and_count = vec2(faces.g, faces.a == 1.0 ? 1.0 : UNEXPECTED);
     } else {

@@ -11,7 +11,7 @@ bool is_balanced(float sum_of_counts) {
 
 // Metres that the rasterizer may have misplaced faces by, of a pixel whose ray advances so much per metre of axial depth.
 float misplaced_length(float sum_of_counts, float advance) {
-    return share_of_count(sum_of_counts) * count_share * advance;
+    return fraction_of_count(sum_of_counts) * count_share * advance;
 }
 
 // NaN fails every comparison, so this refuses it, too.

@@ -18,7 +18,7 @@ layout(location = 0) out vec2 path_and_count;
 
 void main() {
     float side = gl_FrontFacing ? -1.0 : 1.0;
-    float count = count_with_share(side * count_weight + count_offset, snapping(axial, snapping_share));
+    float count = count_with_fraction(side * count_weight + count_offset, snapping(axial, snapping_share));
     float reached = max(axial, axial_start);
 #if OPAQUE
     reached = min(reached, last_axial());

@@ -1,4 +1,4 @@
-// Signed depth of bodies without holes that share one medium, or with TWO_MEDIA one of two, for maps of shadows. See
+// Signed depth of bodies without holes and of one medium, or with TWO_MEDIA of two, for maps of shadows. See
 // signed_depth.frag.
 // PROJECTED_DEPTH: what is behind an opaque surface fails the depth test. What was counted then does not balance, and the
 // lookup ends it at the surface: the sum of min(reached, end) is the sum of reached where that is less, less the end for

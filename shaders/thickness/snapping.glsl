@@ -5,7 +5,7 @@
 
 #include <constants>
 
-// Metres or axial depth, whichever the argument counts; before any branch, since it asks the neighboring pixels.
+// Metres or axial depth, whichever the argument counts; before any branch, since it reads the neighboring pixels.
 float snapping(float along, float step_of_grid) {
     return fwidth(along) * step_of_grid;
 }
@@ -15,11 +15,11 @@ float root_or_more(float x) {
     return uintBitsToFloat((floatBitsToUint(x) >> 1u) + 0x1fc00000u);
 }
 
-// A count with a share of the scene's size in its fraction. Fractions add up to less than 1 where fewer than 64 faces of a
-// pixel are as steep as can be; square roots, since shares go from 1e-7 to 1. The root of a sum is less than the sum of
+// A count, with a fraction of the scene's size after its point. Fractions add up to less than 1 where fewer than 64 faces of a
+// pixel are as steep as can be; square roots, since the values go from 1e-7 to 1. The root of a sum is less than the sum of
 // the roots, so that what comes back is not too small.
-float count_with_share(float count, float share) {
-    return count + root_or_more(min(share, 1.0)) / 64.0;
+float count_with_fraction(float count, float fraction) {
+    return count + root_or_more(min(fraction, 1.0)) / 64.0;
 }
 
 // The count alone. A little is added, since sums of many counts round their fraction.
@@ -27,7 +27,7 @@ float whole_count(float count) {
     return floor(count + 1.0 / 256.0);
 }
 
-float share_of_count(float count) {
+float fraction_of_count(float count) {
     float root = max(count - whole_count(count), 0.0) * 64.0;
     return root * root;
 }

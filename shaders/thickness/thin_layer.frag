@@ -27,7 +27,7 @@ void main() {
 #endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture
 #if OPAQUE
-    // What lies on an opaque surface is seen, also where rounding puts it behind.
+    // What lies on an opaque surface is visible, also where rounding puts it behind.
     if (axial > last_axial() + sheet_tolerance) { discard; }
 #endif
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;

@@ -1,7 +1,7 @@
 // Radiance at the ends of rays: of the environment, or of an opaque object. Needs <View>, <Surfaces>, <ObjectRow>,
 // shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl, opaque_objects.glsl and footprint.glsl.
 
-vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
+vec3 environment_radiance(vec3 point, vec3 direction, bool reflected, float blur) {
 #if MICROFACETS
     float roughness = sqrt(sqrt(min(blur, 1.0)));
     return reflected ? environment_light(direction, roughness) : environment_beyond(point, direction, roughness);
@@ -38,15 +38,15 @@ float depth_within_pixel(vec3 point, vec3 normal) {
 
 // Opaque objects as the picture shows them: with their textures, and blurred behind rough interfaces. False where it does not.
 bool opaque_in_picture(EscapedRay end, out vec3 light) {
-    vec3 shown = seen_at(end.point);
-    if (!in_picture(shown.xy)) { return false; }
-    ivec2 texel = stored(texel_of(shown.xy));
+    vec3 projected = picture_position(end.point);
+    if (!in_picture(projected.xy)) { return false; }
+    ivec2 texel = stored(texel_of(projected.xy));
     float there = texelFetch(opaque_axial_depth, texel, 0).r;
-    if (abs(there - shown.z) * surface_ahead.y >= 1e-2 * surface_reach + depth_within_pixel(end.point, end.normal)) { return false; }
+    if (abs(there - projected.z) * surface_ahead.y >= 1e-2 * surface_reach + depth_within_pixel(end.point, end.normal)) { return false; }
 #if MICROFACETS
     if (end.blur > 0.0) {
-        vec4 blurred = blurred_opaque(shown.xy, blur_width(sqrt(end.blur), length(end.point - end.origin), end.point));
-        light = blurred.rgb + (1.0 - blurred.a) * environment_seen(end.origin, end.direction, end.reflected, end.blur);
+        vec4 blurred = blurred_opaque(projected.xy, blur_width(sqrt(end.blur), length(end.point - end.origin), end.point));
+        light = blurred.rgb + (1.0 - blurred.a) * environment_radiance(end.origin, end.direction, end.reflected, end.blur);
         return true;
     }
 #endif
@@ -71,7 +71,7 @@ vec3 escaped_radiance(EscapedRay end) {
     vec3 light;
     if (end.object == AIR) {
         if (environment_in_footprint(end, light)) { return light; }
-        return environment_seen(end.origin, end.direction, end.reflected, end.blur);
+        return environment_radiance(end.origin, end.direction, end.reflected, end.blur);
     }
 #if OPAQUE
     if (opaque_in_picture(end, light)) { return light; }

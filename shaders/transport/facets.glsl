@@ -3,12 +3,12 @@
 
 #if MICROFACETS
 uniform int sample_number;           // of a pixel
-uniform float blurred_share;         // of the variance of microfacets, that blurs what is seen in them; the rest is sampled
+uniform float blurred_share;         // of the variance of microfacets, that blurs what they reflect; the rest is sampled
 
 // Random numbers for the microfacet at an interface of a path: an additive recurrence in four dimensions over the samples of
 // a pixel (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), two for every other interface, from a
 // random start for each pixel and path (Jarzynski & Olano 2020, "Hash functions for GPU rendering").
-vec2 microfacet_shares(int depth, int branch_code) {
+vec2 microfacet_numbers(int depth, int branch_code) {
     uvec2 at = uvec2(gl_FragCoord.xy + beyond.xy);
     uint state = (at.x * 1664525u + at.y * 22695477u + uint(depth / 2) * 2654435761u + uint(branch_code) * 40503u) * 747796405u + 2891336453u;
     state = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
@@ -29,7 +29,7 @@ Facet take_facet(inout Interaction at, inout float alpha, int depth, int branch_
 #if ROUGH
     if (at.roughness > 0.0 && blurred_share < 1.0) {
         Facet facet = Facet(at.normal, alpha);
-        at.normal = microfacet_normal(at.normal, at.direction, sqrt(1.0 - blurred_share) * alpha, microfacet_shares(depth, branch_code));
+        at.normal = microfacet_normal(at.normal, at.direction, sqrt(1.0 - blurred_share) * alpha, microfacet_numbers(depth, branch_code));
         at.roughness = 0.0;
         alpha *= sqrt(blurred_share);
         return facet;
@@ -38,7 +38,7 @@ Facet take_facet(inout Interaction at, inout float alpha, int depth, int branch_
     return Facet(at.normal, 0.0);
 }
 
-// Takes from the lobes what other microfacets are in the way of. refracted: direction of the light that goes on.
+// Takes from the lobes what other microfacets block. refracted: direction of the light that goes on.
 void mask_lobes(inout Lobes lobes, Facet facet, Interaction at, vec3 refracted) {
 #if ROUGH
     if (facet.alpha > 0.0) {

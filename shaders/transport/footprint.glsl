@@ -26,8 +26,8 @@ vec3 direction_through(vec2 pixel) {
 }
 
 // The products of all parts of a vector and of two numbers.
-mat2x3 spread_out(vec3 along, vec2 shares) {
-    return mat2x3(shares.x * along, shares.y * along);
+mat2x3 spread_out(vec3 along, vec2 fractions) {
+    return mat2x3(fractions.x * along, fractions.y * along);
 }
 
 // Footprint of a pixel on its ray at an axial depth.
@@ -112,13 +112,13 @@ Ellipse ellipse_of(Footprint footprint) {
 }
 
 // Radiance of the environment averaged over an ellipse about a direction: lookups along its longer axis, each in the map
-// that is blurred for the shorter one. blur: squared alpha of a mirror with the same blur as rough interfaces on the way.
+// that is blurred for the shorter one. blur: squared alpha of a mirror with the same blur as the rough interfaces of the path.
 vec3 averaged_environment(vec3 direction, float blur, Ellipse ellipse) {
     float longer = length(ellipse.axis);
     float lookups = clamp(ceil(longer / max(ellipse.breadth, LEAST_BREADTH)), 1.0, MOST_LOOKUPS);
     float breadth = max(ellipse.breadth, longer / lookups);
     float roughness = sqrt(sqrt(min(blur + ALPHA_OF_DEVIATION * ALPHA_OF_DEVIATION * breadth * breadth, 1.0)));
-    // Between the map as it is and the first that is blurred, shares are of the variance: by equal steps of roughness even a
+    // Between the map as it is and the first that is blurred, steps are of the variance: by equal steps of roughness even a
     // narrow ellipse would see much of the wide one.
     float sharpest = 1.0 / float(textureSize(light_levels, 0).z);
     if (blur == 0.0 && roughness < sharpest) { roughness = sharpest * pow(roughness / sharpest, 4.0); }

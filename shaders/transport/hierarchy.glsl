@@ -45,7 +45,7 @@ float largest(vec3 v) {
 
 LocalRay local_ray(vec3 origin, vec3 direction) {
     vec3 away = vec3(direction.x < 0.0 ? -1.0 : 1.0, direction.y < 0.0 ? -1.0 : 1.0, direction.z < 0.0 ? -1.0 : 1.0);
-    // As a share of the largest: in the coordinates of a huge mesh all are small.
+    // As a fraction of the largest: in the coordinates of a huge mesh all are small.
     vec3 inverse = away / max(abs(direction), vec3(1e-12 * largest(abs(direction))));
     return LocalRay(origin, (origin + 1.0) * HIERARCHY_STEPS, inverse / HIERARCHY_STEPS);
 }
@@ -55,8 +55,8 @@ int octant_of(vec3 direction) {
     return (direction.x < 0.0 ? 1 : 0) + (direction.y < 0.0 ? 2 : 0) + (direction.z < 0.0 ? 4 : 0);
 }
 
-// Whether a ray meets the bounds of a node between two distances.
-bool meets_bounds(uvec4 node, LocalRay ray, float start, float path) {
+// Whether a ray hits the bounds of a node between two distances.
+bool hits_bounds(uvec4 node, LocalRay ray, float start, float path) {
     vec3 near = (vec3(node.x & 0xffffu, node.x >> 16, node.y & 0xffffu) - ray.start) * ray.inverse;
     vec3 far = (vec3(node.y >> 16, node.z & 0xffffu, node.z >> 16) - ray.start) * ray.inverse;
     return max(max(near.x, near.y), max(near.z, start)) <= min(min(far.x, far.y), min(far.z, path));
@@ -71,7 +71,7 @@ vec3 triangle_corner(int triangle, int corner) {
     return uintBitsToFloat(texelFetch(hierarchy_triangles, hierarchy_texel(3 * triangle + corner), 0).xyz);
 }
 
-void meet_triangle(int triangle, int object, vec3 origin, vec3 shear, int axis, float start, inout Hit hit) {
+void intersect_triangle(int triangle, int object, vec3 origin, vec3 shear, int axis, float start, inout Hit hit) {
     vec3 a = along_last(triangle_corner(triangle, 0) - origin, axis);
     vec3 b = along_last(triangle_corner(triangle, 1) - origin, axis);
     vec3 c = along_last(triangle_corner(triangle, 2) - origin, axis);
@@ -86,7 +86,7 @@ void meet_triangle(int triangle, int object, vec3 origin, vec3 shear, int axis, 
     if (path > start && path < hit.path) { hit = Hit(path, object, triangle, weights.yz / sum); }
 }
 
-void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit hit) {
+void intersect_object(int object, vec3 origin, vec3 direction, float start, inout Hit hit) {
     ObjectRow place = traced_body(object);
     vec3 along = vec3(dot(place.local_x.xyz, direction), dot(place.local_y.xyz, direction), dot(place.local_z.xyz, direction));
     // From the middle of the mesh before anything is multiplied: near a tiny body far from the center little is rounded.
@@ -95,8 +95,8 @@ void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit
     float ahead = 0.0;
     if (largest(abs(local)) > FAR_AWAY) {
         float most = largest(abs(along));
-        vec3 way = along / most;
-        ahead = max(-dot(local, way) / (dot(way, way) * most), 0.0);
+        vec3 scaled = along / most;
+        ahead = max(-dot(local, scaled) / (dot(scaled, scaled) * most), 0.0);
         local += ahead * along;
     }
     LocalRay ray = local_ray(local, along);
@@ -114,15 +114,15 @@ void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit
         uint held = 0u;
         while (node < end && held == 0u) {
             uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
-            bool met = meets_bounds(found, ray, start, own.path);
+            bool entered = hits_bounds(found, ray, start, own.path);
             bool leaf = found.w >= 0x80000000u;
-            held = leaf && met ? found.w : 0u;
-            node = leaf || met ? node + 1 : int(found.w);
+            held = leaf && entered ? found.w : 0u;
+            node = leaf || entered ? node + 1 : int(found.w);
         }
         int triangle = int(held & 0x0fffffffu);
         int last = held == 0u ? triangle - 1 : triangle + int(held >> 28 & 7u);
         for (; triangle <= last; ++triangle) {
-            meet_triangle(triangle, object, ray.origin, shear, axis, start, own);
+            intersect_triangle(triangle, object, ray.origin, shear, axis, start, own);
         }
     }
     if (own.object >= 0) { hit = Hit(own.path + ahead, own.object, own.triangle, own.weights); }
@@ -139,7 +139,7 @@ bool is_listed(uvec4 list, int object) {
 Hit nearest_hit(vec3 origin, vec3 direction, float start, float end, uvec4 left_out) {
     Hit hit = Hit(end, -1, -1, vec2(0.0));
 #if ONE_OBJECT
-    meet_object(0, origin, direction, start, hit);
+    intersect_object(0, origin, direction, start, hit);
 #else
     LocalRay ray = local_ray((origin - objects_frame.xyz) * objects_frame.w, direction * objects_frame.w);
     int node = octant_of(direction) * object_nodes;
@@ -147,12 +147,12 @@ Hit nearest_hit(vec3 origin, vec3 direction, float start, float end, uvec4 left_
     while (node < last) {
         uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
         bool leaf = found.w >= 0x80000000u;
-        if (!meets_bounds(found, ray, start, hit.path)) {
+        if (!hits_bounds(found, ray, start, hit.path)) {
             node = leaf ? node + 1 : int(found.w);
             continue;
         }
         int object = int(found.w & 0x0fffffffu);
-        if (leaf && !is_listed(left_out, object)) { meet_object(object, origin, direction, start, hit); }
+        if (leaf && !is_listed(left_out, object)) { intersect_object(object, origin, direction, start, hit); }
         ++node;
     }
 #endif

@@ -20,7 +20,7 @@ uvec4 entered_interior(uvec4 interior, int object) {
         interior.w << 16 | interior.z >> 16);
 }
 
-// The list without its first entry. Loops that shift it take as many turns as there are entries: compilers unroll those
+// The list without its first entry. Loops that shift it run as often as there are entries: compilers unroll those
 // over INTERIOR_SIZE.
 uvec4 next_entries(uvec4 interior) {
     return uvec4(interior.x >> 16 | interior.y << 16, interior.y >> 16 | interior.z << 16, interior.z >> 16 | interior.w << 16, interior.w >> 16);
@@ -111,11 +111,11 @@ Medium medium_in(uvec4 interior, int effective) {
     }
 #if ONE_OBJECT && !PRIORITY && !UNION
     // A body that fills a place twice absorbs twice.
-    int turns = 0;
-    for (int i = 0; i < INTERIOR_SIZE; ++i) { turns += interior_entry(interior, i) != 0u ? 1 : 0; }
-    sum.extinction *= float(turns);
-    sum.emission *= float(turns);
-    sum.scattering *= float(turns);
+    int count = 0;
+    for (int i = 0; i < INTERIOR_SIZE; ++i) { count += interior_entry(interior, i) != 0u ? 1 : 0; }
+    sum.extinction *= float(count);
+    sum.emission *= float(count);
+    sum.scattering *= float(count);
 #endif
 #else
     uvec4 rest = interior;

@@ -35,8 +35,8 @@ void main() {
     vec4 point = texelFetch(landed_point, place, 0);
     if (point.w != 1.0) { return; }
     vec3 normal = texelFetch(landed_normal, place, 0).xyz;
-    vec2 seen = seen_at(point.xyz).xy - frame_size.zw;
-    vec2 corner = floor(seen);
+    vec2 projected = picture_position(point.xyz).xy - frame_size.zw;
+    vec2 corner = floor(projected);
     if (any(lessThan(corner, vec2(0.0))) || any(greaterThanEqual(corner, frame_size.xy))) { return; }
 
     // Metres along the camera's axis for which the picture grows by its half extent; 1 where rays are parallel.
@@ -51,9 +51,9 @@ void main() {
     bool behind;
     if (!shows_plane(corner, point.xyz, normal, along, behind)) {
         if (behind) { return; }
-        // It is seen at the edge of its surface, where its pixel shows what is beyond: the nearest one has it, which
+        // It is visible at the edge of its surface, where its pixel shows what is beyond: the nearest one has it, which
         // shows that surface all over.
-        vec2 away = seen - corner - 0.5;
+        vec2 away = projected - corner - 0.5;
         vec2 aside = abs(away.x) > abs(away.y) ? vec2(sign(away.x), 0.0) : vec2(0.0, sign(away.y));
         vec2 edge = corner;
         for (int side = 0; side < 4; ++side) {

@@ -1,4 +1,4 @@
-// Transmittance of the straight way from a light to an interface: what bodies in between absorb, and the body itself where it is
+// Transmittance of the straight path from a light to an interface: what bodies in between absorb, and the body itself where it is
 // in its own light. Found by one ray, which walks as light travels, so that it knows what it is in: it starts where no body is,
 // and counts from the light on. As in shadows, interfaces neither bend nor dim that light; what is opaque is left to the maps.
 // Needs <constants>, <Surfaces>, hierarchy.glsl, interior_list.glsl and surface_hit.glsl. DIMMED: there may be something in between.

@@ -6,7 +6,7 @@ uniform int mirrored;        // 1: these rays, and not those of the first interf
 uniform vec4 mirror_plane;   // of the ground: unit normal upwards, and metres along it from the center of the media
 uniform vec2 mirror_surface; // roughness and ior of its coat
 
-// The ray of a pixel in which the ground is seen, and the fraction of the light that its coat reflects; false elsewhere.
+// The ray of a pixel in which the ground is visible, and the fraction of the light that its coat reflects; false elsewhere.
 bool begin_in_mirror(vec2 pixel, ivec2 texel, vec3 direction, out Ray ray, out PrimaryHit primary, out vec3 reflectance) {
     vec3 point = point_at(pixel, texelFetch(opaque_axial_depth, texel, 0).r), normal = mirror_plane.xyz;
     float cosine = -dot(normal, direction);
@@ -15,7 +15,7 @@ bool begin_in_mirror(vec2 pixel, ivec2 texel, vec3 direction, out Ray ray, out P
     point += (dot(normal, point) - mirror_plane.w) / cosine * direction;  // where the rasterizer does not quite see it
     float alpha = mirror_surface.x * mirror_surface.x;
     vec3 facet = normal;
-    if (blurred_share < 1.0) { facet = microfacet_normal(normal, direction, sqrt(1.0 - blurred_share) * alpha, microfacet_shares(0, 1)); }
+    if (blurred_share < 1.0) { facet = microfacet_normal(normal, direction, sqrt(1.0 - blurred_share) * alpha, microfacet_numbers(0, 1)); }
     vec3 reflected = reflected_direction(direction, facet);
     if (dot(reflected, normal) <= 0.0) { return false; }
     ray = Ray(point + MIRROR_MARGIN * surface_reach * normal, 0.0, reflected, vec3(1.0), uvec4(0u), 1, 0, true,

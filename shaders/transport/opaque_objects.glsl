@@ -1,6 +1,6 @@
 // Opaque objects as rays see them. Needs <View>, <Surfaces>, <ObjectRow>, shade/opaque_light.glsl, and surface_hit.glsl.
 
-// Radiance of an opaque object along a ray, lit as where it is seen directly, but without its textures.
+// Radiance of an opaque object along a ray, lit as where it is visible directly, but without its textures.
 vec3 opaque_light(ObjectRow body, vec3 normal, vec3 direction, vec3 point) {
     // What has no surface is a diffuse base alone.
     float ior = body.plain == 1.0 ? 1.0 : body.ior;

@@ -46,8 +46,8 @@ const float EYE_MARGIN = 1e-3;    // axial depth before the media at which paths
 // Place in the picture at which a path starts: an additive recurrence (Roberts 2018, "The unreasonable effectiveness of
 // quasirandom sequences").
 vec2 pixel_of(ivec2 texel, uint path) {
-    vec2 share = vec2(uvec2(path * 3242174889u, path * 2447445414u) >> 8u) / 16777216.0;
-    return vec2(texel) + (spread == 1 ? fract(share + 0.5) : 0.5 + frame_size.zw);
+    vec2 offset = vec2(uvec2(path * 3242174889u, path * 2447445414u) >> 8u) / 16777216.0;
+    return vec2(texel) + (spread == 1 ? fract(offset + 0.5) : 0.5 + frame_size.zw);
 }
 
 float largest_of(vec3 channels) {
@@ -55,17 +55,17 @@ float largest_of(vec3 channels) {
 }
 
 // Number of a channel, chosen by what each carries.
-int chosen_channel(vec3 weights, float share) {
-    float at = share * (weights.r + weights.g + weights.b);
+int chosen_channel(vec3 weights, float number) {
+    float at = number * (weights.r + weights.g + weights.b);
     return at < weights.r ? 0 : at < weights.r + weights.g || weights.b == 0.0 ? (weights.g > 0.0 ? 1 : 0) : 2;
 }
 
-vec3 environment_seen(Path path, vec2 pixel) {
+vec3 environment_radiance(Path path, vec2 pixel) {
 #if SEEN_LIGHTS
     return mirrored_environment(path.direction);
 #else
     if ((path.flags & FLAG_REFLECTED) != 0u) { return mirrored_environment(path.direction); }
-    if ((path.flags & FLAG_BENT) == 0u) { return seen_environment(in_heights(pixel), path.direction); }
+    if ((path.flags & FLAG_BENT) == 0u) { return background_radiance(in_heights(pixel), path.direction); }
     return environment_beyond(path.origin, path.direction, 0.0);
 #endif
 }
@@ -105,12 +105,12 @@ vec3 phase_of(uvec4 interior, int effective, vec3 scattering, float cosine) {
 }
 
 // Phase function of one of the media of a place, chosen by what it scatters of the light.
-vec4 chosen_phase(uvec4 interior, int effective, vec3 scattering, vec3 carried, float share) {
+vec4 chosen_phase(uvec4 interior, int effective, vec3 scattering, vec3 carried, float number) {
 #if ONE_OBJECT || PRIORITY
     return traced_body(effective).phase;
 #else
     vec3 each = carried / max(scattering, vec3(1e-30));
-    float left = share * dot(each, scattering);
+    float left = number * dot(each, scattering);
     vec4 phase = vec4(0.0);
     for (int i = 0; i < INTERIOR_SIZE; ++i) {
         uint entry = interior_entry(interior, i);
@@ -127,10 +127,10 @@ vec4 chosen_phase(uvec4 interior, int effective, vec3 scattering, vec3 carried, 
 }
 
 // Ends paths that carry little, or lets them carry more in place of the ended ones (Arvo & Kirk 1990).
-void play_roulette(inout Path path, float share) {
+void play_roulette(inout Path path, float number) {
     float chance = min(largest_of(path.throughput) / ROULETTE, 1.0);
     if (path.depth > MANY_INTERFACES) { chance = min(chance, GOES_ON); }
-    path.ends = share >= chance;
+    path.ends = number >= chance;
     path.throughput /= max(chance, 1e-30);
 }
 
@@ -158,7 +158,7 @@ void begin_path(inout Path path, vec2 pixel, ivec2 texel) {
 LightSample light_drawn(int number, vec3 point, inout Draws draws) {
     Light light = light_row(number);
     if (light.disc.w > 0.0) {
-        light.position.xyz += light.disc.xyz + light.disc.w * sphere_point(random_shares(draws).xyz);
+        light.position.xyz += light.disc.xyz + light.disc.w * sphere_point(random_numbers(draws).xyz);
     }
     return light_sample(light, point);
 }
@@ -167,39 +167,40 @@ LightSample light_drawn(int number, vec3 point, inout Draws draws) {
 void scatter(inout Path path, Medium medium, int effective, inout Draws draws) {
     path.flags |= FLAG_BENT | FLAG_REFLECTED;
     path.skipped = 0.0;
-    vec4 shares = random_shares(draws);
+    vec4 numbers = random_numbers(draws);
 #if LIGHTS
-    int number = min(int(shares.x * float(light_count)), light_count - 1);
-    shares.x = fract(shares.x * float(light_count));
-    LightSample arriving = light_drawn(number, path.origin, draws);
+    int light = min(int(numbers.x * float(light_count)), light_count - 1);
+    numbers.x = fract(numbers.x * float(light_count));
+    LightSample arriving = light_drawn(light, path.origin, draws);
     vec3 phase = phase_of(path.interior, effective, medium.scattering, dot(arriving.towards, path.direction));
     vec3 through = straight_transmittance(path.origin, 0.0, path.interior, arriving.towards, arriving.distance_m, CHANNEL);
     path.light += path.throughput * phase * through * arriving.irradiance * float(light_count);
 #endif
-    vec4 phase_function = chosen_phase(path.interior, effective, medium.scattering, path.throughput, shares.x);
+    vec4 phase_function = chosen_phase(path.interior, effective, medium.scattering, path.throughput, numbers.x);
     vec3 before = path.direction;
-    path.direction = turned_by(before, phase_cosine(phase_function, shares.y), shares.z);
+    path.direction = turned_by(before, phase_cosine(phase_function, numbers.y), numbers.z);
 #if !(ONE_OBJECT || PRIORITY)
     vec3 turned = phase_of(path.interior, effective, medium.scattering, dot(before, path.direction));
     float density = dot(path.throughput, turned) / max(dot(path.throughput, vec3(1.0)), 1e-30);
     path.throughput *= turned / max(density, 1e-30);
 #endif
-    play_roulette(path, shares.w);
+    play_roulette(path, numbers.w);
 }
 
-// Adds the light of one of the lights that the microfacets of a rough interface turn into the path. seen: density of that in 1/sr.
-void add_light_at_facets(inout Path path, Interaction at, SurfaceHit surface, LightSample arriving, vec3 seen) {
+// Adds the light of one of the lights that the microfacets of a rough interface scatter into the path. light_density: of
+// scattering, in 1/sr.
+void add_light_at_facets(inout Path path, Interaction at, SurfaceHit surface, LightSample arriving, vec3 light_density) {
 #if LIGHTS
     // Light that comes from the other side of the face than of the smooth surface does not exist.
     float side = dot(arriving.towards, at.normal) < 0.0 ? -1.0 : 1.0;
     float across = dot(arriving.towards, at.face_normal);
-    if (seen == vec3(0.0) || side * across <= 0.0) { return; }
+    if (light_density == vec3(0.0) || side * across <= 0.0) { return; }
     float skipped;
     vec3 origin = origin_beside(at.point, at.face_normal, arriving.towards, skipped);
     vec3 through = straight_transmittance(origin, skipped, side > 0.0 ? path.interior : surface.interior, arriving.towards,
         arriving.distance_m - skipped, CHANNEL);
     vec3 passing = side > 0.0 ? vec3(1.0) : passing_base(at);
-    path.light += path.throughput * passing * through * arriving.irradiance * seen * float(light_count);
+    path.light += path.throughput * passing * through * arriving.irradiance * light_density * float(light_count);
 #endif
 }
 
@@ -216,7 +217,7 @@ void interact(inout Path path, SurfaceHit surface, ObjectRow body, int before, i
     vec3 normal = facing_normal(surface.smooth_normal, path.direction);
     vec3 point = path.origin + surface.path * path.direction;
     Interaction at = interaction_at(surface, body, point, path.direction, normal, before, after, CHANNEL);
-    vec4 shares = random_shares(draws);
+    vec4 numbers = random_numbers(draws);
     path.flags |= FLAG_BENT;
     ++path.depth;
     vec3 emitted;
@@ -224,11 +225,11 @@ void interact(inout Path path, SurfaceHit surface, ObjectRow body, int before, i
     path.light += path.throughput * emitted;
     LightSample arriving = LightSample(vec3(0.0), 0.0, vec3(0.0), vec4(0.0));
 #if LIGHTS
-    if (is_rough(at)) { arriving = light_drawn(min(int(shares.y * float(light_count)), light_count - 1), at.point, draws); }
+    if (is_rough(at)) { arriving = light_drawn(min(int(numbers.y * float(light_count)), light_count - 1), at.point, draws); }
 #endif
-    vec3 seen;
-    Branch next = sampled_branch(at, body, lobes, path.throughput, shares.x, arriving.towards, draws, seen);
-    add_light_at_facets(path, at, surface, arriving, seen);
+    vec3 light_density;
+    Branch next = sampled_branch(at, body, lobes, path.throughput, numbers.x, arriving.towards, draws, light_density);
+    add_light_at_facets(path, at, surface, arriving, light_density);
     add_base(path, at, body, next.on_base);
     path.throughput *= next.weight;
     if (next.transmitted) {
@@ -239,7 +240,7 @@ void interact(inout Path path, SurfaceHit surface, ObjectRow body, int before, i
     path.lost = path.lost || next.lost;
     path.direction = next.direction;
     path.origin = origin_beside(at.point, at.face_normal, path.direction, path.skipped);
-    play_roulette(path, shares.z);
+    play_roulette(path, numbers.z);
     path.ends = path.ends || path.lost;
 }
 
@@ -264,10 +265,10 @@ float drawn_flight(Path path, Medium medium, inout Draws draws, out int channel)
     channel = 1;
 #if SCATTER
     if (largest_of(medium.scattering) > 0.0) {
-        vec4 shares = random_shares(draws);
-        channel = chosen_channel(path.throughput, shares.x);
+        vec4 numbers = random_numbers(draws);
+        channel = chosen_channel(path.throughput, numbers.x);
         float along = medium.scattering[channel];
-        return along > 0.0 ? min(-log(shares.y) / along, NOTHING) : NOTHING;
+        return along > 0.0 ? min(-log(numbers.y) / along, NOTHING) : NOTHING;
     }
 #endif
     return NOTHING;
@@ -324,7 +325,7 @@ void follow(inout Path path, vec2 pixel, ivec2 texel, inout Draws draws) {
         }
     }
     if (!hits) {
-        path.light += path.throughput * environment_seen(path, pixel);
+        path.light += path.throughput * environment_radiance(path, pixel);
         path.ends = true;
         return;
     }
@@ -381,7 +382,7 @@ void main() {
         }
     }
     if (event < most && !done) {
-        // The driver has cut the loop short (Mesa does after 65,535 turns of all loops), at a point that nobody knows.
+        // The driver has cut the loop short (Mesa does after 65,535 iterations of all loops), at a point that nobody knows.
         known = stored_statistics(here);
         bool again = most > 1;
         path = stored_path(here);

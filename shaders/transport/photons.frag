@@ -1,6 +1,6 @@
 // Photons of a light, one for each texel, followed from the light to the first opaque surface (Jensen 1996, "Global
 // illumination using photon maps"). Interfaces reflect or refract them by chance as paths of light; what media absorb on the
-// way is exact. Only those land that an interface has refracted or reflected: all others are straight light.
+// path is exact. Only those land that an interface has refracted or reflected: all others are straight light.
 
 #include <constants>
 #include <View>
@@ -35,7 +35,7 @@ layout(location = 0) out vec4 out_point;   // from the center of the media; w: 1
 layout(location = 1) out vec4 out_power;
 layout(location = 2) out vec4 out_normal;
 
-const int MOST_SURFACES = 96;    // on the way of a photon; after as many it is given up
+const int MOST_SURFACES = 96;    // on the path of a photon; after as many it ends
 const float ROULETTE = 0.05;     // throughput below which a photon ends by Russian roulette, or goes on with this
 
 struct Photon {
@@ -50,25 +50,25 @@ struct Photon {
 
 // An additive recurrence (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
 vec2 start_of(uint number) {
-    vec2 share = vec2(uvec2(number * 3242174889u, number * 2447445414u) >> 8u) / 16777216.0;
-    return fract(share + aim_shift);
+    vec2 start = vec2(uvec2(number * 3242174889u, number * 2447445414u) >> 8u) / 16777216.0;
+    return fract(start + aim_shift);
 }
 
 // A photon at the light, or where it comes near the scene.
 Photon begun(uint number, inout Draws draws, out vec3 power) {
-    vec2 share = start_of(number);
+    vec2 start = start_of(number);
     vec3 light_at = light_from.xyz;
-    if (light_radius > 0.0) { light_at += light_radius * sphere_point(random_shares(draws).xyz); }
+    if (light_radius > 0.0) { light_at += light_radius * sphere_point(random_numbers(draws).xyz); }
     Photon photon = Photon(light_at, 0.0, light_from.xyz, vec3(1.0), light_interior, false, false);
     power = photon_power;
     if (aim_right == vec3(0.0)) {
-        float up = 2.0 * share.x - 1.0;
+        float up = 2.0 * start.x - 1.0;
         float across = sqrt(max((1.0 - up) * (1.0 + up), 0.0));
-        photon.direction = vec3(across * cos(2.0 * PI * share.y), across * sin(2.0 * PI * share.y), up);
+        photon.direction = vec3(across * cos(2.0 * PI * start.y), across * sin(2.0 * PI * start.y), up);
         power *= cone_attenuation(photon.direction, cone);
         return photon;
     }
-    vec3 target = aim_middle + (2.0 * share.x - 1.0) * aim_right + (2.0 * share.y - 1.0) * aim_up;
+    vec3 target = aim_middle + (2.0 * start.x - 1.0) * aim_right + (2.0 * start.y - 1.0) * aim_up;
     float back = 2.0 * surface_reach;
     if (light_from.w == 1.0) {
         vec3 to_target = target - light_at;
@@ -87,10 +87,10 @@ void interact(inout Photon photon, SurfaceHit surface, ObjectRow body, int befor
     vec3 normal = facing_normal(surface.smooth_normal, photon.direction);
     vec3 point = photon.origin + surface.path * photon.direction;
     Interaction at = interaction_at(surface, body, point, photon.direction, normal, before, after, channel);
-    vec4 shares = random_shares(draws);
+    vec4 numbers = random_numbers(draws);
     vec3 emitted;
-    vec3 seen;
-    Branch next = sampled_branch(at, body, polished_lobes(at, body, emitted), photon.throughput, shares.x, vec3(0.0), draws, seen);
+    vec3 light_density;
+    Branch next = sampled_branch(at, body, polished_lobes(at, body, emitted), photon.throughput, numbers.x, vec3(0.0), draws, light_density);
     photon.throughput *= next.weight;
     if (next.transmitted) { photon.interior = surface.interior; }
     photon.bent = photon.bent || !next.transmitted || (!at.thin_walled && at.ior != 1.0);
@@ -98,7 +98,7 @@ void interact(inout Photon photon, SurfaceHit surface, ObjectRow body, int befor
     photon.origin = origin_beside(at.point, at.face_normal, photon.direction, photon.skipped);
     float most = max(photon.throughput.r, max(photon.throughput.g, photon.throughput.b));
     float lives = min(most / ROULETTE, 1.0);
-    photon.ends = next.lost || shares.z >= lives;
+    photon.ends = next.lost || numbers.z >= lives;
     photon.throughput /= max(lives, 1e-30);
 }
 
@@ -153,6 +153,6 @@ void main() {
     for (int surface = 0; surface < MOST_SURFACES; ++surface) {
         if (!follow(photon, power, channel, draws)) { return; }
     }
-    // Or a driver has cut the loop short: Mesa does after 65,535 turns of all loops.
+    // Or a driver has cut the loop short: Mesa does after 65,535 iterations of all loops.
     out_point.w = -1.0;
 }

@@ -24,7 +24,7 @@ uvec4 pcg4d(uvec4 v) {
 }
 
 // Four numbers between 0 and 1, both excluded.
-vec4 random_shares(inout Draws draws) {
+vec4 random_numbers(inout Draws draws) {
     uvec4 bits = pcg4d(uvec4(draws.pixel, draws.path, draws.count, seed));
     ++draws.count;
     return (vec4(bits >> 9u) + 0.5) / 8388608.0;

@@ -34,16 +34,16 @@ Lobes polished_lobes(Interaction at, ObjectRow body, out vec3 emitted) {
     return lobes;
 }
 
-// A branch by a random number, as likely as the light that it carries. to_light: for rough interfaces, with seen: density in 1/sr
-// with which they turn light there.
-Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughput, float share, vec3 to_light, inout Draws draws,
-    out vec3 seen) {
+// A branch by a random number, as likely as the light that it carries. to_light: for rough interfaces, and light_density:
+// density in 1/sr with which they scatter light there.
+Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughput, float number, vec3 to_light, inout Draws draws,
+    out vec3 light_density) {
     Branch branch;
     branch.lost = false;
-    seen = vec3(0.0);
+    light_density = vec3(0.0);
     vec3 passing = passing_base(at);
 #if ROUGH
-    if (is_rough(at) && share < coat_at(at, body)) {
+    if (is_rough(at) && number < coat_at(at, body)) {
         branch.transmitted = false;
         branch.weight = vec3(1.0);
         branch.on_base = vec3(0.0);
@@ -52,7 +52,7 @@ Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughp
         mat3 frame = frame_around(at.normal);
         RoughInterface rough = RoughInterface(at.roughness * at.roughness, at.ior, at.ior_before, body.film);
         vec3 weight;
-        vec3 local = scattered_at_microfacets(at.direction * frame, rough, throughput, to_light * frame, draws, weight, seen);
+        vec3 local = scattered_at_microfacets(at.direction * frame, rough, throughput, to_light * frame, draws, weight, light_density);
         branch.lost = local == vec3(0.0);
         branch.transmitted = local.z < 0.0;
         branch.weight = branch.transmitted ? weight * passing : weight;
@@ -65,7 +65,7 @@ Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughp
         branch.on_base = lobes.transmission;
         float back = dot(throughput, lobes.reflection);
         float chance = back / max(back + dot(throughput, on), 1e-30);
-        branch.transmitted = share >= chance;
+        branch.transmitted = number >= chance;
         branch.weight = branch.transmitted ? on / (1.0 - chance) : lobes.reflection / max(chance, 1e-30);
         branch.direction = !branch.transmitted ? reflected_direction(at.direction, at.normal)
             : at.thin_walled ? at.direction : refracted_direction(at.direction, at.normal, at.ior);

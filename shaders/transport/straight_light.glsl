@@ -1,8 +1,8 @@
 // Light of the scene's lights that comes straight to a place: through media, and interfaces that bend nothing. No path finds
 // what polished interfaces bend of it. Needs shade/lights.glsl, <Surfaces>, <View>, surface_hit.glsl and what that needs.
 
-// Transmittance of the straight way to a light. skipped: metres between the place and the origin, which lies beside a
-// surface that is not to be met.
+// Transmittance of the straight path to a light. skipped: metres between the place and the origin, which lies beside a
+// surface that is not to be hit.
 vec3 straight_transmittance(vec3 origin, float skipped, uvec4 interior, vec3 towards, float distance_m, int channel) {
     vec3 passed = vec3(1.0);
     for (int surface = 0; surface < MOST_STEPS; ++surface) {
@@ -10,7 +10,7 @@ vec3 straight_transmittance(vec3 origin, float skipped, uvec4 interior, vec3 tow
         vec3 extinction = medium_in(interior, before).extinction;
         Hit hit = nearest_hit(origin, towards, 0.0, distance_m, uvec4(0u));
         if (hit.object < 0) {
-            // Out of closed bodies no way leads but through their surfaces: it has passed an edge by rounding.
+            // Out of closed bodies no path leads but through their surfaces: it has passed an edge by rounding.
             return distance_m < NOTHING ? passed * transmittance(extinction * (distance_m + skipped)) : passed;
         }
         passed *= transmittance(extinction * (hit.path + skipped));

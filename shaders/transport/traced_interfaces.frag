@@ -168,7 +168,7 @@ void add_coat(Ray ray, Interaction at, ObjectRow body, vec3 normal, bool polishe
     } else {
         float alpha = body.clearcoat_roughness * body.clearcoat_roughness;
         vec3 direction = kept_on_side(reflected_direction(at.direction, normal), at.face_normal);
-        traced_radiance += unoccluded * coat * ray.throughput * environment_seen(at.point, direction, true, ray.blur + alpha * alpha);
+        traced_radiance += unoccluded * coat * ray.throughput * environment_radiance(at.point, direction, true, ray.blur + alpha * alpha);
     }
 #endif
 }
@@ -187,7 +187,7 @@ void add_base(Ray ray, vec3 arriving, Interaction at, PrimaryHit primary) {
 }
 
 // Goes on with the stronger of two branches, and stacks or ends the weaker one; returns whether the ray ends. again: what another
-// way through the body leaves of light that is reflected back into it; total: reflection; last: of the interfaces.
+// path through the body leaves of light that is reflected back into it; total: reflection; last: of the interfaces.
 bool branch(inout Ray ray, Ray back, Ray on, vec3 again, bool total, bool last) {
     bool on_stronger = strength(on.throughput) >= strength(back.throughput);
     vec3 arrival = ray.direction;
@@ -287,7 +287,7 @@ bool follow(inout Ray ray, PrimaryHit primary, inout float reach, int channel, b
     traced_radiance += ray.throughput * surface.emitted;
     ray.throughput *= surface.transmittance;
     if (type == TYPE_OPAQUE && (surface.outside || body.one_sided == 0.0)) {
-        // It is in an open body, and whether rightly so, what is behind the opaque object would tell.
+        // It is in an open body, and whether rightly so, what is behind the opaque object would decide.
         if (all_closed == 0 && is_in_open_body(ray.interior)) { traced_lost += strength(ray.throughput) / 3.0; }
         escape(EscapedRay(surface.object, normal, ray.origin, point, ray.direction, ray.throughput, ray.reflected, ray.blur, ellipse_of(ray.footprint)));
         return true;
@@ -300,7 +300,7 @@ bool follow(inout Ray ray, PrimaryHit primary, inout float reach, int channel, b
         return false;
     }
     Interaction at = interaction_at(surface, body, point, ray.direction, normal, before, after, channel);
-    // Light that scatters on the way leaves all the same as from a layer.
+    // Light that scatters inside leaves all the same as from a layer.
     vec3 again = surface.outside || is_layer(before) ? vec3(1.0) : passed;
     bool last = ray.depth + 1 >= most_interfaces || late;
     return interact(ray, at, body, hit, surface, primary, first ? primary.surface.unoccluded : 1.0, again, last);
@@ -326,7 +326,7 @@ void trace(Ray ray, PrimaryHit primary, float reach, int channel) {
             traced_radiance += escaped[escapes].throughput * escaped_radiance(escaped[escapes]);
         }
     } while (step < MOST_STEPS && !(ends && stacked == 0));
-    // Not all has been followed after too many steps, or where a driver cuts long loops short: Mesa does after 65,535 turns.
+    // Not all has been followed after too many steps, or where a driver cuts long loops short: Mesa does after 65,535 iterations.
     if (!(ends && stacked == 0 && escapes == 0)) { traced_lost = 1.0; }
 }
 
@@ -414,7 +414,7 @@ void main() {
     vec3 light = traced_radiance;
 #if MIRROR
     if (mirrored == 1) {
-        vec3 without = environment_seen(ray.origin, ray.direction, true, ray.blur);
+        vec3 without = environment_radiance(ray.origin, ray.direction, true, ray.blur);
         out_radiance = vec4(reflectance * through * (min(light, vec3(NOTHING)) - without), 0.0);
         out_transmittance.a = -strength(reflectance) / 3.0 * min(traced_lost, 1.0);
         return;

@@ -6,11 +6,11 @@
 #include <View>
 #include "lib/color.glsl"
 
-uniform sampler2D bent_light;      // sum over the samples that met an interface; alpha: how many of them there are so far
+uniform sampler2D bent_light;      // sum over the samples that hit an interface; alpha: how many of them there are so far
 uniform sampler2D bent_spread;     // r: sum of squared luminance
-uniform sampler2D average_light;   // alpha: how many samples met no interface, of all
+uniform sampler2D average_light;   // alpha: how many samples hit no interface, of all
 uniform float samples;             // of a pixel
-uniform float contrast;            // largest range of light near a pixel that one sample is enough for, as a share of its mean
+uniform float contrast;            // largest range of light near a pixel that one sample is enough for, as a fraction of its mean
 uniform float error;               // largest standard error that is as good as none, likewise
 uniform int first;                 // 1: there is one sample so far
 
@@ -18,10 +18,10 @@ layout(location = 0) out float unsettled;
 
 void main() {
     ivec2 here = ivec2(gl_FragCoord.xy), last = ivec2(frame_size.xy) - 1;
-    float met = samples - texelFetch(average_light, here, 0).a, taken = texelFetch(bent_light, here, 0).a;
-    if (taken >= met) { discard; }
+    float hits = samples - texelFetch(average_light, here, 0).a, taken = texelFetch(bent_light, here, 0).a;
+    if (taken >= hits) { discard; }
     unsettled = 1.0;
-    if (taken == 0.0 || met < samples) { return; }
+    if (taken == 0.0 || hits < samples) { return; }
     int reach = first == 1 ? 2 : 1;
     vec3 low = vec3(NOTHING), high = vec3(0.0);
     float sum = 0.0, count = 0.0, worst = 0.0;

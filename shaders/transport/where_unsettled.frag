@@ -1,4 +1,4 @@
-// Depth that lets rays be traced where an interface is seen in a pixel that needs more samples, and nowhere else; adds nothing to
+// Depth that lets rays be traced where an interface is visible in a pixel that needs more samples, and nowhere else; adds nothing to
 // sums. Row 0 is the top row.
 
 #include <constants>

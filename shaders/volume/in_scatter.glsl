@@ -3,7 +3,7 @@
 //
 // The points are those of a variable in which the exponential is constant, were its exponent linear from end to end (the
 // secant): with E(s) = sigma_t s + tau_light(s) and x = E(L) - E(0), s(u) = -(L / x) log(1 - (1 - e^-x) u). Where a
-// point light is near, the angle seen from it takes the place of s (equiangular sampling, Kulla & Fajardo 2012), which
+// point light is near, the angle at it takes the place of s (equiangular sampling, Kulla & Fajardo 2012), which
 // cancels its 1 / r^2; where it is inside a medium, so that the exponent has a kink next to it, the angle alone. Needs <View>.
 
 #include "intervals/slots.glsl"
@@ -32,25 +32,25 @@ ViewRay ray_from(float axial_depth) {
 }
 
 // Scattering times phase function of what fills a point, for a cosine between the directions of travel.
-vec3 scattering_phase(float turns[SLOTS], float cos_scatter) {
+vec3 scattering_phase(float weights[SLOTS], float cos_scatter) {
     vec3 sum = vec3(0.0);
     for (int slot = 0; slot < SLOTS; ++slot) {
-        if (turns[slot] > 0.0) {
-            sum += turns[slot] * slot_scattering[slot].rgb * phase_value(slot_phase[slot], cos_scatter);
+        if (weights[slot] > 0.0) {
+            sum += weights[slot] * slot_scattering[slot].rgb * phase_value(slot_phase[slot], cos_scatter);
         }
     }
     return sum;
 }
 
 // One light's radiance at distance s along the segment, per metre, without the transmittances; w: its visibility.
-vec4 scattered_here(float turns[SLOTS], int light, ViewRay ray, float s, out vec3 tau) {
+vec4 scattered_here(float weights[SLOTS], int light, ViewRay ray, float s, out vec3 tau) {
     vec3 point = ray.start + s * ray.direction;
     LightSample arriving = light_at(light, point);
     tau = vec3(0.0);
     if (arriving.irradiance == vec3(0.0)) { return vec4(0.0); }  // a spot's view ends with its cone
     vec4 depth = light_depth(light, point);
     tau = depth.rgb;
-    return vec4(arriving.irradiance * scattering_phase(turns, dot(arriving.towards, ray.direction)), depth.a);
+    return vec4(arriving.irradiance * scattering_phase(weights, dot(arriving.towards, ray.direction)), depth.a);
 }
 
 // Between which distances, within metres, a ray is in a cone; rest is 1 - cos of its half angle. Cones are convex, and
@@ -93,23 +93,23 @@ vec4 lit_parts(int light, ViewRay ray, float metres) {
     return inner.x < inner.y ? vec4(outer.x, inner, outer.y) : outer.xyyy;
 }
 
-// Where v in 0..1 a share u of the integral of e^(-x v) is reached, and dv / du there. A rising exponential is a falling
-// one seen from its other end.
+// Where v in 0..1 a fraction u of the integral of e^(-x v) is reached, and dv / du there. A rising exponential is a falling
+// one from its other end.
 vec2 secant_point(float u, float x) {
     float fall = abs(x);
-    float share = x < 0.0 ? 1.0 - u : u;
+    float fraction = x < 0.0 ? 1.0 - u : u;
     float q = opacity(vec3(fall)).x;
     vec2 found;
     if (fall < 1e-3) {
-        found = vec2(share * (1.0 - 0.5 * fall * (1.0 - share)), 1.0 - 0.5 * fall * (1.0 - 2.0 * share));
+        found = vec2(fraction * (1.0 - 0.5 * fall * (1.0 - fraction)), 1.0 - 0.5 * fall * (1.0 - 2.0 * fraction));
     } else {
-        found = vec2(-log_one_minus(q * share), q / (1.0 - q * share)) / fall;
+        found = vec2(-log_one_minus(q * fraction), q / (1.0 - q * fraction)) / fall;
     }
     return x < 0.0 ? vec2(1.0 - found.x, found.y) : found;
 }
 
 // From a part of a segment.
-vec3 scatter_from_part(float turns[SLOTS], int light, ViewRay ray, vec2 lit, vec3 sigma) {
+vec3 scatter_from_part(float weights[SLOTS], int light, ViewRay ray, vec2 lit, vec3 sigma) {
     float metres = lit.y - lit.x;
     vec3 tau;
     vec3 tau_start = light_depth(light, ray.start + lit.x * ray.direction).rgb;
@@ -147,7 +147,7 @@ vec3 scatter_from_part(float turns[SLOTS], int light, ViewRay ray, vec2 lit, vec
             } else {
                 weight *= metres;
             }
-            vec4 light_here = scattered_here(turns, light, ray, s, tau);
+            vec4 light_here = scattered_here(weights, light, ray, s, tau);
             vec3 here = weight * light_here.a * light_here.rgb * transmittance(sigma * s + tau);
 #if GRAY
             sum += here;
@@ -159,12 +159,12 @@ vec3 scatter_from_part(float turns[SLOTS], int light, ViewRay ray, vec2 lit, vec
     return sum;
 }
 
-vec3 in_scattered(float turns[SLOTS], ViewRay ray, float metres, vec3 sigma) {
+vec3 in_scattered(float weights[SLOTS], ViewRay ray, float metres, vec3 sigma) {
     vec3 sum = vec3(0.0);
     for (int light = 0; light < scatter_light_count; ++light) {
         vec4 ends = lit_parts(light, ray, metres);
         for (int i = 0; i < 3; ++i) {
-            if (ends[i] < ends[i + 1]) { sum += scatter_from_part(turns, light, ray, vec2(ends[i], ends[i + 1]), sigma); }
+            if (ends[i] < ends[i + 1]) { sum += scatter_from_part(weights, light, ray, vec2(ends[i], ends[i + 1]), sigma); }
         }
     }
     return sum;

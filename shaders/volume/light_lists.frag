@@ -26,8 +26,8 @@ MEDIUM behind(Walk walk, float metres_per_axial_depth) {
 #if VARIES
     uvec4 words = uvec4(0u, 0u, 0u, floatBitsToUint(metres_per_axial_depth));
     for (int slot = 0; slot < SLOTS; ++slot) {
-        uint turns = min(uint(slot_turns(walk.winding, slot)), (1u << TURNS_BITS) - 1u);
-        words[slot / TURNS_PER_WORD] |= turns << uint(TURNS_BITS * (slot % TURNS_PER_WORD));
+        uint weight = min(uint(slot_weight(walk.winding, slot)), (1u << TURNS_BITS) - 1u);
+        words[slot / TURNS_PER_WORD] |= weight << uint(TURNS_BITS * (slot % TURNS_PER_WORD));
     }
     return words;
 #else
@@ -45,7 +45,7 @@ void main() {
     Walk walk = walk_from_start(excess, 0.0);
     heads[cell] = list;
     if (contents(walk.winding).count > 0.0) {
-        // The light is inside: a crossing at the start tells so.
+        // The light is inside: a crossing at the start says so.
         uint node = atomicAdd(node_count, 1u);
         nodes[node] = uvec4(0u, list, 0u, 0u);
         light_media[node] = behind(walk, metres_per_axial_depth);

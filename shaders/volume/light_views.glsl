@@ -10,7 +10,7 @@
 layout(std430, binding = LIGHT_HEADS_BINDING) buffer LightHeads { uint light_heads[]; };    // links, view after view
 layout(std430, binding = LIGHT_NODES_BINDING) buffer LightNodes { uvec4 light_nodes[]; };   // word, link to the next, slope of the axial depth
 #if VARIES
-layout(std430, binding = LIGHT_MEDIA_BINDING) buffer LightMedia { uvec4 light_media[]; };   // turns of the slots, metres from axial depth 0 to 1
+layout(std430, binding = LIGHT_MEDIA_BINDING) buffer LightMedia { uvec4 light_media[]; };   // weights of the slots, metres from axial depth 0 to 1
 #else
 layout(std430, binding = LIGHT_MEDIA_BINDING) buffer LightMedia { vec4 light_media[]; };    // extinction behind, metres from axial depth 0 to 1
 #endif
@@ -45,14 +45,14 @@ vec3 part_depth(uint link, LightRay ray, float from, float to) {
     uvec4 words = light_media[link - 1u];
     vec3 extinction = vec3(0.0);
     for (int slot = 0; slot < SLOTS; ++slot) {
-        uint turns = words[slot / TURNS_PER_WORD] >> uint(TURNS_BITS * (slot % TURNS_PER_WORD));
-        float share = float(turns & ((1u << TURNS_BITS) - 1u));
-        if (share > 0.0 && slot_varies(slot)) {
+        uint count = words[slot / TURNS_PER_WORD] >> uint(TURNS_BITS * (slot % TURNS_PER_WORD));
+        float weight = float(count & ((1u << TURNS_BITS) - 1u));
+        if (weight > 0.0 && slot_varies(slot)) {
             vec3 start = position_in_box(slot, point_at(ray, from));
-            share *= mean_density(slot, start, position_in_box(slot, point_at(ray, to)));
+            weight *= mean_density(slot, start, position_in_box(slot, point_at(ray, to)));
         }
         bool stops = (stopping_slots >> slot & 1) != 0;
-        extinction += share * (stops ? vec3(stopping_extinction) : slot_extinction[slot].rgb);
+        extinction += weight * (stops ? vec3(stopping_extinction) : slot_extinction[slot].rgb);
     }
     return extinction * ((to - from) * ray.metres);
 #else
@@ -98,7 +98,7 @@ int cube_face(vec3 from_light) {
 }
 
 // Optical depth from a light to a point within a body, given from the center of the media; w: 0 where an opaque surface
-// is in between. The texel around the point tells it. Only next to a silhouette, where faces curve away within a texel,
+// is in between. The texel around the point decides it. Only next to a silhouette, where faces curve away within a texel,
 // the four texels around the point do, the more so the less steep their faces are.
 vec4 light_depth(int light, vec3 point) {
     vec4 source = light_position[light];
@@ -125,13 +125,13 @@ vec4 light_depth(int light, vec3 point) {
     vec3 sum = vec3(0.0);
     float total = 0.0;
     ivec2 corner = texel - ivec2(lessThan(offset, vec2(0.0)));
-    vec2 share = offset + vec2(texel - corner);
+    vec2 fraction = offset + vec2(texel - corner);
     for (int i = 0; i < 4; ++i) {
         ivec2 aside = ivec2(i & 1, i >> 1);
         uint other = light_cell(cells, corner + aside);
         if (light_heads[other] == 0u) { continue; }
-        depth = texel_light_depth(other, share - vec2(aside), ray);
-        vec2 weights = mix(1.0 - share, share, vec2(aside));
+        depth = texel_light_depth(other, fraction - vec2(aside), ray);
+        vec2 weights = mix(1.0 - fraction, fraction, vec2(aside));
         float weight = (weights.x * weights.y + 1e-4) / (depth.w * depth.w + 1e-9);
         sum += weight * depth.rgb;
         total += weight;

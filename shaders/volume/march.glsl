@@ -1,5 +1,5 @@
 // Ray marching through a segment: a sum over steps of what a source sends from each (Max 1995, section 4). A step from
-// begin to end with its sample at s adds S(s) w e^(-sigma_t (s - begin)), seen through the segment up to its beginning.
+// begin to end with its sample at s adds S(s) w e^(-sigma_t (s - begin)), dimmed by the segment up to its beginning.
 
 #include "volume/in_scatter.glsl"
 #if SCATTERS_AGAIN
@@ -24,7 +24,7 @@ float hashed(uint number) {
 }
 
 // Shares of the segment where a step begins and ends, and where its sample is.
-vec3 step_shares(int i) {
+vec3 step_fractions(int i) {
     float n = float(march_steps);
     if (march_rule == MARCH_GAUSS) {
         float begin = 0.0;
@@ -37,39 +37,39 @@ vec3 step_shares(int i) {
     return vec3(float(i), float(i + 1), float(i) + offset) / n;
 }
 
-// Metres along the segment at a share of it, and how many there are to a share there: equal angles for a point light.
-vec2 metres_at_share(float share, int light, ViewRay ray, float metres) {
+// Metres along the segment at a fraction of it, and their derivative by it there: equal angles for a point light.
+vec2 metres_at_fraction(float fraction, int light, ViewRay ray, float metres) {
     vec4 position = light < 0 ? vec4(0.0) : light_position[light];
-    if (march_rule != MARCH_EQUIANGULAR || position.w == 0.0) { return vec2(share, 1.0) * metres; }
+    if (march_rule != MARCH_EQUIANGULAR || position.w == 0.0) { return vec2(fraction, 1.0) * metres; }
     float closest = dot(position.xyz - ray.start, ray.direction);
     float height = max(length(position.xyz - ray.start - closest * ray.direction), 1e-6 * metres);
     float first = atan(-closest, height);
     float angle = atan(metres - closest, height) - first;
-    float tangent = tan(first + angle * share);
+    float tangent = tan(first + angle * fraction);
     return vec2(clamp(closest + height * tangent, 0.0, metres), angle * height * (1.0 + tangent * tangent));
 }
 
 struct Marched {
-    vec3 color;  // seen from the segment's beginning
+    vec3 color;  // at the segment's beginning
     vec3 depth;
 };
 
 // The steps of one pass: emission and all lights, for variable = -1; or with equal angles one point light, which the first
 // pass then leaves out. before: transmittance from the eye to the segment. Where that of all channels falls below
-// LEAST_SEEN, sources are not looked for: what is left out is at most this share of what comes from there.
-Marched march_pass(float turns[SLOTS], int variable, ViewRay ray, float metres, vec3 sigma, vec3 emission, vec3 before) {
+// LEAST_SEEN, sources are not looked for: what is left out is at most this fraction of what comes from there.
+Marched march_pass(float weights[SLOTS], int variable, ViewRay ray, float metres, vec3 sigma, vec3 emission, vec3 before) {
     Marched sum = Marched(vec3(0.0), vec3(0.0));
     for (int i = 0; i < march_steps; ++i) {
-        vec3 shares = step_shares(i);
-        float begin = metres_at_share(shares.x, variable, ray, metres).x;
-        float end = metres_at_share(shares.y, variable, ray, metres).x;
-        vec2 at = metres_at_share(shares.z, variable, ray, metres);
+        vec3 fractions = step_fractions(i);
+        float begin = metres_at_fraction(fractions.x, variable, ray, metres).x;
+        float end = metres_at_fraction(fractions.y, variable, ray, metres).x;
+        vec2 at = metres_at_fraction(fractions.z, variable, ray, metres);
         vec3 source = emission;
 #if VARIES
-        float here[SLOTS] = turns;
+        float here[SLOTS] = weights;
         sigma = source = vec3(0.0);
         for (int slot = 0; slot < SLOTS; ++slot) {
-            if (turns[slot] > 0.0 && slot_varies(slot)) {
+            if (weights[slot] > 0.0 && slot_varies(slot)) {
                 here[slot] *= density_at(slot, position_in_box(slot, ray.start + at.x * ray.direction));
             }
             sigma += here[slot] * slot_extinction[slot].rgb;
@@ -82,13 +82,13 @@ Marched march_pass(float turns[SLOTS], int variable, ViewRay ray, float metres, 
         }
         vec3 through = transmittance(sum.depth);
 #else
-        float here[SLOTS] = turns;
+        float here[SLOTS] = weights;
         sum.depth = sigma * begin;
         vec3 through = transmittance(sum.depth);
 #endif
         sum.depth += sigma * (end - begin);
-        vec3 seen = through * before;
-        if (max(seen.r, max(seen.g, seen.b)) < LEAST_SEEN) { continue; }
+        vec3 transmitted = through * before;
+        if (max(transmitted.r, max(transmitted.g, transmitted.b)) < LEAST_SEEN) { continue; }
         if (variable >= 0) { source = vec3(0.0); }
         for (int light = 0; light < scatter_light_count; ++light) {
             bool angular = march_rule == MARCH_EQUIANGULAR && light_position[light].w != 0.0;
@@ -99,18 +99,18 @@ Marched march_pass(float turns[SLOTS], int variable, ViewRay ray, float metres, 
         }
         vec3 color = march_rule == MARCH_EXPONENTIAL
             ? emitted_radiance(source, sigma, end - begin)
-            : source * at.y * (shares.y - shares.x) * transmittance(sigma * (at.x - begin));
+            : source * at.y * (fractions.y - fractions.x) * transmittance(sigma * (at.x - begin));
         sum.color += through * color;
     }
     return sum;
 }
 
-Marched marched(float turns[SLOTS], ViewRay ray, float metres, vec3 sigma, vec3 emission, vec3 before) {
+Marched marched(float weights[SLOTS], ViewRay ray, float metres, vec3 sigma, vec3 emission, vec3 before) {
     Marched sum = Marched(vec3(0.0), sigma * metres);
     for (int variable = -1; variable < scatter_light_count; ++variable) {
         bool angular = march_rule == MARCH_EQUIANGULAR && light_position[max(variable, 0)].w != 0.0;
         if (variable >= 0 && !angular) { continue; }
-        Marched pass = march_pass(turns, variable, ray, metres, sigma, emission, before);
+        Marched pass = march_pass(weights, variable, ray, metres, sigma, emission, before);
         sum.color += pass.color;
 #if VARIES
         if (variable < 0) { sum.depth = pass.depth; }

@@ -358,7 +358,7 @@ class Viewport:
             units = {name: i for i, name in enumerate(names)}
             defines = dict(zip(("MODE", "RIGHT", "TONE"), key, strict=True))
             program = build_program(self._gl, "geometry/fullscreen.vert", "present/compare.frag", defines, 330, **units)
-            for name, color in (("empty_color", EMPTY), ("seen_color", SEEN), ("wrong_color", WRONG)):
+            for name, color in (("empty_color", EMPTY), ("valid_color", SEEN), ("wrong_color", WRONG)):
                 if name in program:
                     set_uniform(program, name, tuple(v / 255.0 for v in color))
             self._variants[key] = program, self._gl.vertex_array(program, [])

@@ -197,7 +197,7 @@ class CausticsPass:
         self._spread.draw_fullscreen(program)
         self._shade.bind(photon_spread=job.targets["photon_spread"].color_attachments[0], receiver_base=base)
         shading = self._shade.program()
-        set_uniform(shading, "share", 1.0 / rounds)
+        set_uniform(shading, "photon_weight", 1.0 / rounds)
         into.use()
         add_up(self._gl)
         self._shade.draw_fullscreen(shading)
