@@ -50,7 +50,7 @@ def of_shell(at: Array, k: float, d: float, c: float) -> Array:
 def ball_truth(grid: BodyGrid, absorption: float, scattering: float, ior: float) -> float:
     """Mean fluence for unit flux, of sources as deep as the code has them; without what the exact half-space lacks."""
     interface, d = diffuse_interface(ior), float(diffusion_coefficient(absorption, scattering))
-    extinction, (_, depth), ways = absorption + scattering, grid.below, grid.ways(ior)
+    extinction, (_, depth), ways = absorption + scattering, grid.below, grid.inward_directions(ior)
     found, k, c = np.zeros(len(depth)), math.sqrt(absorption / d), interface.conductance
     slant = depth / interface.mean_cosine
     beyond = np.exp(-extinction * slant)
@@ -242,7 +242,7 @@ def test_lossless_bodies_give_back_what_enters(mesh: tl.Mesh, scattering: float)
     """All that is scattered for the first time in the body: paths that leave it before have a weight of 0."""
     grid, medium = grid_of(mesh, 16), tl.Medium(scattering=scattering, ior=1.5)
     found, interface = lit(grid, medium).fluence[:, 0], diffuse_interface(1.5)
-    slant, ways = grid.below[1] / interface.mean_cosine, grid.ways(1.5)
+    slant, ways = grid.below[1] / interface.mean_cosine, grid.inward_directions(1.5)
     beyond = np.exp(-scattering * slant)
     scattered = 1 - beyond
     for quantiles in tails(len(grid.points)):

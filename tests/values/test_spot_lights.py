@@ -14,7 +14,7 @@ import pytest
 import translucent as tl
 from translucent.diffusion.field import DiffusingBody, lit_body
 from translucent.diffusion.keys import diffusion_key
-from translucent.diffusion.volume import _mean_shares
+from translucent.diffusion.volume import _mean_attenuation
 from translucent.formulas.light import ALL_AROUND, cone_attenuation, light_cone
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.light_cameras import light_cameras
@@ -170,7 +170,7 @@ def test_beams_thinner_than_cells_keep_their_power(outer: float) -> None:
     points = np.stack(np.meshgrid(axis - 4, axis - 4, -axis - 1, indexing="ij"), axis=-1).reshape(-1, 3)
     radius = np.linalg.norm(points - np.asarray(spot.position), axis=1)
     shell = (radius > 1.2) & (radius < 3.0)
-    found = (_mean_shares(spot, points[shell], step) / radius[shell] ** 2).sum() * step**3
+    found = (_mean_attenuation(spot, points[shell], step) / radius[shell] ** 2).sum() * step**3
     if outer == 70:  # some of it passes above the block
         assert found < 4 * np.pi * spot.mean_share * 1.8
     else:

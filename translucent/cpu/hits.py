@@ -178,7 +178,7 @@ class ProjectedObject:
         return np.asarray(self.picture.grid.pixels(self.vertices[:, :2], weight) / weight[:, None])
 
     def interact(self, band: Band, pairs: Iterator[_Pairs]) -> Hits:
-        """Pairs of a pixel and a face in which the ray meets the face, each once, sorted as by `line_hits`."""
+        """Pairs of a pixel and a face in which the ray hits the face, each once, sorted as by `line_hits`."""
         parts = []
         for pixel, face in pairs:
             points = self.picture.points(band, pixel)
@@ -186,13 +186,13 @@ class ProjectedObject:
             parts.append((pixel[keep], face[keep], *found))
         return sorted_hits(parts, -1 if self.body.faces_inwards else 1)
 
-    def boxed_pairs(self, band: Band, wanted: Mask, chosen: Mask | None = None) -> Iterator[_Pairs]:
-        """Candidate pairs of a `wanted` pixel (pixels,) and a face, or a `chosen` one (m,), by the faces' bounding
+    def boxed_pairs(self, band: Band, requested: Mask, chosen: Mask | None = None) -> Iterator[_Pairs]:
+        """Candidate pairs of a `requested` pixel (pixels,) and a face, or a `chosen` one (m,), by the faces' bounding
         boxes.
         """
         face, top, rows, left, columns = self._boxes
-        pixels = np.flatnonzero(wanted)
-        before = np.concatenate([[0], np.cumsum(wanted)])
+        pixels = np.flatnonzero(requested)
+        before = np.concatenate([[0], np.cumsum(requested)])
         start = np.clip(top - band.first_row, 0, band.rows)
         stop = np.clip(top + rows - band.first_row, 0, band.rows)
         keep = before[start * band.width] < before[stop * band.width]
@@ -274,15 +274,15 @@ class Outline:
     change: Array
 
     @classmethod
-    def of(cls, seen: ProjectedObject, edges: Edges) -> Outline:
+    def of(cls, projection: ProjectedObject, edges: Edges) -> Outline:
         """Outline of the object in the picture, without the faces that pass the eye."""
-        a, b, c = seen.projected[seen.body.mesh.faces].transpose(1, 2, 0)
+        a, b, c = projection.projected[projection.body.mesh.faces].transpose(1, 2, 0)
         with np.errstate(under="ignore"):
             clockwise = np.sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).astype(np.int8)
-        clockwise[seen.passing] = 0
+        clockwise[projection.passing] = 0
         net = np.bincount(edges.edge.ravel(), (clockwise[:, None] * edges.turn).ravel(), len(edges.ends))
         chosen = np.flatnonzero(net)
-        first, second = seen.projected[edges.ends[chosen]].transpose(1, 0, 2)
+        first, second = projection.projected[edges.ends[chosen]].transpose(1, 0, 2)
         # Rows count downwards: a face that appears clockwise lies to the right of its sides that go up.
         upwards = second[:, 1] < first[:, 1]
         start, end = np.where(upwards[:, None], (second, first), (first, second))
@@ -325,8 +325,8 @@ class Outline:
         """(k,): where edges are at rows (k,), or at the end that is nearest to there."""
         start, end = self.start[edge], self.end[edge]
         height = end[:, 1] - start[:, 1]
-        share = (np.clip(row, start[:, 1], end[:, 1]) - start[:, 1]) / np.where(height > 0, height, 1.0)
-        return np.asarray(start[:, 0] + share * (end[:, 0] - start[:, 0]))
+        fraction = (np.clip(row, start[:, 1], end[:, 1]) - start[:, 1]) / np.where(height > 0, height, 1.0)
+        return np.asarray(start[:, 0] + fraction * (end[:, 0] - start[:, 0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,8 +355,8 @@ class PixelTracer:
 
     def __init__(self, traced: TracedMesh, body: Object, picture: PictureRays) -> None:
         self.embree = traced.embree
-        self._seen = ProjectedObject(body, picture)
-        self._outline = Outline.of(self._seen, traced.edges)
+        self._projection = ProjectedObject(body, picture)
+        self._outline = Outline.of(self._projection, traced.edges)
         self._eye, self._axes = _camera_in_ball(traced.embree, body, picture.camera)
 
     def hits(self, band: Band) -> Hits:
@@ -365,7 +365,7 @@ class PixelTracer:
         if not incomplete.any():
             return found
         # Where the proof fails, every face that may cover the pixel is tried.
-        rest = self._seen.interact(band, self._seen.boxed_pairs(band, incomplete))
+        rest = self._projection.interact(band, self._projection.boxed_pairs(band, incomplete))
         both = joined_hits([found.where(~incomplete[found.pixel]), rest])
         return both.where(np.argsort(both.pixel, kind="stable"))
 
@@ -373,23 +373,25 @@ class PixelTracer:
         """Hits that Embree finds, decided in float64, and (pixels,): rays whose hits are not proved complete."""
         expected, incomplete = self._outline.counts(band)
         pixel = np.flatnonzero((expected > 0) & ~incomplete)
-        passing = self._seen.passing
+        passing = self._projection.passing
         ray, face = self.embree.candidates(*self.rays(band, pixel), expected[pixel], ~passing)
         pairs = _sliced(pixel[ray], face)
-        if self._seen.any_passing:
+        if self._projection.any_passing:
             # These are not expected, for they have no outline; there are few of them, and all are tried.
             proper = ~passing[face]
             everywhere = np.ones(band.pixels, dtype=bool)
-            pairs = chain(_sliced(pixel[ray[proper]], face[proper]), self._seen.boxed_pairs(band, everywhere, passing))
-        hits = self._seen.interact(band, pairs)
+            pairs = chain(
+                _sliced(pixel[ray[proper]], face[proper]), self._projection.boxed_pairs(band, everywhere, passing)
+            )
+        hits = self._projection.interact(band, pairs)
         found = np.bincount(hits.pixel[~passing[hits.face]], minlength=band.pixels)
         return hits, incomplete | (found != expected)
 
     def rays(self, band: Band, pixel: Integers) -> tuple[Array, Array]:
         """Origins and unit directions (k, 3) of the rays of pixels (k,), in the ball of `RayCaster`."""
-        points = self._seen.picture.points(band, pixel)
+        points = self._projection.picture.points(band, pixel)
         across = points[:, :1] * self._axes[0] + points[:, 1:] * self._axes[1]
-        if self._seen.picture.perspective:
+        if self._projection.picture.perspective:
             origins, directions = np.broadcast_to(self._eye, across.shape), across + self._axes[2]
         else:
             origins, directions = self._eye + across, np.broadcast_to(self._axes[2], across.shape)

@@ -39,8 +39,9 @@ class MicrofacetSamples:
     ----------
     samples : int
     blurred : float
-        Share of the variance of microfacets that is left to the blur of the environment: few samples would show noise,
-        and many need no blur (as in Krivanek & Colbert 2008, "Real-time shading with filtered importance sampling").
+        Fraction of the variance of microfacets that is left to the blur of the environment: few samples would show
+        noise, and many need no blur (as in Krivanek & Colbert 2008, "Real-time shading with filtered importance
+        sampling").
     """
 
     def __init__(self, number: int, samples: int) -> None:
@@ -79,7 +80,7 @@ def _hashed(key: npt.NDArray[np.uint32]) -> Array:
     return key.astype(np.float64) * 2.0**-32
 
 
-#: Share of light below which a microfacet counts as blocked.
+#: Fraction of light below which a microfacet counts as blocked.
 LEAST_LET_OUT = 1e-6
 
 
@@ -170,8 +171,8 @@ def interact(
     lobes = below_coat(lobes, coat)
     alike = coat_roughness**2 == alpha
     blurred = (1.0 if spread is None else spread.blurred) * alpha * alpha
-    # A facet turns a reflected image by twice its angle, which a ray that leaves magnifies; refraction, seen from
-    # outside, turns it by n - 1 times that.
+    # A facet rotates a reflected image by twice its angle, which a ray that leaves magnifies; refraction, from
+    # outside, rotates it by n - 1 times that.
     wide = np.where(at.ior < 1.0, 1.0 / at.ior, 1.0)
     narrow = 0.5 * (np.maximum(at.ior, 1.0 / at.ior) - 1.0)
     return BranchInteractions(
@@ -195,18 +196,18 @@ def interact(
 def _at_facets(at: Interaction, facets: Array, alpha: Array) -> tuple[Array, Array]:
     """Microfacets (k, 3) whose light is not masked, and the fraction (k,) that they reflect.
 
-    Light that other microfacets would block leaves by the other branch: each has the part of Fresnel's share that
-    Smith's masking lets out (Heitz 2014, eq. 43), and together they have all. Where nothing is let out, the surface
-    itself takes the place of the microfacet.
+    Light that other microfacets would block leaves by the other branch: each has the part of the Fresnel reflectance
+    that Smith's masking lets out (Heitz 2014, eq. 43), and together they have all. Where nothing is let out, the
+    surface itself takes the place of the microfacet.
     """
-    share = optics.fresnel_dielectric(at.cosine(facets), at.ior)
-    back = _let_out(dot(reflected_direction(at.direction, facets), at.normal), alpha) * share
-    on = _let_out(-dot(refracted_direction(at.direction, facets, at.ior), at.normal), alpha) * (1.0 - share)
+    fresnel = optics.fresnel_dielectric(at.cosine(facets), at.ior)
+    back = _let_out(dot(reflected_direction(at.direction, facets), at.normal), alpha) * fresnel
+    on = _let_out(-dot(refracted_direction(at.direction, facets, at.ior), at.normal), alpha) * (1.0 - fresnel)
     both = back + on
     blocked = both <= LEAST_LET_OUT
     smooth = optics.fresnel_dielectric(at.cosine(at.normal), at.ior)
-    share = np.where(blocked, smooth, back / np.where(blocked, 1.0, both))
-    return np.where(blocked[:, None], at.normal, facets), share
+    fraction = np.where(blocked, smooth, back / np.where(blocked, 1.0, both))
+    return np.where(blocked[:, None], at.normal, facets), fraction
 
 
 def _let_out(cosine: Array, alpha: Array) -> Array:
@@ -250,15 +251,15 @@ class InterfaceLight:
         return radiance
 
     def _add_diffuse(self, radiance: Array, rays: Rays, found: BranchInteractions) -> None:
-        share = found.transmittance * (1.0 - self.table.transmission[found.item, None])
-        diffuse = np.flatnonzero((share > 0.0).any(axis=1))
+        weight = found.transmittance * (1.0 - self.table.transmission[found.item, None])
+        diffuse = np.flatnonzero((weight > 0.0).any(axis=1))
         item, points, normals = found.item[diffuse], rays.origins[diffuse], found.at.normal[diffuse]
         through = self._through[item]
         front, back = (self.light.on_interfaces(points, side * normals) for side in (1.0, -1.0))
         with np.errstate(under="ignore"):
             behind = through[:, None] * self._through_color[item]
             color = self.table.color[item]
-            radiance[diffuse] += share[diffuse] * diffuse_radiance(front, back, color, behind, through)
+            radiance[diffuse] += weight[diffuse] * diffuse_radiance(front, back, color, behind, through)
 
     def _add_highlights(
         self, radiance: Array, rays: Rays, at: Interaction, chosen: Integers, alpha: Array, below: Array | None
@@ -283,14 +284,14 @@ class InterfaceLight:
                 found = highlight_from(to_light, disc, image, alpha, np.maximum(cos_view, 1e-3))
                 reflected_at, peak = found[:, :3], found[:, 3]
             half = unit(to_eye + reflected_at)
-            cos_half, cos_light = (np.clip(dot(at.normal, way), 0.0, 1.0) for way in (half, to_light))
+            cos_half, cos_light = (np.clip(dot(at.normal, direction), 0.0, 1.0) for direction in (half, to_light))
             cos_facet = at.cosine(half)
             if below is None:
-                share = (at.coat * optics.fresnel_dielectric(cos_facet, CLEARCOAT_IOR))[:, None] * np.ones(3)
+                reflectance = (at.coat * optics.fresnel_dielectric(cos_facet, CLEARCOAT_IOR))[:, None] * np.ones(3)
             else:
-                share = below * at.lobes(optics.fresnel_dielectric(cos_facet, at.ior), cos_facet)[0].reflection
+                reflectance = below * at.lobes(optics.fresnel_dielectric(cos_facet, at.ior), cos_facet)[0].reflection
             value = microfacet_value(cos_half, cos_light, at.cosine(at.normal), alpha) * peak
             with np.errstate(under="ignore"):
-                reflected = share * value[:, None] * light.irradiance_on(points, at.normal)
+                reflected = reflectance * value[:, None] * light.irradiance_on(points, at.normal)
                 lit = np.flatnonzero(reflected.any(axis=1))
                 radiance[chosen[lit]] += reflected[lit] * self.light.to_interfaces(light, points[lit])

@@ -126,7 +126,7 @@ class Branches:
     origins, directions : (n, 3) float64
         In radii of the scene from its center, and of unit length.
     throughput : (n, 3) float64
-        Share of the light that reaches the eye.
+        Fraction of the light that reaches the eye.
     owner : (n,) int64
         Ray of the picture that it is a part of.
     interior : (n, MOST) int16
@@ -144,7 +144,7 @@ class Branches:
     footprint : (n, 2, 2, 3) float64
         Differentials of origins and of directions; (n, 0, 2, 3) where nothing is averaged over footprints.
     diffused : (n, 3) float64
-        Basic radiance along it of light that has diffused in the body where it begins, if all was scattered on the way.
+        Basic radiance along it of light that has diffused in the body where it begins, if all was scattered there.
     """
 
     origins: Array

@@ -83,11 +83,11 @@ class SegmentMedia:
         )
         return self._composited(rays, intervals, [_no_hits()] * len(self.films), (None,) * len(self.films))
 
-    def through_films(self, rays: Rays, item: Integers, seen: Hits) -> tuple[Array, Array]:
+    def through_films(self, rays: Rays, item: Integers, film_hits: Hits) -> tuple[Array, Array]:
         """Emitted radiance and transmittance (k, 3) of sheets, item (k,), at the origins of rays; a hit on each."""
         hits = [_no_hits()] * len(self.films)
         for i in np.unique(item):
-            hits[i] = seen.where(item == i)
+            hits[i] = film_hits.where(item == i)
         none = np.empty(0, np.int64)
         return self._composited(rays, Intervals(none, np.empty(0), np.empty(0), none, none), hits, self.films)
 
@@ -189,7 +189,7 @@ class RayTree:
     aspect : float
         Width of the picture divided by its height.
     depth : int
-        Interfaces that a path meets, at most.
+        Interfaces that a path crosses, at most.
     forks : int
         How often a path takes the weaker branch, at most.
     diffused : DiffusedLight
@@ -222,7 +222,7 @@ class RayTree:
         ----------
         rays : Rays
         hits : sequence of Hits
-            Of each object, as `line_hits` gives them: those behind the origins tell what these are inside.
+            Of each object, as `line_hits` gives them: those behind the origins decide which bodies these are inside.
         pixel : (n,) int64
             Each takes other points of `spread`.
         spread : Spread, optional
@@ -281,9 +281,9 @@ class _Growth:
 
     def _pixel_footprints(self, directions: Array) -> Array:
         """Footprints of rays of the camera; none where the environment is smooth, no picture."""
-        seen = self.scene.environment.map is not None
+        has_map = self.scene.environment.map is not None
         samples = 1 if self.spread is None else self.spread.samples
-        return first_footprints(self.scene.camera, directions, seen * self.tree.pixel, samples, self.caster.radius)
+        return first_footprints(self.scene.camera, directions, has_map * self.tree.pixel, samples, self.caster.radius)
 
     def _interior_lists(self, hits: Sequence[Hits], count: int) -> InteriorList:
         """Interior lists of rays at their origins, from all surfaces behind these."""
@@ -322,11 +322,11 @@ class _Growth:
         self._look_up(branches.where(free))
         open_ended = branches.interior[free, 0] != NOTHING
         self.found.valid[branches.owner[free][open_ended]] = False
-        met = np.flatnonzero(~free)
-        face = np.where(distance[met] <= place[met, None] + TOGETHER, face[met], -1)
-        branches = self._through_media(branches.where(met), place[met])
-        points = branches.origins + place[met, None] * branches.directions
-        footprint = moved_on(branches.footprint, place[met])
+        hit = np.flatnonzero(~free)
+        face = np.where(distance[hit] <= place[hit, None] + TOGETHER, face[hit], -1)
+        branches = self._through_media(branches.where(hit), place[hit])
+        points = branches.origins + place[hit, None] * branches.directions
+        footprint = moved_on(branches.footprint, place[hit])
         return self._at_surfaces(replace(branches, origins=points, last=face, footprint=footprint))
 
     def _correct(self, branches: Branches, face: Integers, distance: Array) -> None:
@@ -390,7 +390,7 @@ class _Growth:
         opaque = self.table.is_opaque[item]
         stopped = np.asarray(opaque.any(axis=1))
         if stopped.any():
-            # Whether a ray is rightly in an open body, what is behind the opaque object would tell.
+            # Only surfaces behind the opaque object would show that a ray is rightly in an open body.
             astray = self.is_open[branches.interior[stopped]].any(axis=1)
             self.found.valid[branches.owner[stopped][astray]] = False
             self._end(branches.where(stopped), item[stopped], opaque[stopped].argmax(axis=1))
@@ -404,13 +404,16 @@ class _Growth:
         changed = self.table.alters_light(before, after, self.channel)
         changed |= (before != after) & self.tree.diffused.leaves(before, after)
         column, sheet = self.table.interfaces(item, before, after, changed, self.table.is_wall)
-        met = np.flatnonzero(changed | sheet)
+        interacting = np.flatnonzero(changed | sheet)
         places = InterfaceHits(
-            item[met, column[met]], branches.last[met, column[met]], before[met], np.where(sheet, before, after)[met]
+            item[interacting, column[interacting]],
+            branches.last[interacting, column[interacting]],
+            before[interacting],
+            np.where(sheet, before, after)[interacting],
         )
         onwards = np.flatnonzero(~changed & ~sheet)
         straight = replace(branches.where(onwards), interior=interior[onwards])
-        return joined([straight, *self._branches(branches.where(met), interior[met], places)])
+        return joined([straight, *self._branches(branches.where(interacting), interior[interacting], places)])
 
     def _through_films(self, branches: Branches, item: Integers) -> Branches:
         """Attenuate branches by sheets without an interface, and add the radiance of these."""
@@ -420,9 +423,9 @@ class _Growth:
             face, ray = own.last[:, column], np.arange(len(own))
             sign = np.where(self._enters(face, own.directions), 1, -1).astype(np.int8)
             weights = self.caster.barycentric(face, own.origins)
-            seen = Hits(ray, np.zeros(len(own)), sign, self.caster.faces.number[face], weights)
-            shown, passed = self.segments.through_films(self._rays(own), item[chosen, column], seen)
-            self._add(own, shown)
+            film_hits = Hits(ray, np.zeros(len(own)), sign, self.caster.faces.number[face], weights)
+            emitted, passed = self.segments.through_films(self._rays(own), item[chosen, column], film_hits)
+            self._add(own, emitted)
             throughput = branches.throughput.copy()
             with np.errstate(under="ignore"):
                 throughput[chosen] *= passed
@@ -438,8 +441,10 @@ class _Growth:
         branches = replace(branches, depth=branches.depth + 1)
         back, on = self._both(branches, there, found)
         if branches.footprint.size:
-            ways = split_footprints(self.caster, branches, places, found)
-            back, on = (replace(branch, footprint=way) for branch, way in zip((back, on), ways, strict=True))
+            footprints = split_footprints(self.caster, branches, places, found)
+            back, on = (
+                replace(branch, footprint=footprint) for branch, footprint in zip((back, on), footprints, strict=True)
+            )
         if self.tree.diffused:
             back, on = (self._from_inside(branch, found.at.normal) for branch in (back, on))
         brightness = largest(back.throughput), largest(on.throughput)
@@ -469,23 +474,23 @@ class _Growth:
         coated = np.flatnonzero(found.coated)
         if coated.size:
             own = branches.where(coated)
-            ways = reflected_direction(own.directions, found.at.normal[coated])
-            mirrored = self.tree.surroundings.blurred(own, ways, found.coat_roughness[coated])
+            directions = reflected_direction(own.directions, found.at.normal[coated])
+            mirrored = self.tree.surroundings.blurred(own, directions, found.coat_roughness[coated])
             self._add(own, found.coated[coated, None] * mirrored)
 
     def _both(self, branches: Branches, there: InteriorList, found: BranchInteractions) -> tuple[Branches, Branches]:
         """Reflected and refracted branches at interfaces, those of sheets included; some carry no light."""
         with np.errstate(under="ignore"):
             back, on = branches.throughput * found.reflectance, branches.throughput * found.passing
-        ways = found.reflected.copy()
+        reflected_directions = found.reflected.copy()
         # A path that ends under total reflection is taken to leave straight on: of all that it might see, this is
         # nearest to the truth.
         trapped = (branches.depth >= self.tree.depth) & (largest(found.transmittance) == 0.0) & ~found.at.thin_walled
-        ways[trapped] = branches.directions[trapped]
+        reflected_directions[trapped] = branches.directions[trapped]
         mirrored = np.ones(len(branches), dtype=bool)
         reflected = replace(
             branches,
-            directions=unit(ways),
+            directions=unit(reflected_directions),
             throughput=back,
             reflected=mirrored,
             blur=branches.blur + found.blur_reflected,

@@ -29,7 +29,7 @@ from translucent.reference.render import shade_hits
 from translucent.reference.surfaces import sheet_thicknesses
 from translucent.scene.scene import Light, Scene
 
-#: Number of faces of one object on a line after which Embree is not asked for more.
+#: Number of faces of one object on a line after which Embree looks for no more.
 MOST_FACES = 64
 
 
@@ -75,8 +75,8 @@ class _EmbreeObject(TracedObject):
         end_if_stopped()
         line, face = self._candidates(lines)
         hits = self.crossings(lines, [(line, face)])
-        tried, met = (np.bincount(pixel, minlength=len(lines)) for pixel in (line, hits.pixel))
-        doubtful = (tried != met) | (tried >= MOST_FACES)
+        tried, crossed = (np.bincount(pixel, minlength=len(lines)) for pixel in (line, hits.pixel))
+        doubtful = (tried != crossed) | (tried >= MOST_FACES)
         filled = self.body.medium is not None and self.body.sheet_thickness is None
         if filled or self.body.mesh.diagnosis.solid:
             doubtful |= sum_signs(hits, len(lines)) != 0
@@ -108,7 +108,7 @@ GATHERED = 64
 #: Largest height of a photon over the plane of the point, in radii of its disc.
 FLAT = 0.2
 
-#: Least radius of a disc, as a share of the scene's diagonal.
+#: Least radius of a disc, as a fraction of the scene's diagonal.
 LEAST_RADIUS = 1e-4
 
 #: Factor between the largest and the smallest radius of discs that are looked for together.
@@ -128,7 +128,7 @@ class CausticLight(SurfaceLight):
     Parameters
     ----------
     scene : Scene
-        As shown, with its eye as the origin of points.
+        As rendered, with its eye as the origin of points.
     sheets, meshes
         As `EmbreeLightPaths` takes them.
     caustics : Caustics
@@ -172,7 +172,7 @@ class _Discs:
     """Photons with discs of about the same size: points from the eye, directions, power (n, 3) and radii (n,)."""
 
     points: Array
-    ways: Array
+    directions: Array
     power: Array
     radius: Array
 
@@ -185,17 +185,17 @@ class _Discs:
         near = places.sparse_distance_matrix(self._tree, float(self.radius.max()), output_type="ndarray")
         place, photon, distance = near["i"], near["j"], near["v"] / self.radius[near["j"]]
         height = ((self.points[photon] - places.data[place]) * normals[place]).sum(axis=1)
-        seen = (distance < 1.0) & (np.abs(height) < FLAT * self.radius[photon])
-        seen &= (self.ways[photon] * normals[place]).sum(axis=1) < 0.0
-        place, photon, distance = place[seen], photon[seen], distance[seen]
+        reached = (distance < 1.0) & (np.abs(height) < FLAT * self.radius[photon])
+        reached &= (self.directions[photon] * normals[place]).sum(axis=1) < 0.0
+        place, photon, distance = place[reached], photon[reached], distance[reached]
         with np.errstate(under="ignore"):
             # Those near the edge count less (Epanechnikov), so that no photon comes or goes at once.
-            share = 2.0 * (1.0 - distance**2) / (np.pi * self.radius[photon] ** 2)
-            light = share[:, None] * self.power[photon]
+            kernel = 2.0 * (1.0 - distance**2) / (np.pi * self.radius[photon] ** 2)
+            light = kernel[:, None] * self.power[photon]
             return np.stack([np.bincount(place, light[:, channel], len(normals)) for channel in range(3)], axis=1)
 
 
-def _discs(points: Array, ways: Array, power: Array, scene: Scene) -> list[_Discs]:
+def _discs(points: Array, directions: Array, power: Array, scene: Scene) -> list[_Discs]:
     """Discs of photons by their size."""
     if not len(points):
         return []
@@ -204,7 +204,7 @@ def _discs(points: Array, ways: Array, power: Array, scene: Scene) -> list[_Disc
     radius = np.maximum(radius, LEAST_RADIUS * scene.diagonal)
     size = np.floor(np.log(radius) / np.log(TOGETHER))
     kinds = [np.flatnonzero(size == one) for one in np.unique(size)]
-    return [_Discs(points[own], ways[own], power[own], radius[own]) for own in kinds]
+    return [_Discs(points[own], directions[own], power[own], radius[own]) for own in kinds]
 
 
 def _landed(scene: Scene, caustics: Caustics) -> tuple[Array, Array, Array]:
@@ -216,8 +216,8 @@ def _landed(scene: Scene, caustics: Caustics) -> tuple[Array, Array, Array]:
         with np.errstate(under="ignore"):
             left = ends.power * optics.transmittance(ends.extinction * ends.length[:, None])
         parts.append(np.stack([points, ends.directions, left]))
-    points, ways, power = np.concatenate(parts, axis=1)
-    return points, ways, power
+    points, directions, power = np.concatenate(parts, axis=1)
+    return points, directions, power
 
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -227,7 +227,7 @@ Sheets = tuple[float | None, ...]
 SURFACES = 1 << 21
 
 #: Arrays that an invalid pixel takes from the fallback; its validity and coverage are known already.
-SHOWN = ("radiance", "transmittance", "optical_depth", "thickness")
+RENDERED_IMAGES = ("radiance", "transmittance", "optical_depth", "thickness")
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,6 +288,6 @@ class Shader:
         if self.fallback is not None and invalid.size:
             lines = [line.on_rays(invalid, len(rays)) for line in hits]
             again = shade_hits(self.scene, rays.where(invalid), lines, self.fallback, self.light)
-            for name in SHOWN:
+            for name in RENDERED_IMAGES:
                 shaded[name][invalid] = again[name]
         return shaded

@@ -50,15 +50,15 @@ def split_footprints(
     """Footprints of the reflected and the refracted branches at interfaces."""
     directions, normals, incident = branches.directions, found.at.normal, branches.footprint[:, 1]
     points = onto_planes(branches.footprint[:, 0], directions, caster.faces.outward[places.face])
-    turns = normal_differentials(caster, places.face, branches.origins, points, normals)
-    mirrored = reflected_differentials(incident, turns, directions, normals)
-    refracted = refracted_differentials(incident, turns, directions, normals, found.at.ior)
+    normal_changes = normal_differentials(caster, places.face, branches.origins, points, normals)
+    mirrored = reflected_differentials(incident, normal_changes, directions, normals)
+    refracted = refracted_differentials(incident, normal_changes, directions, normals, found.at.ior)
     refracted = np.where(found.at.thin_walled[:, None, None], incident, refracted)
     return np.stack([points, mirrored], axis=1), np.stack([points, refracted], axis=1)
 
 
 def onto_planes(points: Array, directions: Array, flat: Array) -> Array:
-    """Differentials of points where the neighbors of branches meet the planes of faces with unit normals (k, 3)."""
+    """Differentials of points where the neighbors of branches cross the planes of faces with unit normals (k, 3)."""
     across = dot(flat, directions)
     least = np.where(across < 0.0, np.minimum(across, -LEAST_ACROSS), np.maximum(across, LEAST_ACROSS))
     return np.asarray(points - _outer(directions, _along(points, flat) / least[:, None]))
@@ -84,22 +84,26 @@ def normal_differentials(
         return np.asarray(turned[:, None, None] * (change - _outer(smooth, _along(change, smooth))))
 
 
-def reflected_differentials(incident: Array, turns: Array, directions: Array, normals: Array) -> Array:
-    """Differentials of mirrored directions; `turns` (k, 2, 3) are those of the normals."""
-    cosines = _along(incident, normals) + _along(turns, directions)
+def reflected_differentials(incident: Array, normal_changes: Array, directions: Array, normals: Array) -> Array:
+    """Differentials of mirrored directions; `normal_changes` (k, 2, 3) are those of the normals."""
+    cosines = _along(incident, normals) + _along(normal_changes, directions)
     facing = dot(directions, normals)[:, None, None]
-    return bounded(incident - 2.0 * (facing * turns + _outer(normals, cosines)))
+    return bounded(incident - 2.0 * (facing * normal_changes + _outer(normals, cosines)))
 
 
-def refracted_differentials(incident: Array, turns: Array, directions: Array, normals: Array, ior: Array) -> Array:
+def refracted_differentials(
+    incident: Array, normal_changes: Array, directions: Array, normals: Array, ior: Array
+) -> Array:
     """Differentials of refracted directions; 0 under total internal reflection."""
     cosine = -dot(directions, normals)
     inside = 1.0 - (1.0 - cosine * cosine) / (ior * ior)
     passed = inside > 0.0
     inside = np.maximum(np.sqrt(np.maximum(inside, 0.0)), LEAST_ACROSS)
-    cosines = -(_along(incident, normals) + _along(turns, directions))
+    cosines = -(_along(incident, normals) + _along(normal_changes, directions))
     along = (1.0 / ior - cosine / (ior * ior * inside))[:, None] * cosines
-    found = incident / ior[:, None, None] + (cosine / ior - inside)[:, None, None] * turns + _outer(normals, along)
+    found = (
+        incident / ior[:, None, None] + (cosine / ior - inside)[:, None, None] * normal_changes + _outer(normals, along)
+    )
     return np.where(passed[:, None, None], bounded(found), 0.0)
 
 
@@ -124,9 +128,9 @@ def _along(differentials: Array, vectors: Array) -> Array:
     return np.asarray(np.einsum("kij,kj->ki", differentials, vectors))
 
 
-def _outer(vectors: Array, shares: Array) -> Array:
+def _outer(vectors: Array, factors: Array) -> Array:
     """(k, 2, 3): the products of vectors (k, 3) with two numbers each (k, 2)."""
-    return np.asarray(vectors[:, None, :] * shares[..., None])
+    return np.asarray(vectors[:, None, :] * factors[..., None])
 
 
 class Surroundings:
@@ -150,16 +154,16 @@ class Surroundings:
     def radiance(self, branches: Branches, rays: Rays) -> Array:
         """(n, 3): radiance along branches that leave the scene; `rays` are the same in metres from the eye.
 
-        `Rays.backdrop` is where rays that have met no interface are in the picture.
+        `Rays.backdrop` is where rays that have hit no interface are in the picture.
         """
         environment = self.environment
         if environment.seen is environment and environment.kind != "checkerboard":
             return self._light(environment, branches)
-        seen = self._background(environment.seen, branches, rays)
+        radiance = self._background(environment.seen, branches, rays)
         mirrored = np.flatnonzero(branches.reflected)
         if mirrored.size:
-            seen[mirrored] = self._light(environment, branches.where(mirrored))
-        return seen
+            radiance[mirrored] = self._light(environment, branches.where(mirrored))
+        return radiance
 
     def blurred(self, branches: Branches, directions: Array, roughness: float | Array) -> Array:
         """(n, 3): light of the environment in directions (n, 3), as mirrors of a roughness (n,) would blur it."""
@@ -188,7 +192,7 @@ class Surroundings:
         breadth = np.maximum(breadth, longer / lookups)
         with np.errstate(under="ignore"):
             roughness = np.minimum(branches.blur + (ALPHA_OF_DEVIATION * breadth) ** 2, 1.0) ** 0.25
-            # Between the map as it is and the first that is blurred, shares are of the variance.
+            # Between the map as it is and the first that is blurred, fractions are of the variance.
             sharpest = 1.0 / len(self._maps.levels)
             narrow = (branches.blur == 0.0) & (roughness < sharpest)
             roughness = np.where(narrow, sharpest * (roughness / sharpest) ** 4, roughness)
@@ -197,16 +201,16 @@ class Surroundings:
         along = (np.arange(len(own)) - first[own] + 0.5) / lookups[own] - 0.5
         aside = np.sqrt(12.0) * along[:, None] * axis[own]
         uv = equirectangular_uv(branches.directions[own] + aside, environment.turn)
-        seen = np.add.reduceat(blurred_lookups(self._maps, uv, roughness[own]), first)
-        return environment.scale * seen / lookups[:, None]
+        averages = np.add.reduceat(blurred_lookups(self._maps, uv, roughness[own]), first)
+        return environment.scale * averages / lookups[:, None]
 
-    def _background(self, seen: Environment, branches: Branches, rays: Rays) -> Array:
-        if seen.kind != "checkerboard":
-            return self._light(seen, branches)
+    def _background(self, visible: Environment, branches: Branches, rays: Rays) -> Array:
+        if visible.kind != "checkerboard":
+            return self._light(visible, branches)
         place, ahead = places_on_backdrop(self.scene, self.aspect, rays)
         bent = branches.depth > 0
-        found = seen.radiance(rays.directions, np.where(bent[:, None], place, rays.backdrop))
-        found[bent & ~ahead] = seen.mean
+        found = visible.radiance(rays.directions, np.where(bent[:, None], place, rays.backdrop))
+        found[bent & ~ahead] = visible.mean
         return found
 
 
@@ -214,9 +218,9 @@ def blurred_lookups(maps: FilteredEnvironment, uv: Array, roughness: Array) -> A
     """(n, 3): lookups in prefiltered maps at (n, 2) for roughnesses (n,) from 0 to 1, linear between maps."""
     level = roughness * len(maps.levels)
     below = np.minimum(level.astype(np.int64), len(maps.levels) - 1)
-    share = (level - below)[:, None]
-    found = share * bilinear(maps.levels, below, uv)
+    fraction = (level - below)[:, None]
+    found = fraction * bilinear(maps.levels, below, uv)
     sharp, rough = np.flatnonzero(below == 0), np.flatnonzero(below > 0)
-    found[sharp] += (1.0 - share[sharp]) * maps.sharp.at(uv[sharp])
-    found[rough] += (1.0 - share[rough]) * bilinear(maps.levels, below[rough] - 1, uv[rough])
+    found[sharp] += (1.0 - fraction[sharp]) * maps.sharp.at(uv[sharp])
+    found[rough] += (1.0 - fraction[rough]) * bilinear(maps.levels, below[rough] - 1, uv[rough])
     return np.asarray(found)

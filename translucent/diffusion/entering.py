@@ -31,14 +31,14 @@ MOST_FACES = 64
 
 
 def dimming_bodies(scene: Scene, body: int) -> list[Object]:
-    """Other closed bodies that absorb or scatter light on its way to a body."""
+    """Other closed bodies that absorb or scatter light on its path to a body."""
     return [item for i, item in enumerate(scene.objects) if i != body and may_dim(item) and item.mesh.diagnosis.solid]
 
 
 def light_passed(bodies: Sequence[Object], points: Array, directions: Array, distance: Array) -> Array:
     """Transmittance (k, 3) from points (k, 3) in unit directions (k, 3) over distances (k,) in metres, or inf.
 
-    As in shadows, interfaces neither bend the way nor take of its light, and where bodies overlap their optical depths
+    As in shadows, interfaces neither refract nor reflect the light, and where bodies overlap their optical depths
     add up.
     """
     depth = np.zeros((len(points), 3))
@@ -48,17 +48,17 @@ def light_passed(bodies: Sequence[Object], points: Array, directions: Array, dis
     return optics.transmittance(depth)
 
 
-def sky_paths(body: Object, points: Array, directions: Array, seen: Mask) -> sparse.csr_array:
-    """(s, k): metres in another body from points (s, 3) in unit directions (k, 3) that are `seen`."""
+def sky_paths(body: Object, points: Array, directions: Array, visible: Mask) -> sparse.csr_array:
+    """(s, k): metres in another body from points (s, 3) in unit directions (k, 3) that are `visible`."""
     center, radius = _bounding_ball(body)
     towards = center - points
     along = towards @ directions.T
     near = (towards**2).sum(axis=1)[:, None] - along**2 <= radius**2
     within = (towards**2).sum(axis=1) <= radius**2
-    sample, direction = np.nonzero(seen & near & ((along > 0.0) | within[:, None]))
+    sample, direction = np.nonzero(visible & near & ((along > 0.0) | within[:, None]))
     metres = path_inside(body, points[sample], directions[direction], np.full(len(sample), np.inf))
     crossed = metres > 0.0
-    return sparse.csr_array((metres[crossed], (sample[crossed], direction[crossed])), seen.shape)
+    return sparse.csr_array((metres[crossed], (sample[crossed], direction[crossed])), visible.shape)
 
 
 def _bounding_ball(body: Object) -> tuple[Array, float]:
@@ -73,8 +73,8 @@ def path_inside(body: Object, points: Array, directions: Array, distance: Array)
     mesh = body.mesh
     caster = ray_caster_of(mesh)
     into = np.linalg.inv(body.matrix[:3, :3])
-    origins, ways = (points - body.matrix[:3, 3]) @ into.T, directions @ into.T
-    unit = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    origins, local_directions = (points - body.matrix[:3, 3]) @ into.T, directions @ into.T
+    unit = local_directions / np.linalg.norm(local_directions, axis=1, keepdims=True)
     line, face = caster.candidates(
         (origins - caster.center) / caster.radius,
         unit,
@@ -83,7 +83,7 @@ def path_inside(body: Object, points: Array, directions: Array, distance: Array)
     )
     first, second, third = (mesh.vertices[mesh.faces[face, corner]] for corner in range(3))
     normal = np.cross(second - first, third - first)
-    slope = (ways[line] * normal).sum(axis=1)
+    slope = (local_directions[line] * normal).sum(axis=1)
     reached = ((first - origins[line]) * normal).sum(axis=1) / np.where(slope == 0.0, np.inf, slope)
     ahead = reached > 0.0
     # Inside a body as often as faces ahead are exits, less entries; each that is passed changes that.
@@ -98,20 +98,20 @@ DIRECTIONS = 128
 #: Rows of the map whose texels are shared out among these directions.
 MAP_HEIGHT = 96
 
-#: Start of shadow rays before the surface, as a share of a cell.
+#: Start of shadow rays before the surface, as a fraction of a cell.
 BEFORE = 1e-4
 
 #: Least height of a light above the samples that it lights, in radii of the area of each, and how far to the side that
 #: counts, in such heights. The first is about a cell: the samples then find its light within a tenth (sd 3 %).
 _WIDTH, _REACH = 3.0, 3.0
-#: What is more times as bright as all that a place sees of the environment, on the average, goes its own way inside:
-#: light of windows and soft boxes does, and that of a smooth sky enters as uniform light.
+#: Radiance, in units of the mean over the visible environment, above which light has a direction of its own inside:
+#: light of windows and soft boxes has one, and that of a smooth sky enters as uniform light.
 BRIGHT = 2.0
 
 #: Rays of each sample that carry such light.
 SKY_RAYS = 4
 
-#: Bounds of the correction by which a quadrature over directions gives the known share of uniform light.
+#: Bounds of the correction by which a quadrature over directions gives the known fraction of uniform light.
 _CORRECTION = (0.5, 2.0)
 
 
@@ -131,7 +131,7 @@ class Occluders:
     opaque: RayCaster | None = None
 
     def nearest(self, origins: Array, directions: Array) -> tuple[Array, Array]:
-        """Distance in metres at which rays (k, 3), (k, 3) meet the body, and at which anything opaque; inf for none."""
+        """Distance in metres at which rays (k, 3), (k, 3) hit the body, and at which anything opaque; inf for none."""
         into = np.linalg.inv(self.body.matrix)
         rays = origins @ into[:3, :3].T + into[:3, 3], directions @ into[:3, :3].T
         own = ray_caster_of(self.body.mesh).nearest(*rays)[1]
@@ -172,14 +172,14 @@ class Sky:
     directions : (k, 3) float64
     cosine : (s, k) float64
         With the normal, 0 where the direction is below the surface.
-    seen : (s, k) bool
+    visible : (s, k) bool
     facing : (h,), (h,), (h,) int
-        Pairs of sample and direction in which another place of the body is seen, and the sample that is nearest there.
+        Pairs of sample and direction in which another place of the body is visible, and the sample nearest to it.
     """
 
     directions: Array
     cosine: Array
-    seen: Mask
+    visible: Mask
     facing: tuple[Integers, Integers, Integers]
 
 
@@ -191,12 +191,12 @@ def sky_of(grid: BodyGrid, casters: Occluders) -> Sky:
     sample, direction = np.nonzero(cosine)
     start = grid.points + BEFORE * grid.cells.step * grid.face_normals
     itself, others = casters.nearest(start[sample], directions[direction])
-    seen = np.zeros(cosine.shape, bool)
-    seen[sample, direction] = np.isinf(itself) & np.isinf(others)
+    visible = np.zeros(cosine.shape, bool)
+    visible[sample, direction] = np.isinf(itself) & np.isinf(others)
     faced = np.isfinite(itself) & (itself <= others)
     places = start[sample[faced]] + itself[faced, None] * directions[direction[faced]]
     nearest = cKDTree(grid.points).query(places)[1] if faced.any() else np.zeros(0, int)
-    return Sky(directions, cosine, seen, (sample[faced], direction[faced], nearest))
+    return Sky(directions, cosine, visible, (sample[faced], direction[faced], nearest))
 
 
 def even_directions(count: int) -> Array:
@@ -210,8 +210,8 @@ def even_directions(count: int) -> Array:
 def environment_parts(environment: Environment, directions: Array) -> Array:
     """(k, 3): radiance of the environment, integrated over the part of the sphere nearest to each direction."""
     nearest, _ = nearest_parts(directions)
-    ways, angle = _map_directions()
-    radiance = angle[:, None] * np.asarray(environment.lighting(ways), np.float64)
+    texels, angle = _map_directions()
+    radiance = angle[:, None] * np.asarray(environment.lighting(texels), np.float64)
     return np.stack([np.bincount(nearest, radiance[:, channel], len(directions)) for channel in range(3)], axis=1)
 
 
@@ -223,8 +223,8 @@ def nearest_parts(directions: Array) -> tuple[Integers, Array]:
 @cache
 def _nearest_parts(packed: bytes) -> tuple[Integers, Array]:
     directions = np.frombuffer(packed).reshape(-1, 3)
-    ways, angle = _map_directions()
-    nearest = np.asarray(cKDTree(directions).query(ways)[1])
+    texels, angle = _map_directions()
+    nearest = np.asarray(cKDTree(directions).query(texels)[1])
     return nearest, np.asarray(np.bincount(nearest, angle, len(directions)), np.float64)
 
 
@@ -246,7 +246,7 @@ def transfer(sky: Sky, solid_angles: Array, ior: float, interface: DiffuseInterf
 
 def sky_light(
     sky: Sky,
-    seen: npt.NDArray[np.float32],
+    visible: npt.NDArray[np.float32],
     fluxes: Sequence[npt.NDArray[np.float32]],
     normals: Array,
     ior: float,
@@ -257,7 +257,7 @@ def sky_light(
     Parameters
     ----------
     sky : Sky
-    seen : (s, k) float32
+    visible : (s, k) float32
         See `Entrance`.
     fluxes : three of (s, k) float32
         Flux that enters from each direction, in each channel.
@@ -267,9 +267,9 @@ def sky_light(
     mirrored : float
         Flux that the surface mirrors, as if it was diffuse, for a unit of what enters.
     """
-    uniform = seen * nearest_parts(sky.directions)[1].astype(np.float32)
+    uniform = visible * nearest_parts(sky.directions)[1].astype(np.float32)
     whole = np.maximum(uniform.sum(axis=1), np.finfo(np.float32).tiny)
-    entering, bright = np.zeros((len(seen), 3)), []
+    entering, bright = np.zeros((len(visible), 3)), []
     for channel, flux in enumerate(fluxes):
         most = BRIGHT * flux.sum(axis=1) / whole
         bright.append(np.maximum(flux - most[:, None] * uniform, 0.0))
@@ -300,19 +300,19 @@ def _sky_rays(
     rays = []
     for i in range(SKY_RAYS):
         before = ends[:, i - 1] if i else np.zeros(count)
-        wanted = np.minimum(before + chance * (ends[:, i] - before), summed[:, -1])
-        chosen = sky.directions[(summed < wanted[:, None]).sum(axis=1)]
+        level = np.minimum(before + chance * (ends[:, i] - before), summed[:, -1])
+        chosen = sky.directions[(summed < level[:, None]).sum(axis=1)]
         of = np.flatnonzero((ends[:, i] > before) & ((chosen * normals[lit]).sum(axis=1) > 0.0))
-        ways = refracted_direction(-chosen[of], normals[lit[of]], np.full(len(of), ior))
-        rays.append(EnteringRays(lit[of], ways, entering[of, i], mirrored * entering[of, i]))
+        refracted = refracted_direction(-chosen[of], normals[lit[of]], np.full(len(of), ior))
+        rays.append(EnteringRays(lit[of], refracted, entering[of, i], mirrored * entering[of, i]))
     return rays
 
 
-def from_itself(sky: Sky, shares: Array, solid_angles: Array) -> sparse.csr_array:
+def from_itself(sky: Sky, transferred: Array, solid_angles: Array) -> sparse.csr_array:
     """(s, s): form factors: flux that enters at a sample for a unit of diffuse flux that leaves another one."""
     sample, direction, other = sky.facing
-    values = (shares * solid_angles)[sample, direction] / np.pi
-    return sparse.csr_array((values, (sample, other)), (len(shares), len(shares)))
+    values = (transferred * solid_angles)[sample, direction] / np.pi
+    return sparse.csr_array((values, (sample, other)), (len(transferred), len(transferred)))
 
 
 def from_light(
@@ -352,12 +352,12 @@ def from_light(
         towards /= np.linalg.norm(towards, axis=1)[:, None]
     reflected = optics.fresnel_dielectric(np.maximum((towards * normals).sum(axis=1), 0.0), ior)[:, None]
     # What a rough interface loses, of any light as of uniform light.
-    share = interface.entering / diffuse_interface(ior).entering
+    relative = interface.entering / diffuse_interface(ior).entering
     flux = np.asarray(light.irradiance_on(grid.points[lit] - sunk, normals), np.float64) * gain[lit, None]
     if dimming:
         flux = flux * light_passed(dimming, start, towards, distance[lit])
-    ways = refracted_direction(-towards, normals, np.full(len(lit), ior))
-    return EnteringRays(lit, ways, (1.0 - reflected) * share * flux, reflected * flux)
+    refracted = refracted_direction(-towards, normals, np.full(len(lit), ior))
+    return EnteringRays(lit, refracted, (1.0 - reflected) * relative * flux, reflected * flux)
 
 
 def _spread(towards: Array, grid: BodyGrid) -> tuple[Array, Array]:

@@ -57,7 +57,7 @@ SAMPLES_FOR_PATH = 4
 #: Least fraction of the paths through a body on which light counts as scattered: thinner parts hardly scatter.
 LEAST_SCATTERED = 0.02
 
-#: Share of a cell that is inside from which all of it is.
+#: Fraction of a cell that is inside from which all of it is.
 _WHOLE = 1.0 - 1e-9
 
 
@@ -88,7 +88,7 @@ class DiffusionField:
     ior : float
         Of the medium.
     ahead : (3,) float64
-        Share of its extinction by light that is scattered ahead, g sigma_s / sigma_t, which counts as unscattered here.
+        Fraction of its extinction by light that is scattered ahead, g sigma_s / sigma_t: unscattered light here.
     in_scattered : tuple of two (3,) float64
         See `in_scattered_shares`.
     """
@@ -158,13 +158,13 @@ class Entrance:
 
     Attributes
     ----------
-    seen : (s, k) float32
+    visible : (s, k) float32
         For each radiance over the solid angle of a direction, see `transfer`; 0 where the sky is hidden.
     itself : (s, s) csr_array
         For the flux that leaves each sample, see `from_itself`.
     """
 
-    seen: npt.NDArray[np.float32]
+    visible: npt.NDArray[np.float32]
     itself: sparse.csr_array
 
 
@@ -206,19 +206,19 @@ class LitBody:
         points, part = self.grid.points, slice(None, None, SAMPLES_FOR_PATH)
         start = points[part] + BEFORE * self.grid.cells.step * self.grid.face_normals[part]
         nearest = cKDTree(points[part]).query(points)[1]
-        # Next to an edge they face other ways: of each, ways to all that the samples see for which it stands.
+        # Next to an edge samples face other directions: each takes every direction that its group of samples sees.
         groups = sparse.csr_array((np.ones(len(points)), (nearest, np.arange(len(points)))), (len(start), len(points)))
-        metres = sky_paths(body, start, self.sky.directions, groups @ self.sky.seen.astype(np.float64) > 0.0)
+        metres = sky_paths(body, start, self.sky.directions, groups @ self.sky.visible.astype(np.float64) > 0.0)
         return sparse.csr_array(metres[nearest])
 
     def entrance(self, ior: float, roughness: float) -> Entrance:
         """Transfer through an interface with this index and roughness; the last one is cached."""
         if (ior, roughness) not in self._entrances:
             solid_angles = nearest_parts(self.sky.directions)[1]
-            shares = transfer(self.sky, solid_angles, ior, diffuse_interface(ior, roughness))
-            itself = from_itself(self.sky, shares, solid_angles)
+            transferred = transfer(self.sky, solid_angles, ior, diffuse_interface(ior, roughness))
+            itself = from_itself(self.sky, transferred, solid_angles)
             self._entrances.clear()
-            self._entrances[ior, roughness] = Entrance((shares * self.sky.seen).astype(np.float32), itself)
+            self._entrances[ior, roughness] = Entrance((transferred * self.sky.visible).astype(np.float32), itself)
         return self._entrances[ior, roughness]
 
 
@@ -279,26 +279,26 @@ class DiffusingBody:
         return _field(self._lit, self._medium, self._roughness, found)
 
     def _from_sky(self, parts: Array, others: list[Object]) -> tuple[Array, list[EnteringRays]]:
-        """Flux (s, 3) that enters of radiance over solid angles (k, 3), less what other bodies on its way absorb.
+        """Flux (s, 3) that enters of radiance over solid angles (k, 3), less what other bodies on its path absorb.
 
         And, as rays, the parts of the sky that are brighter than the rest. Light that others scatter continues
         elsewhere, and as much comes from there: in uniform light it is not missing.
         """
         if not parts.any():
             return np.zeros((len(self._lit.grid.points), 3)), []
-        seen, sky, ior = self._entrance.seen, self._lit.sky, self._medium.ior
-        fluxes = [seen * parts[:, channel].astype(np.float32) for channel in range(3)]
+        visible, sky, ior = self._entrance.visible, self._lit.sky, self._medium.ior
+        fluxes = [visible * parts[:, channel].astype(np.float32) for channel in range(3)]
         absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
         paths = self._lit.sky_paths(absorbing) if absorbing else []
         for channel, flux in enumerate(fluxes):
-            depth = sparse.csr_array(seen.shape)
+            depth = sparse.csr_array(visible.shape)
             for body, metres in zip(absorbing, paths, strict=True):
                 assert body.medium is not None
                 depth = depth + metres * float(np.asarray(body.medium.absorption)[channel])
             lost = depth.tocoo()
             flux[lost.row, lost.col] *= optics.transmittance(lost.data)
         mirrored = (1.0 - diffuse_interface(ior).entering) / self._interface.entering
-        return sky_light(sky, seen, fluxes, self._lit.grid.normals, ior, mirrored)
+        return sky_light(sky, visible, fluxes, self._lit.grid.normals, ior, mirrored)
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:

@@ -29,7 +29,7 @@ from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 #: First events above the depth at which the fluence is read, and below it, for each sample.
 EVENTS, DEEP_EVENTS = 4, 2
 
-#: Share of the light below which no first events are looked for.
+#: Fraction of the light below which no first events are looked for.
 _NOTHING = 1e-3
 
 #: Over 1 / STRAIGHT reduced mean free paths light that leaves has been turned little by little, and not straight back.
@@ -42,7 +42,7 @@ FLAT = 4.0
 #: Reduced albedo below which the reflectance of half-spaces is in proportion to it.
 _LEAST_ALBEDO = 1e-6
 
-#: Least cosine of a way with the normal of the surface: where smooth normals turn it more, as if it was so much.
+#: Least cosine of an entering direction with the surface normal; smaller ones, by smooth normals, are raised to it.
 _LEAST_COSINE = 0.05
 
 
@@ -130,7 +130,7 @@ class EntryPaths:
 
 def diffuse_paths(grid: BodyGrid, dense: Densities, ior: float) -> EntryPaths:
     """One path below each sample, in directions that are distributed as those of uniform light from outside."""
-    directions, samples = grid.ways(ior), np.arange(len(grid.points))
+    directions, samples = grid.inward_directions(ior), np.arange(len(grid.points))
     return EntryPaths(samples, directions, diffuse_interface(ior).mean_cosine, True, dense.lengths(samples, directions))
 
 
@@ -151,9 +151,9 @@ class Events:
         Fluence at the surface by events above the depth of reading, less the excess of diffusion over the exact
         solution.
     above : (k,) float64
-        Share that is scattered above that depth, as the cells receive it.
+        Fraction that is scattered above that depth, as the cells receive it.
     below : list of ((k,) int, (k,) float64)
-        Cells in which light is scattered below that depth, and shares.
+        Cells in which light is scattered below that depth, and fractions.
     """
 
     near: Array
@@ -164,15 +164,15 @@ class Events:
         """(cells, s): scattered power in each cell for a unit of flux that enters at each sample."""
         count = len(self.near)
         deep = sparse.csr_array((count, grid.count))
-        for cell, share in self.below:
-            deep = deep + sparse.csr_array((share, (np.arange(count), cell)), deep.shape)
+        for cell, weight in self.below:
+            deep = deep + sparse.csr_array((weight, (np.arange(count), cell)), deep.shape)
         return sparse.csr_array((grid.area * (deep + sparse.diags_array(self.above) @ read)).T)
 
     def power_below(self, flux: Array, cells: int) -> Array:
         """(cells,): power scattered in each cell below the depth of reading, for an entering flux (k,)."""
         total = np.zeros(cells)
-        for cell, share in self.below:
-            total += np.bincount(cell, share * flux, cells)
+        for cell, weight in self.below:
+            total += np.bincount(cell, weight * flux, cells)
         return total
 
 
@@ -211,40 +211,40 @@ class FirstEvents:
         # Small bodies are curved, and reflect more than half-spaces.
         self._flat = float(optics.opacity((self._extinction * chord / FLAT) ** 3))
 
-    def of(self, ways: EntryPaths) -> Events:
+    def of(self, paths: EntryPaths) -> Events:
         """First events of light along these paths."""
-        grid, extinction, cosine = self._grid, self._extinction, ways.cosine
-        layer = replace(self._layer, depth=self._layer.depth[ways.samples])
+        grid, extinction, cosine = self._grid, self._extinction, paths.cosine
+        layer = replace(self._layer, depth=self._layer.depth[paths.samples])
         relative = 1.0 / layer.u(layer.depth)
         # Excess of the reflectance by diffusion over that of the exact half-space.
-        asked = None if ways.diffuse else np.asarray(cosine)
-        straight = straight_back(self._albedo, self._ior, self._phase, asked) * self._thick
+        cosines = None if paths.diffuse else np.asarray(cosine)
+        straight = straight_back(self._albedo, self._ior, self._phase, cosines) * self._thick
         excess = (
-            self._flat * half_space_excess(self._albedo, self._ior, asked) / diffuse_interface(self._ior).conductance
+            self._flat * half_space_excess(self._albedo, self._ior, cosines) / diffuse_interface(self._ior).conductance
         )
 
         def counted(path: Array) -> Array:
-            """Share of the first events after an optical path from the surface that count as if they were isotropic."""
+            """Fraction of the first events after an optical path from the surface that count as isotropic."""
             return np.asarray(1.0 - straight * optics.transmittance(STRAIGHT * path))
 
-        # Shares of the light that is scattered above the depth of reading, and below it.
+        # Fractions of the light that is scattered above the depth of reading, and below it.
         slant = layer.depth / cosine
         below, above = optics.transmittance(extinction * slant), optics.opacity(extinction * slant)
         near, into_cells = np.zeros(len(slant)), np.zeros(len(slant))
         for quantile in (np.arange(EVENTS) + 0.5) / EVENTS:
             path = -np.log1p(-quantile * above)
             depth = path * cosine / extinction
-            share = self._albedo / EVENTS * above * relative * counted(path)
-            into_cells += share * layer.u(depth)
-            near += share * layer.rise(layer.depth - depth) / self._d
+            weight = self._albedo / EVENTS * above * relative * counted(path)
+            into_cells += weight * layer.u(depth)
+            near += weight * layer.rise(layer.depth - depth) / self._d
         deep = []
         # Interpolation by chance: each place counts in the cell around it.
         spread, quantiles = _places(len(grid.points))
-        start = grid.points[ways.samples] + grid.cells.step * spread[ways.samples]
-        for quantile in quantiles[:, ways.samples] if below.max(initial=0.0) > _NOTHING else ():
+        start = grid.points[paths.samples] + grid.cells.step * spread[paths.samples]
+        for quantile in quantiles[:, paths.samples] if below.max(initial=0.0) > _NOTHING else ():
             length = slant - np.log1p(-quantile) / extinction
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
-            at = start + ways.length(length)[:, None] * ways.directions
+            at = start + paths.length(length)[:, None] * paths.directions
             cell, inside = grid.cell_at(at)
             deep.append((cell, self._albedo / DEEP_EVENTS * below * inside * counted(extinction * length)))
         return Events(near - excess, into_cells, deep)
@@ -262,14 +262,17 @@ def tails(samples: int) -> Array:
     return np.asarray((np.arange(DEEP_EVENTS)[:, None] + shift) / DEEP_EVENTS)
 
 
-def scattered_shares(grid: BodyGrid, dense: Densities, ior: float, extinction: float) -> Array:
+def scattered_fractions(grid: BodyGrid, dense: Densities, ior: float, extinction: float) -> Array:
     """(s,): fraction of uniform light entering at each sample of a body that is scattered before it leaves.
 
     The same fraction of what leaves there has been scattered: paths are the same in both directions.
     """
-    ways, metres = grid.crossings(ior)
-    shares = [optics.opacity(extinction * dense.along(way, to)) for way, to in zip(ways, metres, strict=True)]
-    return np.asarray(np.mean(shares, axis=0))
+    directions, metres = grid.crossings(ior)
+    fractions = [
+        optics.opacity(extinction * dense.along(direction, to))
+        for direction, to in zip(directions, metres, strict=True)
+    ]
+    return np.asarray(np.mean(fractions, axis=0))
 
 
 def half_space_excess(albedo: float, ior: float, cosine: Array | None = None) -> Array | float:
@@ -277,7 +280,7 @@ def half_space_excess(albedo: float, ior: float, cosine: Array | None = None) ->
 
     For light that is uniform outside, or that travels inside at cosines (k,) with the normal.
     """
-    return diffused_share(albedo, ior, cosine) - _exact(round(albedo, 6), ior, ISOTROPIC, cosine)
+    return diffused_reflectance(albedo, ior, cosine) - _exact(round(albedo, 6), ior, ISOTROPIC, cosine)
 
 
 def straight_back(albedo: float, ior: float, phase: PhaseFunction, cosine: Array | None = None) -> Array | float:
@@ -300,7 +303,7 @@ def straight_back(albedo: float, ior: float, phase: PhaseFunction, cosine: Array
     reduced = max(round(albedo, 6), _LEAST_ALBEDO)
     own = reduced / (reduced + (1.0 - reduced) * (1.0 - phase.mean_cosine))
     less = _exact(reduced, ior, ISOTROPIC, cosine) - _exact(own, ior, phase, cosine)
-    return less / diffused_share(reduced, ior, cosine, STRAIGHT)
+    return less / diffused_reflectance(reduced, ior, cosine, STRAIGHT)
 
 
 def _exact(albedo: float, ior: float, phase: PhaseFunction, cosine: Array | None) -> Array | float:
@@ -309,7 +312,7 @@ def _exact(albedo: float, ior: float, phase: PhaseFunction, cosine: Array | None
     return half_space_reflectances(cosine, albedo, ior, phase)
 
 
-def diffused_share(albedo: float, ior: float, cosine: Array | None = None, dimmed: float = 0.0) -> Array | float:
+def diffused_reflectance(albedo: float, ior: float, cosine: Array | None = None, dimmed: float = 0.0) -> Array | float:
     """Reflectance of a half-space by diffusion, for the light that enters.
 
     `dimmed`: first events after an optical path t from the surface count by exp(-dimmed t).

@@ -28,10 +28,10 @@ from translucent.scene.scene import Object
 #: Lines through each cell along each axis, on a square of this side.
 LINES = 4
 
-#: Shift of the lines, as a share of the distance between them, so that they miss what is modelled on a grid.
+#: Shift of the lines, as a fraction of the distance between them, so that they miss what is modelled on a grid.
 _SHIFT = (0.0312, 0.0187)
 
-#: Of lines that meet nothing.
+#: Of lines that hit nothing.
 _NO_CROSSINGS: tuple[Integers, Array, Integers] = np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64)
 
 
@@ -46,11 +46,11 @@ class Voxels:
     step : float
         Side of a cell.
     inside : (x, y, z) float64
-        Share of each cell that is inside, 0 to 1.
+        Fraction of each cell that is inside, 0 to 1.
     center : (x, y, z, 3) float64
-        Centroid of that share, in cells from `low`; of empty cells, their middle.
+        Centroid of that fraction, in cells from `low`; of empty cells, their middle.
     open_area : tuple of 3 arrays
-        Share of the face towards the previous cell that is inside, along each axis: (x + 1, y, z) and so on.
+        Fraction of the face towards the previous cell that is inside, along each axis: (x + 1, y, z) and so on.
     """
 
     low: Array
@@ -61,7 +61,7 @@ class Voxels:
 
     @property
     def volume(self) -> float:
-        """Volume of all shares."""
+        """Volume of all fractions."""
         return float(self.inside.sum()) * self.step**3
 
 
@@ -100,7 +100,7 @@ def voxels(vertices: Array, faces: npt.NDArray[np.integer], step: float) -> Voxe
 def _along_last_axis(
     points: Array, faces: npt.NDArray[np.integer], size: npt.NDArray[np.integer]
 ) -> tuple[Array, Array, Array]:
-    """Length inside each cell, its first moment, and share of each cell's lower and upper face that is inside."""
+    """Length inside each cell, its first moment, and fraction of each cell's lower and upper face that is inside."""
     lines = size[:2] * LINES
     scaled = points[:, :2] * LINES - 0.5 - np.array(_SHIFT)
     found = [_NO_CROSSINGS, *line_crossings(scaled, points[:, 2], faces, (int(lines[0]), int(lines[1])))]
@@ -143,20 +143,20 @@ def _intervals(line: Integers, height: Array, sign: Integers) -> tuple[Integers,
 #: Sample points on the surface for each area of a cell's face.
 SAMPLES = 3.0
 
-#: Share of a cell that must be inside for the cell to count: thinner slivers would make the system stiff for nothing.
+#: Fraction of a cell that must be inside for the cell to count: thinner slivers would only make the system stiff.
 LEAST_INSIDE = 0.05
 
 #: Depths below the surface, in cells, at which the fluence is read: the first that enough of the body surrounds.
 PROBE_DEPTHS = (1.0, 0.75, 0.5, 0.25)
 
-#: Share of the eight cells around such a point that must be inside.
+#: Fraction of the eight cells around such a point that must be inside.
 LEAST_AROUND = 0.55
 
 #: Shortest distance between the centers of two cells, and least depth, in cells.
 LEAST_LENGTH, LEAST_DEPTH = 0.3, 0.1
 
-#: EntryPaths below each sample on which it is measured what leaves unscattered, and their start below it, in cells.
-WAYS, START = 8, 1e-4
+#: Paths below each sample that measure the unscattered light, and their start below it, in cells.
+INWARD_DIRECTIONS, START = 8, 1e-4
 
 #: Samples next to each other for which something is found together.
 TOGETHER = 6
@@ -176,7 +176,7 @@ class Probe:
     center : (points, 3) float64
         Where the weighted centroid of the cells is, in cells from the corner of the grid.
     around : (points,) float64
-        Share of the cells around each point that is inside.
+        Fraction of the cells around each point that is inside.
     """
 
     weights: sparse.csr_array
@@ -216,25 +216,25 @@ class BodyGrid:
         return np.reshape(cKDTree(self.points).query(self.points, min(TOGETHER, count))[1], (count, -1))
 
     def crossings(self, ior: float) -> tuple[Array, Array]:
-        """(w, s, 3), (w, s): directions below each sample (see `ways`), and metres to where they leave the body."""
+        """(w, s, 3), (w, s): `inward_directions` of each sample, and metres to where they leave the body."""
         if ior not in self._crossings:
             start = self.points - START * self.cells.step * self.face_normals
             into, caster = np.linalg.inv(self.body.matrix), ray_caster_of(self.body.mesh)
             origins = start @ into[:3, :3].T + into[:3, 3]
-            ways = np.stack([self.ways(ior, number) for number in range(WAYS)])
-            metres = np.zeros(ways.shape[:2])
-            for number, way in enumerate(ways @ into[:3, :3].T):
-                face, distance = caster.nearest(origins, way)
+            directions = np.stack([self.inward_directions(ior, number) for number in range(INWARD_DIRECTIONS)])
+            metres = np.zeros(directions.shape[:2])
+            for number, local_direction in enumerate(directions @ into[:3, :3].T):
+                face, distance = caster.nearest(origins, local_direction)
                 metres[number] = np.where(face >= 0, distance, 0.0)
             self._crossings.clear()
-            self._crossings[ior] = ways, metres
+            self._crossings[ior] = directions, metres
         return self._crossings[ior]
 
-    def ways(self, ior: float, number: int = 0) -> Array:
-        """(s, 3): a direction inside for each sample, distributed as refracted uniform light, number one of `WAYS`."""
+    def inward_directions(self, ior: float, number: int = 0) -> Array:
+        """(s, 3): set `number` of directions inside, one for each sample, distributed as refracted uniform light."""
         # Not the numbers by which the samples lie on large triangles: there, light would come from one side alone.
         first, second = other_plane_points(len(self.points)).T
-        first, second = (first + number / WAYS) % 1.0, (second + 0.618 * number) % 1.0
+        first, second = (first + number / INWARD_DIRECTIONS) % 1.0, (second + 0.618 * number) % 1.0
         cosine = optics.refracted_cosine(np.sqrt(first), ior)
         normal = self.face_normals
         aside = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
@@ -278,10 +278,10 @@ class BodyGrid:
         weights = sparse.csr_array((len(self.points), self.count))
         depth = np.zeros(len(self.points))
         missing = np.ones(len(self.points), bool)
-        for wanted in PROBE_DEPTHS:
-            probe = self.probe(self.points - wanted * self.cells.step * self.face_normals)
+        for target in PROBE_DEPTHS:
+            probe = self.probe(self.points - target * self.cells.step * self.face_normals)
             found = self._depth(probe)
-            taken = missing & (probe.around > LEAST_AROUND) & (found > 0.3 * wanted)
+            taken = missing & (probe.around > LEAST_AROUND) & (found > 0.3 * target)
             weights = weights + _rows(probe.weights, taken)
             depth[taken] = found[taken]
             missing &= ~taken
@@ -311,14 +311,14 @@ class BodyGrid:
     def cores(self) -> Array:
         """(cells,): volume in m^3 of each cell without its layers; with these, all are the volume of the body."""
         rest = np.maximum(self.volumes - self.layers, 0.0)
-        wanted = self.volumes.sum() - self.area * self.below[1].sum()
-        return np.asarray(rest * min(max(wanted, 0.0) / max(rest.sum(), np.finfo(np.float64).tiny), 1.0))
+        target = self.volumes.sum() - self.area * self.below[1].sum()
+        return np.asarray(rest * min(max(target, 0.0) / max(rest.sum(), np.finfo(np.float64).tiny), 1.0))
 
     def probe(self, points: Array) -> Probe:
         """Linear interpolation at points (k, 3), in metres, from the cells around each as far as they are inside."""
         place = (points - self.cells.low) / self.cells.step - 0.5
         corner = np.floor(place).astype(int)
-        share = place - corner
+        fraction = place - corner
         size = np.array(self.number.shape)
         rows, columns, values = [], [], []
         center, around = np.zeros(points.shape), np.zeros(len(points))
@@ -326,7 +326,7 @@ class BodyGrid:
             cell = corner + offset
             x, y, z = np.clip(cell, 0, size - 1).T
             number = self.number[x, y, z]
-            weight = np.where(offset, share, 1.0 - share).prod(axis=1) * self.cells.inside[x, y, z]
+            weight = np.where(offset, fraction, 1.0 - fraction).prod(axis=1) * self.cells.inside[x, y, z]
             weight = np.where((number >= 0) & ((cell >= 0) & (cell < size)).all(axis=1), weight, 0.0)
             used = np.flatnonzero(weight)
             rows.append(used)
@@ -340,7 +340,7 @@ class BodyGrid:
         return Probe(weights, center / scale[:, None], around)
 
     def cell_at(self, points: Array) -> tuple[Integers, Array]:
-        """(k,), (k,): number of the cell at points (k, 3) in metres, and its share inside; 0 outside the system."""
+        """(k,), (k,): number of the cell at points (k, 3) in metres, and its fraction inside; 0 outside the system."""
         place = np.floor((points - self.cells.low) / self.cells.step).astype(int)
         within = np.all((place >= 0) & (place < np.array(self.number.shape)), axis=1)
         x, y, z = np.where(np.asarray(within)[:, None], place, 0).T
@@ -424,10 +424,10 @@ def _rows(matrix: sparse.csr_array, taken: npt.NDArray[np.bool_]) -> sparse.csr_
 #: Points in each cell, along each axis, at which its density is looked at.
 _PLACES = (0.25, 0.75)
 
-#: Places on a way through the body at which the density is looked at.
-_WAY_PLACES = (np.arange(12) + 0.5) / 12
+#: Points on a path through the body at which the density is read.
+_PATH_POINTS = (np.arange(12) + 0.5) / 12
 
-#: Pieces of each way of entering light, from the surface to the end of the grid.
+#: Pieces of each path of entering light, from the surface to the end of the grid.
 _PIECES = 48
 
 
@@ -457,27 +457,27 @@ class Densities:
         densest = float(self.cells.max(initial=0.0))
         return np.asarray(d / np.maximum(self.cells, min(d / self.longest, densest or np.inf)))
 
-    def along(self, ways: Array, metres: Array) -> Array:
+    def along(self, directions: Array, metres: Array) -> Array:
         """(s,): integral of the density in m from all samples in directions (s, 3), up to metres (s,)."""
         if self._means is None:
             return metres
         cells = self._grid.cells
         start = (self._grid.points - cells.low) / cells.step - 0.5
-        places = (start + (share * metres / cells.step)[:, None] * ways for share in _WAY_PLACES)
+        places = (start + (fraction * metres / cells.step)[:, None] * directions for fraction in _PATH_POINTS)
         return np.asarray(
             metres * np.mean([map_coordinates(self._means, at.T, order=1, mode="nearest") for at in places], axis=0)
         )
 
-    def lengths(self, samples: Integers, ways: Array) -> Callable[[Array], Array]:
+    def lengths(self, samples: Integers, directions: Array) -> Callable[[Array], Array]:
         """Function from integrals of the density (k,), in m, along directions (k, 3) from samples (k,), to metres."""
         if self._means is None:
             return lambda integral: integral
         cells = self._grid.cells
         start = (self._grid.points[samples] - cells.low) / cells.step - 0.5
-        slow = np.where(np.abs(ways) > np.finfo(np.float64).eps, ways, np.finfo(np.float64).eps)
+        slow = np.where(np.abs(directions) > np.finfo(np.float64).eps, directions, np.finfo(np.float64).eps)
         end = np.where(slow > 0.0, np.array(self._means.shape) - start, -1.0 - start) / slow
         piece = end.min(axis=1) * cells.step / _PIECES
-        inside = (start + ((i + 0.5) * piece / cells.step)[:, None] * ways for i in range(_PIECES))
+        inside = (start + ((i + 0.5) * piece / cells.step)[:, None] * directions for i in range(_PIECES))
         dense = np.stack([map_coordinates(self._means, at.T, order=1, mode="nearest") for at in inside])
         sums = np.cumsum(dense * piece, axis=0)
         return lambda integral: _lengths(sums, dense, piece, integral)

@@ -128,11 +128,11 @@ def _harmonic(index: int) -> Environment:
 
 
 def _check(body: Object, diffusion: Diffusion) -> None:
-    asked, medium = f"scattered light of {body.mesh.name!r}", body.medium
+    requested, medium = f"scattered light of {body.mesh.name!r}", body.medium
     if medium is None or not medium.scatters:
         do = "give one that does, for example --preset wax, or tl.scattering_medium('#f2e0b8', 0.002)"
-        raise InputError(asked, "its medium does not scatter" if medium is not None else "no medium", do)
+        raise InputError(requested, "its medium does not scatter" if medium is not None else "no medium", do)
     if np.asarray(medium.emission).any():
-        raise InputError(asked, "its medium emits: that light depends on no other", "leave the emission out")
+        raise InputError(requested, "its medium emits: that light depends on no other", "leave the emission out")
     if (why := diffusion.refusal(body)) is not None:
-        raise InputError(asked, why, "give a closed mesh, a thicker body, or a higher resolution")
+        raise InputError(requested, why, "give a closed mesh, a thicker body, or a higher resolution")

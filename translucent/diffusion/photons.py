@@ -112,7 +112,7 @@ class _Photons:
 def photon_segments(scene: Scene, photons: int, seed: int) -> Iterator[PhotonSegments]:
     """Segments of the paths of about so many photons from the lights of a scene.
 
-    At a rough interface a photon interacts with one microfacet, and no other one is in the way.
+    At a rough interface a photon interacts with one microfacet, and no other one blocks it.
 
     Parameters
     ----------
@@ -139,10 +139,10 @@ class _PhotonTracer:
 
     def __init__(self, scene: Scene, rng: np.random.Generator) -> None:
         self.scene, self.rng, objects = scene, rng, scene.objects
-        seen = [i for i, item in enumerate(objects) if not item.covers]
-        self._caster = SceneRayCaster([objects[i] for i in seen])
+        hittable = [i for i, item in enumerate(objects) if not item.covers]
+        self._caster = SceneRayCaster([objects[i] for i in hittable])
         #: Object of each face; at index -1, of none.
-        self._item = np.append(np.array(seen)[self._caster.faces.item], AIR)
+        self._item = np.append(np.array(hittable)[self._caster.faces.item], AIR)
         self._table = InterfaceTable(scene, [item.sheet_thickness for item in objects])
         #: (objects, 3): in 1/m; what is scattered ahead counts as unscattered.
         self._extinction = np.stack([_reduced_extinction(item) for item in objects])
@@ -295,8 +295,8 @@ class _PhotonTracer:
         facets = at.normal.copy()
         rough = np.flatnonzero((alpha > 0.0) & ~at.thin_walled & (at.ior != 1.0))
         if rough.size:
-            shares = self.rng.random((rough.size, 2))
-            facets[rough] = microfacet_normal(at.normal[rough], at.direction[rough], alpha[rough], shares)
+            samples = self.rng.random((rough.size, 2))
+            facets[rough] = microfacet_normal(at.normal[rough], at.direction[rough], alpha[rough], samples)
         cosine, coat = at.cosine(facets), at.coat_reflectance()
         below = below_coat(at.lobes(optics.fresnel_dielectric(cosine, at.ior), cosine)[0], coat)
         lobes = Lobes(below.reflection + coat, below.transmission * at.base)

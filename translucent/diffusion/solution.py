@@ -28,7 +28,7 @@ from translucent.diffusion.first_events import (
     LayerSolution,
     diffuse_paths,
     entry_paths,
-    scattered_shares,
+    scattered_fractions,
 )
 from translucent.diffusion.grid import BodyGrid, Densities, even_densities
 from translucent.errors import RenderError
@@ -40,7 +40,7 @@ from translucent.media.medium import Medium
 #: Solutions that are kept, and numbers in all of them together.
 MOST, MOST_NUMBERS = 32, 1 << 23
 
-#: Share of the largest energy of mixtures below which one of unit size is rounding.
+#: Fraction of the largest energy of mixtures below which one of unit size is rounding.
 ROUNDING = 1e-13
 
 
@@ -48,7 +48,7 @@ class KnownSolutions:
     """Subspace of the last solutions, in which the solver finds its starting point (Fischer 1998).
 
     Diffusion is linear in the light: once environments and lights have been solved for, mixtures of them, dimmed or
-    tinted, need no more steps; and as diffusion is smooth, turns of an environment need few.
+    tinted, need no more steps; and as diffusion is smooth, rotations of an environment need few.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ class KnownSolutions:
         self._energies = np.zeros((most, most))
         self._oldest = 0
 
-    def nearest(self, wanted: Array) -> Array:
+    def nearest(self, right_side: Array) -> Array:
         """(n,): the mixture of known solutions nearest in energy to the one for a right-hand side (n,)."""
-        mixture = np.linalg.lstsq(self._energies, self._solutions @ wanted, rcond=ROUNDING)[0]
+        mixture = np.linalg.lstsq(self._energies, self._solutions @ right_side, rcond=ROUNDING)[0]
         return np.asarray(mixture @ self._solutions)
 
     def add(self, solution: Array) -> None:
@@ -121,8 +121,8 @@ class CellSystem:
         RenderError
             If the solver does not get there.
         """
-        wanted = source * self._scale
-        found, steps = self._found(wanted, self._known.nearest(wanted), TOLERANCE)
+        right_side = source * self._scale
+        found, steps = self._found(right_side, self._known.nearest(right_side), TOLERANCE)
         if steps:
             self._known.add(found)
         return np.asarray(found * self._scale), steps
@@ -135,18 +135,18 @@ class CellSystem:
         """Fluence (cells,) for powers (cells,) up to a residual of `ROUGH`; no other solution starts from it."""
         return np.asarray(self._found(source * self._scale, None, ROUGH)[0] * self._scale)
 
-    def _found(self, wanted: Array, near: Array | None, tolerance: float) -> tuple[Array, int]:
+    def _found(self, right_side: Array, near: Array | None, tolerance: float) -> tuple[Array, int]:
         steps = 0
 
         def count(_: Array) -> None:
             nonlocal steps
             steps += 1
 
-        found, failed = cg(self._matrix, wanted, x0=near, rtol=tolerance, maxiter=MOST_STEPS, callback=count)
+        found, failed = cg(self._matrix, right_side, x0=near, rtol=tolerance, maxiter=MOST_STEPS, callback=count)
         if failed:
             raise RenderError(
                 "diffusion in a body",
-                f"the solver is not there after {MOST_STEPS} steps in {len(wanted)} cells",
+                f"the solver is not there after {MOST_STEPS} steps in {len(right_side)} cells",
                 "render with scattering=tl.ScatteringLayer()",
             )
         return np.asarray(found), steps
@@ -171,13 +171,13 @@ def _balance(grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> sparse.c
 #: Largest number of times that light of the body falls on the body again, and the change at which it is enough.
 MOST_BOUNCES, ENOUGH = 24, 1e-3
 
-#: Largest share of the light that may come back to the surface: of what would, a hundred times as much is to come.
-MOST_SHARE = 0.99
+#: Largest fraction of the light that may return to the surface; at that one, a hundred times as much is to come.
+MOST_RETURNED = 0.99
 
 #: Bounds of the correction by uniform light.
 LEAST_CORRECTION, MOST_CORRECTION = 0.5, 2.0
 
-#: Least share of a cell's volume that absorbs.
+#: Least fraction of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
 
 
@@ -240,7 +240,7 @@ class BodySystem:
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         self._grid, self._dense = grid, dense or even_densities(grid)
-        ways = diffuse_paths(grid, self._dense, medium.ior)
+        paths = diffuse_paths(grid, self._dense, medium.ior)
         self._channels = {
             channel: _ChannelSystem(
                 grid,
@@ -249,7 +249,7 @@ class BodySystem:
                 float(absorption),
                 float(scattering),
                 self._dense,
-                ways,
+                paths,
                 medium.phase_function,
                 corrected=corrected,
             )
@@ -280,10 +280,10 @@ class BodySystem:
         """
         fluence, flux, cells = np.zeros_like(entering), entering.copy(), np.zeros_like(inside)
         scattered = np.ones_like(entering)
-        steps, ways = 0, [entry_paths(ray, self._grid, self._dense) for ray in rays]
+        steps, paths = 0, [entry_paths(ray, self._grid, self._dense) for ray in rays]
         for channel, system in self._channels.items():
             emission = float(self._emitted[channel])
-            straight = system.directional(channel, rays, ways)
+            straight = system.directional(channel, rays, paths)
             if not self._warm_starts:
                 system.forget()
             found = system.solved(entering[:, channel], from_itself, inside[:, channel], emission, straight)
@@ -314,13 +314,13 @@ class _ChannelSystem:
         absorption: float,
         scattering: float,
         dense: Densities,
-        ways: EntryPaths,
+        paths: EntryPaths,
         phase: PhaseFunction = ISOTROPIC,
         *,
         corrected: bool,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
-        self._exit_share = interface.exit_share
+        self._exit_fraction = interface.exit_share
         self._mirrored = (1.0 - diffuse_interface(ior).entering) / interface.entering
         extinction = absorption + scattering
         self._albedo = scattering / extinction
@@ -332,7 +332,7 @@ class _ChannelSystem:
         # 4 V / S is the mean chord (Cauchy).
         chord = 4.0 * float(dense.cells @ grid.volumes) / (grid.area * len(depth))
         self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord)
-        diffuse = self._first.of(ways)
+        diffuse = self._first.of(paths)
         self._near, self._into_cells = diffuse.near, diffuse.matrix(grid, self._read)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
         # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
@@ -345,13 +345,13 @@ class _ChannelSystem:
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
         self._correction = np.ones(len(depth))
         #: (s,): see `SurfaceLight`.
-        self.scattered = scattered_shares(grid, dense, ior, extinction)[grid.nearest].mean(axis=1)
+        self.scattered = scattered_fractions(grid, dense, ior, extinction)[grid.nearest].mean(axis=1)
         if corrected:
-            lossless = _ChannelSystem(grid, ior, roughness, 0.0, extinction, dense, ways, corrected=False)
+            lossless = _ChannelSystem(grid, ior, roughness, 0.0, extinction, dense, paths, corrected=False)
             # What half-spaces absorb has not been in the body long enough to get to other parts of it.
-            share = half_space_reflectance(round(self._albedo, 6), ior)
+            reflectance = half_space_reflectance(round(self._albedo, 6), ior)
             found = lossless.by_uniform_light()
-            self._correction = 1.0 + share * (found - 1.0)
+            self._correction = 1.0 + reflectance * (found - 1.0)
 
     def by_uniform_light(self) -> Array:
         """(s,): factors of the fluence with which a lossless body in uniform light is as invisible as it has to be.
@@ -362,25 +362,25 @@ class _ChannelSystem:
         """
         even = np.ones(len(self._grid.points))
         found = (self._read @ self._cells.rough(self._into_cells @ even)) * self._attenuated + self._near * even
-        found, wanted = found[self._grid.nearest].mean(axis=1), self.scattered
+        found, target = found[self._grid.nearest].mean(axis=1), self.scattered
         # What leaves in all is right.
         least = np.finfo(np.float64).tiny
-        share = wanted / max(wanted.sum(), least) * found.sum() / np.maximum(found, least)
-        return np.asarray(np.clip(share, LEAST_CORRECTION, MOST_CORRECTION))
+        correction = target / max(target.sum(), least) * found.sum() / np.maximum(found, least)
+        return np.asarray(np.clip(correction, LEAST_CORRECTION, MOST_CORRECTION))
 
     def forget(self) -> None:
         """Start the next solution from nothing; its bounces start from each other."""
         self._cells.forget()
 
     def directional(
-        self, channel: int, rays: Sequence[EnteringRays], ways: Sequence[EntryPaths]
+        self, channel: int, rays: Sequence[EnteringRays], paths: Sequence[EntryPaths]
     ) -> _DirectionalEffects:
         """Effects of rays that enter: first events along each of their paths."""
         grid = self._grid
         flux, mirrored, near, above = np.zeros((4, len(grid.points)))
         below = np.zeros(grid.count)
-        for ray, way in zip(rays, ways, strict=True):
-            entering, events = ray.entering[:, channel], self._first.of(way)
+        for ray, path in zip(rays, paths, strict=True):
+            entering, events = ray.entering[:, channel], self._first.of(path)
             flux[ray.samples] += entering
             mirrored[ray.samples] += ray.mirrored[:, channel]
             near[ray.samples] += events.near * entering
@@ -410,15 +410,15 @@ class _ChannelSystem:
             fluence = np.maximum((self._read @ cells) * self._attenuated + self._near * flux + emitted, 0.0)
             fluence *= self._correction
             # What the surface mirrors goes on as if it was diffuse.
-            leaving = self._exit_share * fluence + self._mirrored * flux + straight.mirrored
+            leaving = self._exit_fraction * fluence + self._mirrored * flux + straight.mirrored
             change = entering + from_itself @ leaving - flux
-            # Of what changed the last time this share comes back now. In a hollow it is nearly all, and always the same
-            # share: so much is still to come.
-            share = float(change @ before) / max(float(before @ before), np.finfo(np.float64).tiny)
-            share = min(max(share, 0.0), MOST_SHARE)
-            flux = np.maximum(flux + change / (1.0 - share), 0.0)
+            # Fraction of the last change that returns now. In a hollow it is nearly all, and always the same: so much
+            # is still to come.
+            returned = float(change @ before) / max(float(before @ before), np.finfo(np.float64).tiny)
+            returned = min(max(returned, 0.0), MOST_RETURNED)
+            flux = np.maximum(flux + change / (1.0 - returned), 0.0)
             most = np.abs(flux + straight.flux).max(initial=0.0)
-            if np.abs(change).max(initial=0.0) <= ENOUGH * (1.0 - share) * most:
+            if np.abs(change).max(initial=0.0) <= ENOUGH * (1.0 - returned) * most:
                 break
-            before = change if share == 0.0 else np.zeros_like(entering)
+            before = change if returned == 0.0 else np.zeros_like(entering)
         return fluence, flux + straight.flux, np.maximum(cells, 0.0), steps

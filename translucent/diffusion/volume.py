@@ -41,7 +41,7 @@ _SERIES = np.float32(1e-2)
 def swept(
     extinction: Array, emission: Array, arriving: Array, directions: Array, solid_angles: Array, step: float
 ) -> Array:
-    """Mean fluence in cells, of light from the boundary of a grid and of what the cells send out, dimmed on the way.
+    """Mean fluence in cells, of light from the boundary of a grid and from its cells, attenuated on its path.
 
     Along each direction slice after slice: what leaves a cell is shared out to the cells of the next slice that it gets
     to. So each cell takes away as much as is missing behind it, and no power is lost or won.
@@ -78,11 +78,11 @@ def condensed(extinction: Array, directions: Array, step: float) -> Array:
     In a sweep light is scattered on from anywhere in the cell where it was scattered, and gets into several cells of
     each slice: from event to event it goes too far. Along a direction of largest component m, with tangents t aside, it
     crosses n edges of cells of a depth x with E[n] = m / x and E[n^2] = coth(x / 2 m) m / x, and is moved aside
-    by 1 with a chance t at each. The mean square of the way, in cells, is E[n^2] / m^2 + E[n] sum t (1 - t),
+    by 1 with a chance t at each. The mean square of the path, in cells, is E[n^2] / m^2 + E[n] sum t (1 - t),
     so that the diffusion coefficient, x / 6 times as much, is (2 / x + S + B x) / 6 up to x^2, with the means
     S of m sum t (1 - t) and B of 1 / 6 m^2 over the directions. It has to be 1 / 3 tau, where tau is the true depth of
-    a cell. Then light that starts anywhere has the right power, and the right mean square of its way, whatever is
-    absorbed. From about tau = 1.2 on there is no such depth: then the one with the shortest ways is it.
+    a cell. Then light that starts anywhere has the right power, and the right mean square of its path, whatever is
+    absorbed. From about tau = 1.2 on there is no such depth: then the one with the shortest paths is it.
 
     The same is done for lattice gases (Henon 1987, "Viscosity of a lattice gas").
     """
@@ -143,9 +143,9 @@ class _Sweep:
             sigma, source = extinction[i].astype(np.float32), emission[i].astype(np.float32)
             # All that leaves a cell gets into those of the next slice: nothing is lost between them.
             edge = self._between(light)
-            share, rest = _means(sigma * self.length)
-            light[:, *self.here] = edge * np.exp(-sigma * self.length) + source * self.length * share
-            fluence[i] += np.tensordot(weights, edge * share + rest * source * self.length, axes=1)
+            mean, rest = _means(sigma * self.length)
+            light[:, *self.here] = edge * np.exp(-sigma * self.length) + source * self.length * mean
+            fluence[i] += np.tensordot(weights, edge * mean + rest * source * self.length, axes=1)
 
     def _between(self, values: Floats) -> Floats:
         """(g, n, m, c): values of the previous slice, interpolated where the directions come from."""
@@ -157,7 +157,7 @@ class _Sweep:
 
 
 def _means(depth: Floats) -> tuple[Floats, Floats]:
-    """Mean transmittance over a way, (1 - e^-x) / x, and the mean of what comes from all places before on it."""
+    """Mean transmittance over a path, (1 - e^-x) / x, and the mean over all starting points on it."""
     safe = np.maximum(depth, _SERIES)
     mean = -np.expm1(-safe) / safe
     small = depth < _SERIES
@@ -185,7 +185,7 @@ MOST_DEPTH = 2.0
 #: Points at which the density is read in each cell on the path of a light.
 POINTS_A_CELL = 1.5
 
-#: Cells that count as none of a way.
+#: Cells that count as none of a path.
 _STILL = 1e-9
 
 #: Places in each cell, along each axis, at which it is looked for the light of a spot.
@@ -384,8 +384,8 @@ class _Mixed:
                     np.stack([last - each[k][..., channel].ravel() for each in self._rounds], axis=1)
                     for k, last in enumerate((own, changed))
                 )
-                shares = np.linalg.lstsq(changes, changed)[0]
-                found[..., channel] -= ((starts + changes) @ shares).reshape(found.shape[:3])
+                weights = np.linalg.lstsq(changes, changed)[0]
+                found[..., channel] -= ((starts + changes) @ weights).reshape(found.shape[:3])
         self._rounds = [*self._rounds, (start, change)][-MIXED:]
         return found
 
@@ -397,9 +397,9 @@ def _finer(values: Array, times: int) -> Array:
     places = [np.clip((np.arange(size * times) + 0.5) / times - 0.5, 0.0, size - 1.0) for size in values.shape[:3]]
     for axis, place in enumerate(places):
         low = np.minimum(place.astype(np.int64), max(values.shape[axis] - 2, 0))
-        share = (place - low).reshape([-1 if i == axis else 1 for i in range(4)])
+        fraction = (place - low).reshape([-1 if i == axis else 1 for i in range(4)])
         high = np.minimum(low + 1, values.shape[axis] - 1)
-        values = (1.0 - share) * values.take(low, axis) + share * values.take(high, axis)
+        values = (1.0 - fraction) * values.take(low, axis) + fraction * values.take(high, axis)
     return values
 
 
@@ -433,7 +433,7 @@ def _from_lights(
             nearest = (3.0 / (4.0 * np.pi)) ** (1.0 / 3.0) * cells.step / np.sqrt(3.0)
             power = np.asarray(light.intensity) / np.maximum(((place - points) ** 2).sum(axis=1), nearest**2)[:, None]
             if isinstance(light, SpotLight):
-                power = power * _mean_shares(light, points, cells.step)[:, None]
+                power = power * _mean_attenuation(light, points, cells.step)[:, None]
         else:
             place = points - np.asarray(light.direction) * cells.step * sum(density.shape)
             power = np.broadcast_to(np.asarray(light.irradiance), points.shape)
@@ -442,10 +442,10 @@ def _from_lights(
         # From the edge of the cell on, the mean over it: of what lets nothing through, all that gets in.
         own = density[inside] * cells.step
         if body.density is None:
-            column = _way_inside(body, points, place)
+            column = _metres_inside(body, points, place)
         else:
-            way = np.abs(place - points)
-            own = own * np.linalg.norm(way, axis=1) / np.maximum(way.max(axis=1), _STILL)
+            offset = np.abs(place - points)
+            own = own * np.linalg.norm(offset, axis=1) / np.maximum(offset.max(axis=1), _STILL)
             column = _column(grid, density, points, place)
         before = np.maximum(column - 0.5 * own, 0.0)
         turned, all_turned = (
@@ -457,21 +457,23 @@ def _from_lights(
     return unturned, ahead
 
 
-def _mean_shares(light: SpotLight, points: Array, step: float) -> Array:
+def _mean_attenuation(light: SpotLight, points: Array, step: float) -> Array:
     """(k,): mean falloff of a spot over cells around points, as its cone may be thinner than a cell."""
     places = (np.arange(_SPOT_PLACES) + 0.5) / _SPOT_PLACES - 0.5
     total = np.zeros(len(points))
     for offset in np.stack(np.meshgrid(places, places, places), axis=-1).reshape(-1, 3) * step:
-        way = points + offset - np.asarray(light.position)
-        total += cone_attenuation(way / np.maximum(np.linalg.norm(way, axis=1), _STILL * step)[:, None], light.cone)
+        from_light = points + offset - np.asarray(light.position)
+        total += cone_attenuation(
+            from_light / np.maximum(np.linalg.norm(from_light, axis=1), _STILL * step)[:, None], light.cone
+        )
     return np.asarray(total / _SPOT_PLACES**3)
 
 
-def _way_inside(body: Object, points: Array, places: Array) -> Array:
+def _metres_inside(body: Object, points: Array, places: Array) -> Array:
     """(k,): metres in a body between points (k, 3) and places (k, 3): a grid would smear its surface."""
-    way = places - points
-    distance = np.linalg.norm(way, axis=1)
-    return path_inside(body, points, way / np.maximum(distance, np.finfo(np.float64).tiny)[:, None], distance)
+    path = places - points
+    distance = np.linalg.norm(path, axis=1)
+    return path_inside(body, points, path / np.maximum(distance, np.finfo(np.float64).tiny)[:, None], distance)
 
 
 def _column(grid: BodyGrid, density: Array, points: Array, places: Array) -> Array:
@@ -481,10 +483,10 @@ def _column(grid: BodyGrid, density: Array, points: Array, places: Array) -> Arr
     along = end - begin
     slow = np.where(np.abs(along) > _STILL, along, _STILL)
     leaves = np.where(slow > 0.0, size - begin, -1.0 - begin) / slow
-    share = np.clip(leaves.min(axis=1), 0.0, 1.0)
+    fraction = np.clip(leaves.min(axis=1), 0.0, 1.0)
     count = max(int(POINTS_A_CELL * size.max()), 1)
     total = np.zeros(len(points))
     for t in (np.arange(count) + 0.5) / count:
-        at = begin + (t * share)[:, None] * along
+        at = begin + (t * fraction)[:, None] * along
         total += map_coordinates(density, at.T, order=1, mode="constant")
-    return np.asarray(total * np.linalg.norm(along, axis=1) * share * cells.step / count)
+    return np.asarray(total * np.linalg.norm(along, axis=1) * fraction * cells.step / count)

@@ -40,20 +40,20 @@ def filmed_reflectance(
     ----------
     bare, cosine, ior : array_like (...)
     film : array_like (..., 3)
-        Share of the interface that has it, its index of refraction, and metres.
+        Fraction of the interface that has it, its index of refraction, and metres.
     ior_before : array_like (...)
         Index of the side that light comes from.
     """
     film = np.asarray(film, np.float64)
     scalars = np.broadcast_arrays(*(np.asarray(v, np.float64) for v in (bare, cosine, ior, ior_before)), film[..., 0])
-    share, metres = scalars[4], np.broadcast_to(film[..., 2], scalars[0].shape)
+    fraction, metres = scalars[4], np.broadcast_to(film[..., 2], scalars[0].shape)
     index = np.broadcast_to(film[..., 1], scalars[0].shape)
     found = np.repeat(scalars[0][..., None], 3, axis=-1)
-    some = share > 0.0
+    some = fraction > 0.0
     if some.any():
         _, at, relative, before, _ = (values[some] for values in scalars)
         colored = thin_film_reflectance(at, relative, index[some] / before, index[some] * metres[some])
-        found[some] += share[some, None] * (colored - found[some])
+        found[some] += fraction[some, None] * (colored - found[some])
     return found
 
 

@@ -44,17 +44,17 @@ def reflectance_on_card(albedo: npt.ArrayLike, depth: npt.ArrayLike, ior: float,
     Returns
     -------
     array
-        0 to 1: from a clear slab on a white card, the share of light that enters.
+        0 to 1: from a clear slab on a white card, the fraction of light that enters.
     """
-    shares, depths = np.broadcast_arrays(np.asarray(albedo, dtype=np.float64), np.asarray(depth, dtype=np.float64))
+    albedos, depths = np.broadcast_arrays(np.asarray(albedo, dtype=np.float64), np.asarray(depth, dtype=np.float64))
     mu, weight = _cosines(ior)
-    bare = _layers(shares.ravel(), np.minimum(depths.ravel(), DEEPEST), mu, weight)
-    back, on = (matrix.reshape(*shares.shape, len(mu), len(mu)) for matrix in bare)
+    bare = _layers(albedos.ravel(), np.minimum(depths.ravel(), DEEPEST), mu, weight)
+    back, on = (matrix.reshape(*albedos.shape, len(mu), len(mu)) for matrix in bare)
     turned = np.asarray(card, dtype=np.float64)[..., None, None] * np.broadcast_to(2.0 * mu * weight, back.shape[-2:])
     one = np.eye(len(mu))
     back = back + on @ np.linalg.solve(one - turned @ back, turned @ on)
     mirror = optics.fresnel_dielectric(mu, 1.0 / ior) if ior > 1.0 else np.zeros_like(mu)
-    # Uniform radiance from outside stays uniform inside the cone that it refracts to, but for Fresnel's share.
+    # Uniform radiance from outside stays uniform inside the cone that it refracts to, but for Fresnel reflection.
     entered = np.broadcast_to((1.0 - mirror)[:, None], (*back.shape[:-1], 1))
     down = np.linalg.solve(one - mirror[:, None] * back, entered)
     flux = mu * weight * (1.0 - mirror)

@@ -39,7 +39,7 @@ def bare_half_space(albedo: float, phase: PhaseFunction, cosine: Array, weight: 
     cosine, weight : (n,)
         Quadrature over 0 to 1.
     moments : int
-        Legendre moments of the phase function, as many as the quadrature can tell apart: twice the nodes of a part of
+        Legendre moments of the phase function, as many as the quadrature can resolve: twice the nodes of a part of
         it. The forward peak beyond them counts as unscattered.
     """
     from scipy.linalg import eigh  # late: a window opens without it
@@ -48,13 +48,13 @@ def bare_half_space(albedo: float, phase: PhaseFunction, cosine: Array, weight: 
     peak = float(known[-1])
     albedo = albedo * (1.0 - peak) / (1.0 - albedo * peak)
     order = np.arange(moments)
-    share = (2 * order + 1) * (known[:-1] - peak) / (1.0 - peak)
+    coefficients = (2 * order + 1) * (known[:-1] - peak) / (1.0 - peak)
     root = np.sqrt(weight)
     values = root[:, None] * np.polynomial.legendre.legvander(cosine, moments - 1)
     one = np.eye(len(cosine))
-    # What is alike up and down meets even moments alone, what is opposite odd ones: with s = up + down, t = up - down,
-    # mu s' = odd t and mu t' = even s. Both are symmetric, as the radiance carries the roots of the weights.
-    even, odd = (one - albedo * (values[:, part] * share[part]) @ values[:, part].T for part in _PARTS)
+    # Even moments act on the sum alone, odd ones on the difference: with s = up + down, t = up - down, mu s' = odd t
+    # and mu t' = even s. Both are symmetric, as the radiance carries the roots of the weights.
+    even, odd = (one - albedo * (values[:, part] * coefficients[part]) @ values[:, part].T for part in _PARTS)
     along = np.linalg.solve(odd, np.diag(cosine))
     rates, sums = eigh(even, cosine[:, None] * along)  # looks at one triangle of each alone
     differences = along @ sums * np.sqrt(np.maximum(rates, 0.0))
@@ -74,21 +74,21 @@ H_TOLERANCE, H_STEPS = 1e-13, 200
 
 @dataclass(frozen=True)
 class DiffuseInterface:
-    """Shares of diffuse light that an interface reflects and lets through; the rest, if it is rough, is lost.
+    """Fractions of diffuse light that an interface reflects and lets through; the rest, if it is rough, is lost.
 
-    A single reflection at GGX microfacets loses what would meet a second one: as `TracedInterfaces` does.
+    A single reflection at GGX microfacets loses what would hit a second one: as `TracedInterfaces` does.
 
     Attributes
     ----------
     entering : float
-        Of uniform radiance from outside, the share that enters.
+        Of uniform radiance from outside, the fraction that enters.
     mean_cosine : float
         Of the entering light, inside: the mean depth of its first event is this many mean free paths.
     reflected, reflected_flux : float
-        Of light from inside, the share that is reflected: of uniform radiance, weighted by the cosine; and of radiance
-        that is as the cosine, weighted by its square (R_phi and R_j of Haskell et al. 1994).
+        Of light from inside, the fraction that is reflected: of uniform radiance, weighted by the cosine; and of
+        radiance that is as the cosine, weighted by its square (R_phi and R_j of Haskell et al. 1994).
     leaving, leaving_flux : float
-        Likewise, the shares that leave.
+        Likewise, the fractions that leave.
     """
 
     entering: float
@@ -100,18 +100,18 @@ class DiffuseInterface:
 
     @property
     def conductance(self) -> float:
-        """Net flux through the interface from inside, as a share of the fluence there: (1 - R_phi) / (2 (1 + R_j))."""
+        """Net flux through the interface from inside over the fluence there: (1 - R_phi) / (2 (1 + R_j))."""
         return 0.5 * (1.0 - self.reflected) / (1.0 + self.reflected_flux)
 
     @property
     def exit_share(self) -> float:
-        """Flux outside as a share of the fluence inside; the conductance unless the interface loses light."""
+        """Flux outside as a fraction of the fluence inside; the conductance unless the interface loses light."""
         return 0.25 * self.leaving + 0.5 * self.conductance * self.leaving_flux
 
 
 @lru_cache(maxsize=256)
 def diffuse_interface(ior: float, roughness: float = 0.0) -> DiffuseInterface:
-    """Shares of diffuse light at an interface.
+    """Fractions of diffuse light at an interface.
 
     Parameters
     ----------
@@ -126,8 +126,10 @@ def diffuse_interface(ior: float, roughness: float = 0.0) -> DiffuseInterface:
     flux = 2.0 * outside * outside_weight * entered
     mean_cosine = float((flux * optics.refracted_cosine(outside, ior)).sum() / flux.sum())
     if roughness > 0.0 and ior > 1.0:
-        (_, entering), (reflected, leaving) = (_rough_shares(relative, roughness, 2) for relative in (ior, 1.0 / ior))
-        reflected_flux, leaving_flux = _rough_shares(1.0 / ior, roughness, 3)
+        (_, entering), (reflected, leaving) = (
+            _rough_fractions(relative, roughness, 2) for relative in (ior, 1.0 / ior)
+        )
+        reflected_flux, leaving_flux = _rough_fractions(1.0 / ior, roughness, 3)
         return DiffuseInterface(entering, mean_cosine, reflected, reflected_flux, leaving, leaving_flux)
     inside = _inside_reflectance(cosine, ior)
     reflected = float((2.0 * cosine * inside * weight).sum())
@@ -174,10 +176,10 @@ def half_space_reflectance(albedo: float, ior: float = 1.0, phase: PhaseFunction
         Index of the half-space relative to what is above; polished.
     phase : PhaseFunction
     """
-    cosine, flux, shares = _half_space(albedo, ior, phase)
-    # Uniform radiance from outside stays uniform inside the cone that it refracts to, but for Fresnel's share.
+    cosine, flux, reflectances = _half_space(albedo, ior, phase)
+    # Uniform radiance from outside stays uniform inside the cone that it refracts to, but for Fresnel reflection.
     down = flux * (1.0 - _inside_reflectance(cosine, ior))
-    return float((down * shares).sum() / down.sum())
+    return float((down * reflectances).sum() / down.sum())
 
 
 def half_space_reflectances(
@@ -192,13 +194,13 @@ def half_space_reflectances(
     albedo, ior, phase
         See `half_space_reflectance`.
     """
-    at, _, shares = _half_space(albedo, ior, phase)
-    return np.asarray(np.interp(np.asarray(cosine, np.float64), at, shares))
+    at, _, reflectances = _half_space(albedo, ior, phase)
+    return np.asarray(np.interp(np.asarray(cosine, np.float64), at, reflectances))
 
 
 @lru_cache(maxsize=1024)
 def _half_space(albedo: float, ior: float, phase: PhaseFunction) -> tuple[Array, Array, Array]:
-    """Cosines inside, flux of uniform radiance around each, and the share of light that enters there and leaves again.
+    """Cosines inside, flux of uniform radiance around each, and the reflectance of light that enters there.
 
     The bare half-space reflects as Chandrasekhar's H functions say where it scatters to all sides alike, else as its
     modes do (`bare_half_space`); its interface mirrors part of that back, and the half-space reflects it again: one
@@ -259,13 +261,13 @@ def _nodes(ior: float, number: int = NODES) -> tuple[Array, Array]:
     )
 
 
-def _rough_shares(ior: float, roughness: float, power: int) -> tuple[float, float]:
-    """Reflected and transmitted share of light whose density over cosines is `power` mu^(power - 1)."""
+def _rough_fractions(ior: float, roughness: float, power: int) -> tuple[float, float]:
+    """Reflected and transmitted fraction of light whose density over cosines is `power` mu^(power - 1)."""
     number = np.arange(FACETS)
-    first, *shares = ((0.5 + number[:, None] * [0.8191725133961645, 0.6710436067037893, 0.5497004779019703]) % 1.0).T
+    first, *samples = ((0.5 + number[:, None] * [0.8191725133961645, 0.6710436067037893, 0.5497004779019703]) % 1.0).T
     cosine, alpha = first ** (1.0 / power), roughness * roughness
     towards = np.stack([np.sqrt(1.0 - cosine**2), np.zeros_like(cosine), cosine], axis=1)
-    facet = interface.ggx_visible_normal(towards, alpha, np.stack(shares, axis=1))
+    facet = interface.ggx_visible_normal(towards, alpha, np.stack(samples, axis=1))
     on_facet = np.clip((towards * facet).sum(axis=1), 0.0, 1.0)
     reflectance = optics.fresnel_dielectric(on_facet, ior)
     back = 2.0 * on_facet * facet[:, 2] - cosine

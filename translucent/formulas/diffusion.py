@@ -18,8 +18,9 @@ from translucent.arrays import Array
 #: within 40 degrees, as after one to three events with g = .8.
 IN_SCATTERED_ROUGHNESS = 0.8
 
-#: Share of the mirror of diffuse light at which interfaces mirror it, as it is between rays and diffuse light: for an
-#: index of 1.5 and g = 0.9 it is 0.28 where media are thin and 0.6 where hardly any light gets through.
+#: Fraction of the diffuse reflectance at which interfaces reflect in-scattered light, as that is between rays and
+#: diffuse light: for an index of 1.5 and g = 0.9 it is 0.28 where media are thin and 0.6 where hardly any light gets
+#: through.
 IN_SCATTERED_REFLECTED = 0.5
 
 
@@ -34,7 +35,7 @@ def emergent_radiance(
 ) -> Array:
     """Radiance times 4 pi, inside a body below its surface and towards it, of light that has been scattered.
 
-    The source of scattered light seen along a ray that leaves, where the fluence rises inwards from the surface and
+    The source of scattered light along a ray that leaves, where the fluence rises inwards from the surface and
     light has entered just now: w (phi (1 + 3 c mu) - 3 E mu^2 / (mu + m)) + E / (mu + m). Constant over all angles in
     a lossless body in uniform light; 1 + 3 c mu where all light comes from deep below.
 
@@ -69,9 +70,9 @@ def in_scattered_shares(reflected: npt.ArrayLike, passed: npt.ArrayLike) -> tupl
     Parameters
     ----------
     reflected : array_like (...)
-        r: share of diffuse light from inside that the interface mirrors.
+        r: fraction of diffuse light from inside that the interface mirrors.
     passed : array_like (...)
-        p: share of diffuse light that absorption lets across the body.
+        p: fraction of diffuse light that absorption lets across the body.
     """
     r, p = np.asarray(reflected, np.float64), np.asarray(passed, np.float64)
     first = IN_SCATTERED_REFLECTED * r

@@ -8,7 +8,7 @@ texture mapping"), each in a map that is blurred for the shorter one.
 from __future__ import annotations
 
 #: Pixels across which differentials are taken, for one sample of a pixel; for several, over the square root of their
-#: number. Over a whole pixel the footprint of a ray that has met several curved surfaces is far from an ellipse: twice
+#: number. Over a whole pixel the footprint of a ray that has hit several curved surfaces is far from an ellipse: twice
 #: the bias for a twentieth less noise.
 FOOTPRINT_STEP = 0.5
 

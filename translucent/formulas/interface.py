@@ -1,7 +1,7 @@
 """Formulas of light at interfaces between media, in float64. Each has a twin in ``shaders/lib/interface.glsl``.
 
 All functions are pure and broadcast. Directions (..., 3) are unit vectors in which light travels; a normal looks to the
-side that the light comes from; ``ior`` is the index of the other side relative to this one. The share that a smooth
+side that the light comes from; ``ior`` is the index of the other side relative to this one. The fraction that a smooth
 boundary reflects is `optics.fresnel_dielectric`, the cosine inside `optics.refracted_cosine`.
 
 References
@@ -93,7 +93,7 @@ def ggx_visibility(cos_light: npt.ArrayLike, cos_view: npt.ArrayLike, alpha: npt
     """Height-correlated masking and shadowing G2 / (4 cos_light cos_view) of GGX (Heitz 2014, eq. 99).
 
     The light that a rough boundary reflects is F D V of what arrives, with `optics.fresnel_dielectric` at the
-    microfacet. Exactly edge-on from both sides, where nothing is seen, V is 0.
+    microfacet. Exactly edge-on from both sides, where nothing is visible, V is 0.
 
     Parameters
     ----------
@@ -116,8 +116,8 @@ def _smith_root(cosine: Array, alpha: Array) -> Array:
 def smith_lambda(cosine: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
     """Smith's Lambda of GGX, (sqrt(1 + alpha^2 tan^2) - 1) / 2 (Heitz 2014, eq. 72).
 
-    Of the microfacets that face a direction the share 1 / (1 + Lambda) is seen from there; of those seen from one
-    direction, (1 + Lambda_1) / (1 + Lambda_1 + Lambda_2) is seen from another on the same side, too.
+    From a direction, the fraction 1 / (1 + Lambda) of the microfacets that face it is visible; of these,
+    (1 + Lambda_1) / (1 + Lambda_1 + Lambda_2) is also visible from another direction on the same side.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def smith_lambda(cosine: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
 
 @np.errstate(under="ignore")
 def ggx_visible_normal(towards: npt.ArrayLike, alpha: npt.ArrayLike, shares: npt.ArrayLike) -> Array:
-    """Random normal of a GGX microfacet as it is seen from a direction (Heitz 2018, listing 1).
+    """Random normal of a GGX microfacet that is visible from a direction (Heitz 2018, listing 1).
 
     Parameters
     ----------
@@ -158,8 +158,8 @@ def ggx_visible_normal(towards: npt.ArrayLike, alpha: npt.ArrayLike, shares: npt
     first = np.where(tilted, level / np.where(tilted, across[..., None], 1.0), (1.0, 0.0, 0.0))
     second = np.cross(stretched, first)
     radius, angle = np.sqrt(u[..., 0]), 2.0 * np.pi * u[..., 1]
-    x, seen = radius * np.cos(angle), 0.5 * (1.0 + stretched[..., 2])
-    y = (1.0 - seen) * np.sqrt(np.maximum(1.0 - x * x, 0.0)) + seen * radius * np.sin(angle)
+    x, visible = radius * np.cos(angle), 0.5 * (1.0 + stretched[..., 2])
+    y = (1.0 - visible) * np.sqrt(np.maximum(1.0 - x * x, 0.0)) + visible * radius * np.sin(angle)
     z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
     facet = x[..., None] * first + y[..., None] * second + z[..., None] * stretched
     return _unit(np.stack([a * facet[..., 0], a * facet[..., 1], np.maximum(facet[..., 2], 1e-6)], axis=-1))

@@ -28,7 +28,7 @@ def light_cone(direction: npt.ArrayLike, inner: float, outer: float) -> Array:
 
 
 def cone_attenuation(travel: npt.ArrayLike, cone: npt.ArrayLike) -> Array:
-    """Share of a light's intensity in the unit directions `travel` (..., 3): (...).
+    """Fraction of a light's intensity in the unit directions `travel` (..., 3): (...).
 
     KHR_lights_punctual: the square of (cos - cos outer) / (cos inner - cos outer), within 0 to 1. Cosines come from
     chords, 1 - cos = |travel - direction|^2 / 2, which have their digits in narrow cones, too.
@@ -110,7 +110,7 @@ def highlight_from(
         rough = np.where(radius > 0.0, np.clip(8.0 * alpha / radius - 1.0, 0.0, 1.0), 1.0)[..., None]
         middle = (1.0 - rough) * disc[..., :3] + rough * towards
         middle /= np.linalg.norm(middle, axis=-1, keepdims=True)
-        shown = np.concatenate([middle, (1.0 - rough) * radius[..., None]], axis=-1)
-        peak = np.where(radius > 0.0, disc_peak(alpha, shown[..., 3], cos_view), 1.0)
-        found = np.where(radius[..., None] > 0.0, nearest_on_disc(shown, mirrored), towards)
+        effective_disc = np.concatenate([middle, (1.0 - rough) * radius[..., None]], axis=-1)
+        peak = np.where(radius > 0.0, disc_peak(alpha, effective_disc[..., 3], cos_view), 1.0)
+        found = np.where(radius[..., None] > 0.0, nearest_on_disc(effective_disc, mirrored), towards)
     return np.concatenate([found, np.broadcast_to(peak[..., None], (*found.shape[:-1], 1))], axis=-1)

@@ -16,18 +16,18 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 
-#: Smallest cosine in the thin-layer formula (Drobot 2017): a sheet seen edge-on is 1000 times as thick.
+#: Smallest cosine in the thin-layer formula (Drobot 2017): a sheet viewed edge-on is 1000 times as thick.
 MIN_THIN_LAYER_COSINE = 0.001
 
 
 def transmittance(optical_depth: npt.ArrayLike) -> Array:
-    """Transmittance, the share of light that passes, T = exp(-tau) (Beer-Lambert); underflows to exactly 0."""
+    """Transmittance, the fraction of light that passes, T = exp(-tau) (Beer-Lambert); underflows to exactly 0."""
     with np.errstate(under="ignore"):
         return np.exp(-np.asarray(optical_depth, dtype=np.float64))
 
 
 def opacity(optical_depth: npt.ArrayLike) -> Array:
-    """Opacity, the share of light that is lost, alpha = 1 - exp(-tau), without cancellation at small tau."""
+    """Opacity, the fraction of light that is lost, alpha = 1 - exp(-tau), without cancellation at small tau."""
     with np.errstate(under="ignore"):
         return -np.expm1(-np.asarray(optical_depth, dtype=np.float64))
 

@@ -1,4 +1,4 @@
-"""Phase functions: how a medium spreads the light that it scatters over the angles that light turns by.
+"""Phase functions: distributions of scattered light over the scattering angle.
 
 Functions have twins of the same name in ``shaders/lib/phase.glsl``; a phase function is four numbers there, its
 `PhaseFunction.parameters`.
@@ -34,7 +34,7 @@ MAX_ALPHA = 1e4
 DROPLETS = 5e-6, 50e-6
 
 #: Parameters of a phase function as tables and shaders have them: g of Henyey and Greenstein; g and alpha of Draine,
-#: and the share of the light that the latter scatters.
+#: and the fraction of the light that the latter scatters.
 Parameters = tuple[float, float, float, float]
 
 
@@ -56,7 +56,7 @@ def henyey_greenstein(cos_scatter: npt.ArrayLike, anisotropy: npt.ArrayLike) -> 
 
 
 def henyey_greenstein_cosine(share: npt.ArrayLike, anisotropy: npt.ArrayLike) -> Array:
-    """Cosine of which a share, 0 to 1, of the scattered light turns further (Witt 1977).
+    """Cosine of the angle beyond which a fraction `share`, 0 to 1, of the light is scattered (Witt 1977).
 
     Rearranged so that nothing is divided by g, which may be 0.
     """
@@ -78,20 +78,20 @@ def draine(cos_scatter: npt.ArrayLike, anisotropy: npt.ArrayLike, alpha: npt.Arr
 
 @np.errstate(under="ignore")
 def draine_cosine(share: npt.ArrayLike, anisotropy: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
-    """Cosine of which a share, 0 to 1, of the light that Draine's phase function scatters turns further.
+    """Cosine of the angle beyond which Draine's phase function scatters a fraction `share`, 0 to 1, of the light.
 
-    With t, that share by Henyey and Greenstein, it is the integral of 1 + alpha cos^2 over t: in q = 1 - g + 2 g t, the
-    integral of cos^2 is t (m^2 + t^2 (1 - g) (1 + g)^4 / (3 q^3)) with m = (t (1 + g^2) - (1 - g)) / q, in which
+    With t, that fraction by Henyey and Greenstein, it is the integral of 1 + alpha cos^2 over t: in q = 1 - g + 2 g t,
+    the integral of cos^2 is t (m^2 + t^2 (1 - g) (1 + g)^4 / (3 q^3)) with m = (t (1 + g^2) - (1 - g)) / q, in which
     nothing cancels. It rises with t, and is solved for by Newton's method in a bracket.
     """
     share, g, a = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (share, anisotropy, alpha)))
-    wanted = share * (1.0 + a * (1.0 + 2.0 * g * g) / 3.0)
+    target = share * (1.0 + a * (1.0 + 2.0 * g * g) / 3.0)
     low, high, t = np.zeros(share.shape), np.ones(share.shape), share
     for _ in range(DRAINE_STEPS):
         q = 1.0 - g + 2.0 * g * t
         middle = (t * (1.0 + g * g) - (1.0 - g)) / q
         squares = middle**2 + t * t * (1.0 - g) * (1.0 + g) ** 4 / (3.0 * q**3)
-        beyond = t * (1.0 + a * squares) - wanted
+        beyond = t * (1.0 + a * squares) - target
         low, high = np.where(beyond > 0, low, t), np.where(beyond > 0, t, high)
         following = t - beyond / (1.0 + a * henyey_greenstein_cosine(t, g) ** 2)
         t = np.where((following >= low) & (following <= high), following, 0.5 * (low + high))
@@ -99,17 +99,17 @@ def draine_cosine(share: npt.ArrayLike, anisotropy: npt.ArrayLike, alpha: npt.Ar
 
 
 def phase_value(phase: npt.ArrayLike, cos_scatter: npt.ArrayLike) -> Array:
-    """Phase function in 1/sr at the cosine (...,) of the angle that light turns by, of `parameters` (..., 4)."""
+    """Phase function in 1/sr at the cosine (...,) of the scattering angle, of `parameters` (..., 4)."""
     g, draine_g, alpha, weight = np.moveaxis(np.asarray(phase, np.float64), -1, 0)
     parts = henyey_greenstein(cos_scatter, g), draine(cos_scatter, draine_g, alpha)
     return np.asarray((1.0 - weight) * parts[0] + weight * parts[1])
 
 
 def phase_cosine(phase: npt.ArrayLike, share: npt.ArrayLike) -> Array:
-    """Cosine (...,) of the angle that light turns by, at random: `share` (...,) is a random number, 0 to 1."""
+    """Random cosine (...,) of the scattering angle: `share` (...,) is a random number, 0 to 1."""
     g, draine_g, alpha, weight = np.moveaxis(np.asarray(phase, np.float64), -1, 0)
     share = np.asarray(share, np.float64)
-    # Of the two of the mixture, one scatters the first shares and the other the rest.
+    # Of the two of the mixture, one scatters the first numbers and the other the rest.
     first = np.minimum(share / np.where(weight > 0, weight, 1.0), 1.0)
     second = np.clip((share - weight) / np.where(weight < 1, 1.0 - weight, 1.0), 0.0, 1.0)
     draines = (weight > 0) & (share <= weight)
@@ -132,7 +132,7 @@ class PhaseFunction(ABC):
 
     @property
     def mean_cosine(self) -> float:
-        """Mean cosine g of the angle that light turns by: 0 where as much goes on as turns back."""
+        """Mean cosine g of the scattering angle: 0 where as much goes on as back."""
         return float(self.moments(2)[1])
 
     @abstractmethod
@@ -141,7 +141,7 @@ class PhaseFunction(ABC):
 
     @checked
     def value(self, cos_scatter: npt.ArrayLike) -> Array:
-        """Phase function in 1/sr at the cosine of the angle that light turns by: 1 is straight on."""
+        """Phase function in 1/sr at the cosine of the scattering angle: 1 is straight on."""
         cosine = np.asarray(cos_scatter, dtype=np.float64)
         if not (np.abs(cosine) <= 1 + 1e-6).all():  # what rounding makes of 1
             raise InputError("cosine of an angle of scattering", "not in -1 to 1", "give cosines, 1 for straight on")
@@ -257,7 +257,7 @@ class WaterDroplets(PhaseFunction):
 
     @checked
     def moments(self, count: int) -> Array:
-        """Those of both parts, by their shares."""
+        """Those of both parts, by their weights."""
         g, draine_g, alpha, weight = self.parameters
         parts = HenyeyGreenstein(g).moments(count), Draine(draine_g, alpha).moments(count)
         return (1.0 - weight) * parts[0] + weight * parts[1]
@@ -269,7 +269,7 @@ def _moments(count: int) -> int:
     return count
 
 
-#: Phase function of light that turns everywhere alike.
+#: Phase function of isotropic scattering.
 ISOTROPIC = HenyeyGreenstein()
 
 #: Phase functions by their names.

@@ -71,6 +71,6 @@ def exit_lobe(cosine: npt.ArrayLike, ior: npt.ArrayLike, entering: npt.ArrayLike
     ior : array_like
         Of the medium.
     entering : array_like
-        e: share of diffuse light that the polished interface lets through, `DiffuseInterface.entering`.
+        e: fraction of diffuse light that the polished interface lets through, `DiffuseInterface.entering`.
     """
     return np.asarray((1.0 - optics.fresnel_dielectric(cosine, ior)) / np.asarray(entering, np.float64))

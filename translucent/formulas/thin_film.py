@@ -31,14 +31,14 @@ FILM_BLUE_CENTER = 2.2399e6
 FILM_BLUE_WIDTH = 4.5282e9
 
 _PEAKS = 5.4856e-13 * np.sqrt(4.3278e9), 9.7470e-14 * np.sqrt(4.5282e9)
-#: Share of the second maximum in X.
+#: Fraction of the second maximum in X.
 FILM_BLUE_SHARE = float(_PEAKS[1] / (_PEAKS[0] + _PEAKS[1]))
 
 _XYZ_TO_RGB = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
 )
 _ADAPTED = _XYZ_TO_RGB * (0.95047, 1.0, 1.08883)
-#: Rec.709 of X, Y and Z in shares of white; rows add up to 1.
+#: Rec.709 of X, Y and Z in fractions of white; rows add up to 1.
 FILM_TO_RGB = _ADAPTED / _ADAPTED.sum(axis=1, keepdims=True)
 
 #: Optical paths in m up to which all orders are added up as if light had one wavelength for each channel, and from
@@ -54,7 +54,7 @@ def film_interference(optical_path: npt.ArrayLike) -> Array:
     Parameters
     ----------
     optical_path : array_like
-        Difference of two ways times index of refraction, in metres, >= 0.
+        Difference of two paths times index of refraction, in metres, >= 0.
     """
     phase = 2.0 * np.pi * np.asarray(optical_path, dtype=np.float64)[..., None]
     waves = np.cos(np.asarray(FILM_CENTERS) * phase) * np.exp(-np.asarray(FILM_WIDTHS) * phase**2)
@@ -107,8 +107,8 @@ def _film_transmittance(first: Array, film: Array, last: Array, path: Array, wav
     orders = 1.0 + 2.0 * sum(both ** (order + 1) * wave for order, wave in enumerate(waves))
     colored = passed / ((1.0 - both) * (1.0 + both)) * orders
     together = passed / (1.0 - 2.0 * both * np.clip(waves[0], -1.0, 1.0) + both * both)
-    share = np.clip((path - FILM_COHERENT[0]) / (FILM_COHERENT[1] - FILM_COHERENT[0]), 0.0, 1.0)[..., None]
-    return np.asarray(together + share * share * (3.0 - 2.0 * share) * (colored - together))
+    fraction = np.clip((path - FILM_COHERENT[0]) / (FILM_COHERENT[1] - FILM_COHERENT[0]), 0.0, 1.0)[..., None]
+    return np.asarray(together + fraction * fraction * (3.0 - 2.0 * fraction) * (colored - together))
 
 
 @np.errstate(under="ignore")

@@ -25,11 +25,11 @@ NEUTRAL_F90 = 0.04
 NEUTRAL_START = 0.8 - NEUTRAL_F90
 NEUTRAL_DESATURATION = 0.15
 
-#: AgX: stops below and above middle gray that the curve tells apart, and middle gray itself.
+#: AgX: stops below and above middle gray that the curve resolves, and middle gray itself.
 AGX_STOPS = (-10.0, 6.5)
 AGX_MIDDLE_GRAY = 0.18
 
-#: AgX: share of each channel mixed into every other, which narrows the gamut towards gray.
+#: AgX: fraction of each channel mixed into every other, which narrows the gamut towards gray.
 AGX_MIX = (0.04240107095046854, 0.07843650156180276, 0.0791624274877287)
 
 #: AgX: powers of the toe and of the shoulder, slope of the sigmoid between, and the power of the display.
@@ -58,9 +58,9 @@ def tone_neutral(linear: npt.ArrayLike) -> Array:
         color = color - reflected
         peak = color.max(axis=-1, keepdims=True)
         above = np.maximum(peak, NEUTRAL_START)
-        shown = 1.0 - (1.0 - NEUTRAL_START) ** 2 / (above + 1.0 - 2.0 * NEUTRAL_START)
-        kept = 1.0 / (NEUTRAL_DESATURATION * (above - shown) + 1.0)
-        bright = color * (shown / above) * kept + shown * (1.0 - kept)
+        compressed = 1.0 - (1.0 - NEUTRAL_START) ** 2 / (above + 1.0 - 2.0 * NEUTRAL_START)
+        kept = 1.0 / (NEUTRAL_DESATURATION * (above - compressed) + 1.0)
+        bright = color * (compressed / above) * kept + compressed * (1.0 - kept)
     return np.asarray(np.where(peak > NEUTRAL_START, bright, color))
 
 

@@ -29,7 +29,7 @@ def two_stream_absorption(absorption: npt.ArrayLike) -> Array:
 def two_stream_scattering(scattering: npt.ArrayLike, anisotropy: npt.ArrayLike) -> Array:
     """Scattering S = 3/4 sigma_s (1 - g) in 1/m (Gate 1974): of reduced scattering, three quarters turn light around.
 
-    For diffuse light on a wide slab of an albedo from 0.9, both shares are within 0.03 of the true ones whatever its
+    For diffuse light on a wide slab of an albedo from 0.9, both fractions are within 0.03 of the true ones whatever its
     thickness, and within 0.07 from an albedo of 0.5; of light straight on, thin slabs reflect up to half less.
     """
     return 0.75 * (1.0 - np.asarray(anisotropy, dtype=np.float64)) * np.asarray(scattering, dtype=np.float64)

@@ -7,7 +7,7 @@ each other become one. All clusters of a round are handled at once, so that NumP
 are as good as those of the surface area heuristic. Which subtrees become leaves is decided by that heuristic
 (MacDonald & Booth 1990).
 
-Nodes are visited depth-first with skip links (Smits 1998, "Efficiency issues for ray tracing"): a ray that meets the
+Nodes are visited depth-first with skip links (Smits 1998, "Efficiency issues for ray tracing"): a ray that hits the
 bounds of a node goes on to the next node, any other to the node behind the subtree; no stack is needed. There is an
 order for each octant of directions, in which the nearer child comes first.
 """
@@ -232,9 +232,9 @@ def _laid_out(tree: _BinaryTree, order: Integers, leaf_size: int) -> Hierarchy:
     for begin, end in tree.rounds:
         left, right = tree.children[:, begin:end]
         counts[begin:end] = counts[left] + counts[right]
-    shares = _shares(tree, counts, leaf_size)
-    shown = shares == 1
-    nodes = shown.astype(np.int32)
+    replacements = _replacements(tree, counts, leaf_size)
+    kept = replacements == 1
+    nodes = kept.astype(np.int32)
     for begin, end in tree.rounds:
         left, right = tree.children[:, begin:end]
         nodes[begin:end] += nodes[left] + nodes[right]
@@ -245,7 +245,7 @@ def _laid_out(tree: _BinaryTree, order: Integers, leaf_size: int) -> Hierarchy:
         first[right] = first[begin:end] + counts[left]
     faces = np.empty(leaves, np.int32)
     faces[first[:leaves]] = order
-    chosen = np.flatnonzero(shown)[::-1]  # the root was made last
+    chosen = np.flatnonzero(kept)[::-1]  # the root was made last
     leaf = nodes[chosen] == 1
     return Hierarchy(
         np.ascontiguousarray(tree.low[:, chosen].T),
@@ -253,12 +253,12 @@ def _laid_out(tree: _BinaryTree, order: Integers, leaf_size: int) -> Hierarchy:
         nodes[chosen],
         np.where(leaf, first[chosen], 0).astype(np.int32),
         np.where(leaf, counts[chosen], 0).astype(np.int32),
-        _depth_first(tree, nodes, shown)[:, chosen],
+        _depth_first(tree, nodes, kept)[:, chosen],
         faces,
     )
 
 
-def _shares(tree: _BinaryTree, counts: npt.NDArray[np.int32], leaf_size: int) -> npt.NDArray[np.int8]:
+def _replacements(tree: _BinaryTree, counts: npt.NDArray[np.int32], leaf_size: int) -> npt.NDArray[np.int8]:
     """(n,): 1 for nodes of a tree that are kept, 0 for nodes within leaves; others are replaced by that many.
 
     Skip links let a node have any number of children. One whose bounds are hardly smaller than those of the node above
@@ -291,20 +291,18 @@ def _shares(tree: _BinaryTree, counts: npt.NDArray[np.int32], leaf_size: int) ->
             np.copyto(cost, with_tests, where=less)
             np.copyto(children[begin:end], k, where=less)
         own[0] = cost
-    shares = np.zeros(total, np.int8)
-    shares[-1] = 1
+    replacements = np.zeros(total, np.int8)
+    replacements[-1] = 1
     for begin, end in reversed(tree.rounds):
         left, right = tree.children[:, begin:end]
-        share = shares[begin:end]
-        split = np.where(share == 1, children[begin:end], share)
+        replaced = replacements[begin:end]
+        split = np.where(replaced == 1, children[begin:end], replaced)
         from_left = np.take_along_axis(taken[:, begin:end], np.maximum(split, 1)[None].astype(np.int64) - 1, axis=0)[0]
-        shares[left], shares[right] = from_left, split - from_left
-    return shares
+        replacements[left], replacements[right] = from_left, split - from_left
+    return replacements
 
 
-def _depth_first(
-    tree: _BinaryTree, nodes: npt.NDArray[np.int32], shown: npt.NDArray[np.bool_]
-) -> npt.NDArray[np.int32]:
+def _depth_first(tree: _BinaryTree, nodes: npt.NDArray[np.int32], kept: npt.NDArray[np.bool_]) -> npt.NDArray[np.int32]:
     """(8, n): place of each node in the order for each octant; `nodes` counts the nodes kept in each subtree."""
     center = tree.low + tree.high
     orders = np.zeros((8, len(nodes)), np.int32)
@@ -315,7 +313,7 @@ def _depth_first(
         axis = np.abs(apart).argmax(axis=0)
         swapped = np.take_along_axis(apart, axis[None], axis=0)[0] < 0
         swap = swapped ^ (octants[:, None] >> axis & 1).astype(bool)
-        place = orders[:, begin:end] + shown[begin:end]
+        place = orders[:, begin:end] + kept[begin:end]
         orders[:, left] = place + np.where(swap, nodes[right], 0)
         orders[:, right] = place + np.where(swap, 0, nodes[left])
     return orders

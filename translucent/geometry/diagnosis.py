@@ -17,7 +17,7 @@ from translucent.geometry.grouping import CHUNK, SortedSides, connected, equal_r
 from translucent.geometry.repair import spread_winding
 from translucent.geometry.winding import inside_out_parts, one_volume, winds_negatively
 
-#: Deepest dent of a convex body, as a share of its size.
+#: Deepest dent of a convex body, as a fraction of its size.
 CONVEX_TOLERANCE = 1e-6
 
 #: Smallest and largest x, y, z.

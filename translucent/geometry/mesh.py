@@ -16,7 +16,7 @@ from translucent.arrays import Array, Frozen
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.diagnosis import Diagnosis, diagnose
 from translucent.geometry.grouping import CHUNK, equal_rows, extent, use_mask
-from translucent.geometry.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, all_apart, orient, weld
+from translucent.geometry.repair import WELD_EDGE_FRACTION, WELD_TOLERANCE, all_apart, orient, weld
 from translucent.geometry.winding import winding_number
 from translucent.signals import import_trimesh
 
@@ -310,7 +310,7 @@ def _welded(raw: Mesh) -> npt.NDArray[np.int64] | None:
     if all_apart(raw.vertices, reach):
         return None
     # A stray vertex far away makes the diagonal huge; what is short beside the usual edge is still one point.
-    return weld(raw.vertices, reach, lambda: WELD_EDGE_SHARE * _median_edge(raw))
+    return weld(raw.vertices, reach, lambda: WELD_EDGE_FRACTION * _median_edge(raw))
 
 
 def _median_edge(mesh: Mesh) -> float:
@@ -326,10 +326,10 @@ def _median_edge(mesh: Mesh) -> float:
 Triangles = tuple[Array, npt.NDArray[np.int32], Array | None]
 
 
-def joined(parts: list[Triangles], asked: str) -> Triangles:
+def joined(parts: list[Triangles], requested: str) -> Triangles:
     """Concatenate the triangles of all parts; raises `InputError` if there are none."""
     if not parts:
-        raise InputError(asked, "it has no faces", "give a triangle mesh, not points or lines")
+        raise InputError(requested, "it has no faces", "give a triangle mesh, not points or lines")
     if len(parts) == 1:
         return parts[0]
     starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts[:-1])])

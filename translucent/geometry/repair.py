@@ -64,12 +64,12 @@ def near_points(points: Array, distance: float) -> Integers:
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]
 
-#: Welding distance as a share of the bounding-box diagonal. Files store float32 at best, whose last bit is 6e-8 of the
-#: coordinate: CAD exports differ by some of these between neighboring faces.
+#: Welding distance as a fraction of the bounding-box diagonal. Files store float32 at best, whose last bit is 6e-8 of
+#: the coordinate: CAD exports differ by some of these between neighboring faces.
 WELD_TOLERANCE = 1e-6
 
-#: Largest welding distance as a share of the median edge.
-WELD_EDGE_SHARE = 1e-2
+#: Largest welding distance as a fraction of the median edge.
+WELD_EDGE_FRACTION = 1e-2
 
 
 #: Smallest welding distance in metres: cells of it are still numbers.
@@ -79,7 +79,7 @@ _LEAST = 1e-250
 #: and how many nearest ones are.
 _CROWD = 16
 
-#: Vertices at the beginning of a mesh that tell whether it is a soup of triangles, each with corners of its own.
+#: Vertices at the beginning of a mesh that decide whether it is a soup of triangles, each with corners of its own.
 _SAMPLE = 3000
 
 
@@ -207,5 +207,5 @@ def _flips(count: int, one: Numbers, other: Numbers, disagree: Mask) -> tuple[Nu
     # A part whose two choices are one component (a Moebius strip) has no consistent winding: leave it.
     orientable = as_is != turned
     in_second = orientable & (as_is > turned)
-    share = np.bincount(part, weights=in_second) / np.bincount(part)
-    return part, orientable & (in_second != (share > 0.5)[part])
+    fraction = np.bincount(part, weights=in_second) / np.bincount(part)
+    return part, orientable & (in_second != (fraction > 0.5)[part])

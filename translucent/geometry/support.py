@@ -125,7 +125,7 @@ class Support:
         """
         if not self.many:
             return np.asarray(values(self.points).max(axis=0))
-        # One vertex of each cluster tells how large the largest value is at least. Of no cluster it is larger than its
+        # One vertex of each cluster bounds the largest value from below. Of no cluster it is larger than its
         # bounds, but for rounding: where none seems to reach it, the vertices have it.
         least = values(self._first).T.max(axis=1)
         most = values(self._corners).T.reshape(len(least), 8, -1).max(axis=1)

@@ -43,7 +43,7 @@ def line_crossings(
     lines : (int, int)
         Lines are at 0 to below these.
     group : (m,) int, optional
-        Of each face, to tell apart grids that are searched together.
+        Of each face, to keep grids apart that are searched together.
 
     Yields
     ------
@@ -72,7 +72,7 @@ def line_crossings(
 
 
 def _spans(scaled: Array, faces: npt.NDArray[np.integer], lines: tuple[int, int]) -> list[tuple[Integers, Integers]]:
-    """Two times (m,), (m,): the first line that faces may meet along one axis, and how many."""
+    """Two times (m,), (m,): the first line that faces may cross along one axis, and how many."""
     found = []
     for column, most in zip(scaled.T, lines, strict=True):
         a, b, c = column[faces].T
@@ -83,15 +83,15 @@ def _spans(scaled: Array, faces: npt.NDArray[np.integer], lines: tuple[int, int]
 
 
 def crossings(triangles: Array, heights: Array, place: Array, line: Integers) -> tuple[Integers, Array, Integers]:
-    """Line, height and sign (+1 upwards into the body) of the triangles (k, 3, 2) that lines at places (k, 2) meet."""
+    """Line, height and sign (+1 upwards into the body) of the triangles (k, 3, 2) that lines at places (k, 2) cross."""
     relative = triangles - place[:, None, :]
     x, y = relative[..., 0], relative[..., 1]
     area = x[:, [1, 2, 0]] * y[:, [2, 0, 1]] - y[:, [1, 2, 0]] * x[:, [2, 0, 1]]
     total = area.sum(axis=1)
-    met = ((area > 0).all(axis=1) | (area < 0).all(axis=1)) & (total != 0)
-    weights = area[met] / total[met, None]
+    hit = ((area > 0).all(axis=1) | (area < 0).all(axis=1)) & (total != 0)
+    weights = area[hit] / total[hit, None]
     # Counter-clockwise seen from above: the outside is up there, and a line that goes up leaves.
-    return line[met], (weights * heights[met]).sum(axis=1), -np.sign(total[met]).astype(np.int64)
+    return line[hit], (weights * heights[hit]).sum(axis=1), -np.sign(total[hit]).astype(np.int64)
 
 
 #: Lines along each side of the grid of one direction: twice the root of the number of faces, within these bounds.
@@ -99,7 +99,7 @@ def crossings(triangles: Array, heights: Array, place: Array, line: Integers) ->
 LINES = (12, 96)
 
 #: Pairs of a face and a line that are tested at most; scans need fewer than 100,000 as a rule. Faces that reach across
-#: the mesh, such as thousands on one edge, meet most lines, and get fewer of them.
+#: the mesh, such as thousands on one edge, cross most lines, and get fewer of them.
 MOST_TESTS = 1 << 21
 
 #: Share of the diagonal on which rounding and welding may wind a surface negatively.
@@ -111,14 +111,14 @@ _FEW = 1 << 14
 #: Axes (columns) off those along which meshes tend to be built; and the same with each of them as the last, along which
 #: the lines run.
 _AXES = np.linalg.qr(np.array([[0.9, 0.31, 0.17], [-0.23, 0.87, 0.41], [0.11, -0.37, 0.93]]))[0]
-TURNS = np.stack([_AXES, _AXES[:, [1, 2, 0]], _AXES[:, [2, 0, 1]]])
+ROTATIONS = np.stack([_AXES, _AXES[:, [1, 2, 0]], _AXES[:, [2, 0, 1]]])
 
 
 def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
     """True if a sample line crosses a place around which the surface winds a negative number of times.
 
     A closed surface that does not cross itself never does, unless a part of it is inside out; nor does one that only
-    overlaps itself. Lines that enter and leave unequally often tell nothing, and are left out.
+    overlaps itself. Lines that enter and leave unequally often are no evidence, and are left out.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
         return False
     unit = (vertices - (low / 2 + high / 2)) / diagonal
     lines = int(np.clip(2 * np.sqrt(len(faces)), *LINES))
-    points = (unit @ TURNS).reshape(-1, 3)
+    points = (unit @ ROTATIONS).reshape(-1, 3)
     scaled, copies, direction = _copies(points[:, :2], faces, lines)
     if (tests := line_tests(scaled, copies, (lines, lines))) > MOST_TESTS:
         lines = max(int(lines * np.sqrt(MOST_TESTS / tests)), 1)
@@ -148,7 +148,7 @@ def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
 
 
 def _copies(points: Array, faces: npt.NDArray[np.integer], lines: int) -> tuple[Array, Integers, Integers]:
-    """Points (3 n, 2) in distances between lines; the faces that may meet one, and the direction of each.
+    """Points (3 n, 2) in distances between lines; the faces that may cross one, and the direction of each.
 
     One copy for each direction, the lines of all along the last axis: arrays of small meshes cost more than numbers.
     """
@@ -159,7 +159,7 @@ def _copies(points: Array, faces: npt.NDArray[np.integer], lines: int) -> tuple[
 
 
 def _near_lines(scaled: Array, faces: npt.NDArray[np.integer], lines: int) -> Integers:
-    """Numbers of the faces that may meet a line at whole numbers of both coordinates; most of a fine mesh do not."""
+    """Numbers of the faces that may cross a line at whole numbers of both coordinates; most of a fine mesh do not."""
     near = np.arange(len(faces))
     if len(faces) < _FEW:
         return near
@@ -189,7 +189,7 @@ def _winds_below_zero(line: Integers, height: Array, sign: Integers) -> bool:
     return bool(np.bincount(of[inner], lengths).max(initial=0.0) > NEGATIVE)
 
 
-#: Smallest negative volume of an inside-out part, as a share of its cubed size: less is rounding.
+#: Smallest negative volume of an inside-out part, as a fraction of its cubed size: less is rounding.
 _FLAT = 1e-12
 
 #: Pairs of a face and a point that are tested at a time, and at most: parts that all lie one in another have as many as
@@ -217,7 +217,7 @@ def winding_number(corners: Array, point: npt.ArrayLike) -> float:
         dots = [np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a))]
         lengths = la * lb * lc
         half_angle = np.arctan2(triple, lengths + dots[0] * lc + dots[1] * la + dots[2] * lb)
-    # Across a face its solid angle jumps from 2 pi to -2 pi: on it, as far as rounding can tell, it is the mean.
+    # Across a face its solid angle jumps from 2 pi to -2 pi: on it, as far as rounding can resolve, it is the mean.
     half_angle[np.abs(triple) <= 16 * np.finfo(np.float64).eps * lengths] = 0.0
     return float(half_angle.sum() / (2.0 * np.pi))
 
@@ -316,22 +316,22 @@ def _are_cavities(
     low, high = boxes.min(axis=(0, 1)), boxes.max(axis=(0, 1))
     middle, size = low / 2 + high / 2, float((high - low).max())
     winding = np.zeros(len(suspects))
-    for turn in TURNS:
-        triangles, places = ((of - middle) / size @ turn for of in (corners[face], points[suspect]))
+    for rotation in ROTATIONS:
+        triangles, places = ((of - middle) / size @ rotation for of in (corners[face], points[suspect]))
         for one, other in _pairs(triangles[..., :2], places[:, :2]):
             held = around(part[face[one]], suspect[other])
             one, other = one[held], other[held]
-            met, height, sign = crossings(triangles[one, :, :2], triangles[one, :, 2], places[other, :2], other)
-            behind = np.where(height < places[met, 2], sign, -sign)
-            winding += np.bincount(suspect[met], behind, minlength=len(winding))
-    return np.asarray(np.round(winding / (2 * len(TURNS))) != 0)
+            hit, height, sign = crossings(triangles[one, :, :2], triangles[one, :, 2], places[other, :2], other)
+            behind = np.where(height < places[hit, 2], sign, -sign)
+            winding += np.bincount(suspect[hit], behind, minlength=len(winding))
+    return np.asarray(np.round(winding / (2 * len(ROTATIONS))) != 0)
 
 
 def _pairs(triangles: Array, points: Array) -> Iterator[tuple[Integers, Integers]]:
     """Numbers of triangles (m, 3, 2), and of points (k, 2) in the boxes around them, in chunks.
 
     Points are sorted into strips across the first axis, with about as many in each as there are strips, and within
-    those along the second axis: a box meets a run of points in each of a few strips.
+    those along the second axis: a box crosses a run of points in each of a few strips.
     """
     count, tests = len(points), 0
     if not count:
