@@ -199,10 +199,10 @@ def _solve(thickness: Array, name: str, target: float) -> float:
 
 
 def _root(relative: Array, goal: float) -> float:
-    """Root x >= 0 of log(mean(exp(-x shares))) = goal: Newton within a bracket, else bisection.
+    """Root x >= 0 of log(mean(exp(-x relative))) = goal: Newton within a bracket, else bisection.
 
     The logarithm of the mean is convex and falls, so Newton from the left never passes the root; the bracket is for
-    rounding. By Jensen's inequality, x = -goal (the shares' mean is 1) is at the root or left of it.
+    rounding. By Jensen's inequality, x = -goal (the mean of `relative` is 1) is at the root or left of it.
     """
     low, high, x = 0.0, np.inf, -goal
     for _ in range(_MAX_STEPS):

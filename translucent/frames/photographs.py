@@ -80,7 +80,7 @@ TILES = 4
 #: mean.
 MOST_LIMITED, MOST_ERROR = 0.01, 0.1
 
-#: Strips that a wedge is cut into, and the part of a step that counts: its edges are where steps meet.
+#: Strips that a wedge is cut into, and the part of a step that counts: its edges are where steps touch.
 STRIPS, INNER = 16, 0.6
 
 #: Standard deviations, from the median of the deviations, beyond which a pixel is dust or a scratch.
@@ -111,7 +111,7 @@ class Photograph:
 
 
 class _Mean(NamedTuple):
-    """Mean (3,) of a patch, its variance, and the shares of pixels that are black and saturated."""
+    """Mean (3,) of a patch, its variance, and the fractions of pixels that are black and saturated."""
 
     mean: Array
     variance: Array

@@ -108,7 +108,7 @@ def color_at_distance(extinction: npt.ArrayLike, distances: npt.ArrayLike) -> Ar
 
 
 def lengths(metres: npt.ArrayLike) -> Array:
-    """Lengths of ways through a medium in metres, as they are: more light than white would be left of a negative one.
+    """Lengths of paths through a medium in metres, as they are: more light than white would be left of a negative one.
 
     Raises
     ------

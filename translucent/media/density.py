@@ -146,7 +146,7 @@ def _ends(start: npt.ArrayLike, end: npt.ArrayLike) -> tuple[Array, Array]:
 
 
 def _cuts(begin: Array, stop: Array, count: int) -> tuple[Integers, Array]:
-    """Cuts of lines at grid planes: line index, and share 0 to 1 at which the coordinate is one of 0 to count - 1."""
+    """Cuts of lines at grid planes: line index, and where (0 to 1) the coordinate is one of 0 to count - 1."""
     low, high = np.minimum(begin, stop), np.maximum(begin, stop)
     first = np.clip(np.floor(low) + 1, 0, count).astype(np.int64)
     number = np.maximum(np.clip(np.ceil(high), 0, count).astype(np.int64) - first, 0)

@@ -9,8 +9,8 @@ left is a parameter here, `TD_TRANSMITTANCE` unless stated.
 Formula: sigma_t = -ln(T) / TD, the same in all channels. The way back: the thickness after which white light has kept
 the luminance T, so that a filament of any color has one TD, as a meter without color filters has it.
 
-What a meter measures has been scattered on its way, too: the extinction is that of light that arrives at all, less than
-the sum of absorption and scattering of a filament that scatters.
+What a meter measures has been scattered on its path, too: the extinction is that of light that arrives at all, less
+than the sum of absorption and scattering of a filament that scatters.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ class Medium(Frozen):
     emission : array_like (3,)
         q in radiance per metre, >= 0.
     anisotropy : float
-        Mean cosine g of the angle that scattered light turns by, -1 < g < 1: by the phase function of Henyey and
+        Mean cosine g of the angle that scattered light is deflected by, -1 < g < 1: by the phase function of Henyey and
         Greenstein, where no other is given.
     ior : float
         Index of refraction, >= 1; 1 is index-matched.
@@ -131,7 +131,7 @@ class Medium(Frozen):
     ) -> Medium:
         """Medium of many small opaque spheres: sigma_t = rho A with their projected area A = pi r^2.
 
-        Max 1995, sections 2 to 5: of the light that meets a particle it scatters the fraction `albedo` and absorbs
+        Max 1995, sections 2 to 5: of the light that hits a particle it scatters the fraction `albedo` and absorbs
         the rest, and it sends out the radiance `glow` where it absorbs, so that q = sigma_a glow.
 
         Parameters
@@ -186,7 +186,7 @@ class Medium(Frozen):
         """
         with np.errstate(under="ignore", invalid="ignore", over="ignore"):
             optical_depth = conversion.lengths(distance)[..., None] * self.extinction
-        # Without extinction even an infinite way, 0 times infinity, loses nothing.
+        # Without extinction even an infinite path, 0 times infinity, loses nothing.
         return optics.transmittance(np.where(self.extinction == 0, 0.0, optical_depth))
 
     @property

@@ -50,7 +50,7 @@ CARDS = {"white": 1.0, "black": 0.0}
 BODY_SIZE = 1e-2
 #: Albedo below which scattering is neglected ...
 NEGLIGIBLE_ALBEDO = 0.1
-#: ... or share of the light that crosses the body below which scattering is neglected.
+#: ... or fraction of the light that crosses the body below which scattering is neglected.
 NEGLIGIBLE_SCATTERING = 0.05
 #: Smallest reduced albedo at which scattering dominates.
 DOMINANT_ALBEDO = 0.5

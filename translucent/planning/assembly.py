@@ -150,7 +150,7 @@ def _touching(scene: Scene, method: Method, interfaces: InterfaceMode) -> tuple[
 
 
 def _through_bodies(scene: Scene, interfaces: InterfaceMode) -> tuple[Note, ...]:
-    """Notes on shadows on interfaces that are not rendered: maps have what is on the way to opaque objects alone."""
+    """Notes on shadows on interfaces that are not rendered: maps have what is on the path to opaque objects alone."""
     notes = []
     if not interfaces.traced and dims_interfaces(scene):
         notes.append("lights reach their highlights and diffuse reflection through bodies")

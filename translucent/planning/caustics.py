@@ -23,7 +23,7 @@ from translucent.scene.scene import Light, Object, Scene, object_names
 #: Largest number of photons of a frame: a software rasterizer follows so many in some minutes.
 MAX_PHOTONS = 1 << 30
 
-#: Photons in media, least and most: each of them lights all cells on its way.
+#: Photons in media, least and most: each of them lights all cells on its path.
 LEAST_IN_MEDIA, MOST_IN_MEDIA = 1 << 16, 1 << 18
 
 
@@ -33,13 +33,13 @@ class Caustics:
     """Light of the lights of a scene that interfaces bend and mirror onto opaque objects and media, by photons.
 
     Photons (Jensen 1996) leave the lights towards the bodies, and are refracted or reflected there by chance, as
-    Fresnel says; media absorb on the way. Those that have been bent or mirrored land on the first opaque surface, and
+    Fresnel says; media absorb along the path. Refracted or reflected photons land on the first opaque surface, and
     are drawn as points into the picture of the opaque objects (McGuire & Luebke 2009), each divided by the area that
     its pixel covers there; where there are few, they are spread over some pixels. Surfaces reflect them diffusely. The
     energy is right whatever their number; the noise of a pixel falls with its square root. Of several samples of a
     pixel each follows its part of the photons.
 
-    Others of them (`in_media`) are followed into bodies in which light diffuses, and light fog all along their ways.
+    Others (`in_media`) are followed into bodies in which light diffuses, and light fog all along their paths.
 
     The straight light of the lights ends at solids that bend light (`RenderPlan.opaque_to_shadows`).
 
@@ -330,7 +330,7 @@ def _point_aims(
 
 
 def _visible_bounds(clouds: list[Array], middle: Array, at: Array, away: float, radius: float) -> list[Array] | None:
-    """Bounds (2, 2) of bodies, as seen from a ball around `at` on the plane across the way to their `middle`; None if
+    """Bounds (2, 2) of bodies, as seen from a ball around `at` on the plane across the line to their `middle`; None if
     they are all around.
     """
     axis, across, found = (middle - at) / away, _across((middle - at) / away), []

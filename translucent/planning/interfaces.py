@@ -30,7 +30,7 @@ ONE_DRAWN = 0.4
 #: Time of shading one interface, as a fraction of that of two; measured likewise.
 ONE_SHADED = 0.45
 
-#: Note of a plan in which rays meet interfaces as far as the first interval shows them.
+#: Note of a plan in which rays hit interfaces as far as the first interval shows them.
 LATER_REFRACTION = Note(
     NoteKind.LATER_REFRACTION,
     "refraction and reflection beyond the first interval of a ray: what lies farther on is crossed straight, "
@@ -40,7 +40,7 @@ LATER_REFRACTION = Note(
 
 @dataclass(frozen=True)
 class InterfaceMode:
-    """A way to find the interfaces at which light refracts and reflects; see its subclasses.
+    """A method to find the interfaces at which light refracts and reflects; see its subclasses.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class InterfaceMode:
 
     @property
     def tree(self) -> tuple[int, int]:
-        """Number of interfaces that a traced ray may meet, and of forks."""
+        """Number of interfaces that a traced ray may hit, and of forks."""
         return 0, 0
 
     def refusal(self, scene: Scene) -> tuple[str, str] | None:
@@ -228,7 +228,7 @@ class ScreenInterfaces(InterfaceMode):
         return [LATER_REFRACTION]
 
 
-#: Largest number of interfaces that a ray may meet: each takes a walk through the meshes.
+#: Largest number of interfaces that a ray may hit: each takes a walk through the meshes.
 MAX_DEPTH = 64
 
 #: Bodies that a traced ray can be in at once.
@@ -245,7 +245,7 @@ TRACE_COST = 50.0
 @checked
 @dataclass(frozen=True)
 class TracedInterfaces(InterfaceMode):
-    """All interfaces that a ray meets, found by rays through the meshes: a tree of reflected and refracted ones.
+    """All interfaces that a ray hits, found by rays through the meshes: a tree of reflected and refracted ones.
 
     The tree of Whitted 1980: at an interface the reflected ray takes the Fresnel reflectance, the refracted one the
     rest (Born & Wolf 1999, section 1.5). Bodies see themselves, each other and opaque objects, and may touch or hold
@@ -254,7 +254,7 @@ class TracedInterfaces(InterfaceMode):
     Parameters
     ----------
     depth : int
-        Interfaces that a ray may meet, from 1; behind the last one it sees the environment, as if nothing was ahead.
+        Interfaces that a ray may hit, from 1; behind the last one it sees the environment, as if nothing was ahead.
     forks : int
         How often a ray may go on as the weaker of the two, reflected or refracted, from 0; the mirror image at the
         first interface is free. The stronger one is always followed; a weaker one beyond that sees the environment.
@@ -330,12 +330,12 @@ INTERFACES: dict[str, type[InterfaceMode]] = {
 }
 
 
-#: Interfaces that rays may meet if no number is requested: wine in a glass needs them, and few rays go as far.
+#: Interfaces that rays may hit if no number is requested: wine in a glass needs them, and few rays go as far.
 USUAL_DEPTH = 12
 
 
 def chosen_interfaces(scene: Scene, requested: InterfaceMode | None, *, sheets: bool) -> tuple[InterfaceMode, str]:
-    """The way in which interfaces are found, and why it is not the one that the planner would rather take.
+    """The method by which interfaces are found, and why it is not the one that the planner would rather take.
 
     Parameters
     ----------

@@ -163,7 +163,7 @@ AMBIENT = "of the ambient radiance A, media scatter sigma_s A for each metre, wh
 
 
 def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: InterfaceMode | None = None) -> tuple[Note, ...]:
-    """Notes on effects that the scene asks for and a plan does not render.
+    """Notes on effects that the scene requests and a plan does not render.
 
     Parameters
     ----------

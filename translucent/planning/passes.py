@@ -26,7 +26,7 @@ class NoteKind(StrEnum):
     NOISE = "noise"
     SPHERE_LIGHTS = "sphere lights"
 
-    # What the scene asks for and no pass renders.
+    # What the scene requests and no pass renders.
     LIGHTS_LEFT_OUT = "lights left out"
     ONLY_REMOVES = "only removes"
     SCATTERED_AGAIN = "scattered again"

@@ -90,7 +90,7 @@ def plan(
     ----------
     scene : Scene
     method : Method, optional
-        How to find thickness; None picks the cheapest way that is exact.
+        How to find thickness; None picks the cheapest method that is exact.
     capabilities : Capabilities, optional
         Of the machine; default: all.
     interfaces : TracedInterfaces, ScreenInterfaces or FrontInterface, optional

@@ -87,7 +87,7 @@ class RenderPlan:
     limits : tuple of Note
         Where thickness, transmittance or emission are not exact, and why; empty for an exact plan.
     unmodelled : tuple of Note
-        What the scene asks for and no pass renders.
+        What the scene requests and no pass renders.
     remarks : tuple of Note
         What is rendered right, and a picture hardly shows: bodies that are black.
     interfaces : Interfaces, optional
@@ -187,7 +187,7 @@ class RenderPlan:
         return any(step.name in names for step in self.passes)
 
     def says(self, kind: NoteKind) -> bool:
-        """True if the plan has a note of this kind: a limit, an effect that it does not model, or a remark."""
+        """True if a note of this kind is among the `limits`, the effects not modelled or the `remarks`."""
         return any(note.kind is kind for note in (*self.limits, *self.unmodelled, *self.remarks))
 
     def invalid_text(self, invalid: int, covered: int) -> str:

@@ -19,7 +19,7 @@ from translucent.scene.scene import Object, Scene
 
 @dataclass(frozen=True)
 class Scattering:
-    """A way to show light that media scatter more than once; see its subclasses.
+    """A method to render light that media scatter more than once; see its subclasses.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Diffusion(Scattering):
     body and by opaque objects, and light of the body that falls on it again. Solved on the CPU where the light, the
     medium or the mesh changes; a picture then takes two look-ups. Light that passes unscattered is seen along rays as
     ever. Where the density varies, it does so from cell to cell. Without an interface, as in clouds, rays gather what
-    is scattered into them on their way, from a solution by discrete ordinates that diffusion accelerates.
+    is scattered into them on their path, from a solution by discrete ordinates that diffusion accelerates.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def choose_treatments(
     matched : bool
         Bodies without an interface can show it, too.
     volumes : bool
-        Rays can gather it on their way through them; else it leaves through their surface.
+        Rays can gather it on their path through them; else it leaves through their surface.
 
     Raises
     ------

@@ -21,7 +21,7 @@ LEAST_SIZE, MOST_SIZE = 64, 8192
 @checked
 @dataclass(frozen=True)
 class ShadowMaps:
-    """Colored shadows on opaque objects: the transmittance of the straight way from each light.
+    """Colored shadows on opaque objects: the transmittance of the straight path from each light.
 
     From each light, one draw of the opaque objects and one of the bodies find the transmittance to the first opaque
     surface on each ray: thickness ends there, so that no bias is needed. Where the surface is read, it is interpolated

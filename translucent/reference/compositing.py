@@ -155,6 +155,6 @@ def emission_of_mixtures(volume: Volume, rays: Rays, segments: Segments, filling
     emission = segments.emission.copy()
     with np.errstate(over="ignore", under="ignore"):
         mean_transmittance = optics.mean_transmittance(segments.extinction[found] * length)
-    # Of a medium so deep that the fraction vanishes, nothing is seen either.
+    # A medium so deep that the mean transmittance vanishes emits nothing visible either.
     emission[found] = exact / (length * np.maximum(mean_transmittance, np.finfo(np.float64).tiny))
     return replace(segments, emission=emission)

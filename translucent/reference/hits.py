@@ -267,7 +267,7 @@ def cross_triangles(corners: Array, weight: Array, points: Array, perspective: b
 def _edge_functions(a: Array, b: Array) -> tuple[npt.NDArray[np.int8], Array]:
     """Exact sign of the cross product a x b (..., 2), and its size; a tie is decided by moving the ray.
 
-    Rounding is monotone, so the rounded products tell which is larger unless they are equal; then their errors do.
+    Rounding is monotone, so the rounded products decide which is larger unless they are equal; then their errors do.
     The ray moves by (e, e^2), e -> 0: a x b changes by -e (b - a)_y + e^2 (b - a)_x. The sign is 0 where a = b.
     """
     left, right = a[..., 0] * b[..., 1], a[..., 1] * b[..., 0]
@@ -316,7 +316,7 @@ PAIRS = 1 << 10
 #: Enlargement of boxes as a fraction of the distances, so that rounding loses no triangle.
 BOX_MARGIN = 1e-13
 
-#: Half size of an empty box, which no line meets.
+#: Half size of an empty box, which no line hits.
 _NOTHING = -1e300
 
 
@@ -375,7 +375,7 @@ class BoxTree:
                 return cls(order, tuple(levels))
 
     def candidates(self, lines: Lines) -> Iterator[tuple[Integers, Integers]]:
-        """Chunks of pairs (k,), (k,) of a line and a triangle that may meet; all that do are among them."""
+        """Chunks of pairs (k,), (k,) of a line and a triangle that may intersect; all that do are among them."""
         for begin in range(0, len(lines), LINES_AT_A_TIME):
             line, triangle = self._walk(lines.where(slice(begin, begin + LINES_AT_A_TIME)))
             yield line + begin, triangle
@@ -402,7 +402,7 @@ class BoxTree:
 
 
 def _overlaps(lines: Lines, boxes: Array, slack: Array) -> npt.NDArray[np.bool_]:
-    """(k, 8): whether lines may meet boxes (k, 6, 8), by the axes that could separate them (Gottschalk et al. 1996)."""
+    """(k, 8): whether lines may hit boxes (k, 6, 8), by the axes that could separate them (Gottschalk et al. 1996)."""
     x, y, z = (boxes[:, i] - lines.origins[:, i, None] for i in range(3))
     a, b, c = (boxes[:, i] for i in range(3, 6))
     u, v, w = (lines.directions[:, i, None] for i in range(3))

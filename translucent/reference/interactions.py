@@ -123,8 +123,8 @@ class Interactions:
         Chooses between reflection and refraction; without it both are followed.
     lights : StraightLight, optional
         Adds the light of `Scene.lights` that rough interfaces of solids scatter into the rays, on either side, where no
-        interface on its way bends it. Without it, and at sheets, that light is reflected once, and interfaces on its
-        way do not bend it.
+        interface on its path bends it. Without it, and at sheets, that light is reflected once, and interfaces on its
+        path do not bend it.
     """
 
     def __init__(
@@ -378,7 +378,7 @@ def _towards(directions: Array, side: Array) -> Array:
 class StraightLight:
     """Light of point, spot and directional lights, as far as no interface bends it.
 
-    A path that polished interfaces bend meets such a light with probability 0, so that nothing random finds it.
+    A path that polished interfaces bend hits such a light with probability 0, so that nothing random finds it.
 
     Parameters
     ----------
@@ -438,7 +438,7 @@ class StraightLight:
         return found
 
     def _transmittance(self, light: Light, points: Array, inside: Inside, start: float) -> Array:
-        """(k, 3): fraction of a light that all interfaces on its way transmit; media are not counted."""
+        """(k, 3): fraction of a light that all interfaces on its path transmit; media are not counted."""
         directions, distance = _towards_light(light, points)
         lines = Lines(points, directions, np.full(len(points), start), distance)
         hits, transmittance = self.light.tracer.hits(lines), np.ones((len(points), 3))

@@ -26,7 +26,7 @@ from translucent.scene.surface import Surface
 #: Distance within which surfaces coincide, as a fraction of the scene's diagonal.
 TOGETHER = 1e-9
 
-#: Smallest cosine between an interface's normal and a ray that meets it.
+#: Smallest cosine between an interface's normal and a ray that hits it.
 EDGE_ON = 1e-3
 
 #: Index meaning outside all bodies.
@@ -309,7 +309,7 @@ class _InterfaceWalk:
 def interface_normals(own: Optics, interfaces: FirstInterfaces, directions: Array) -> tuple[Array, Array]:
     """Unit normals (n, 3) of interfaces, towards where rays (n, 3) come from: of smooth surfaces, and of their faces.
 
-    Smooth normals may look away from a ray that their face looks at: it meets the interface edge-on.
+    Smooth normals may look away from a ray that their face looks at: it hits the interface edge-on.
     """
     smooth, flat = np.zeros((2, len(directions), 3))
     for i in np.unique(interfaces.item):

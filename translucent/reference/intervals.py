@@ -80,7 +80,7 @@ def unbalanced(hits: Hits, origin: Integers) -> Mask:
     ----------
     hits : Hits
         All surfaces of the body ahead of the origins, also behind what stops the rays: a ray may end inside a body, and
-        what lies behind tells whether it has rightly come to be there.
+        what lies behind decides whether it has rightly come to be there.
     origin : (pixels,) int64
         As for `body_intervals`.
     """

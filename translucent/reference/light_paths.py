@@ -25,7 +25,7 @@ from translucent.scene.shadow_directions import shadow_directions
 #: rest.
 CONTACT = 1e-9
 
-#: Rounding errors of a point's largest coordinate that are in contact, too: the way meets its surface at an angle.
+#: Rounding errors of a point's largest coordinate that are in contact, too: the path hits its surface at an angle.
 ROUNDED = 64.0
 
 #: Shells in a sphere that shines, and points on each.
@@ -46,7 +46,7 @@ class Arrival:
     irradiance : (k, 3) float64
         On a surface that faces it, in W/m^2; at most 1e18.
     sound : (k,) bool
-        The point is not at the light itself, and no hole of a body was on the way.
+        The point is not at the light itself, and no hole of a body was on the path.
     """
 
     travel: Array
@@ -104,9 +104,9 @@ class LightPaths:
         transmittance : (k, 3) float64
             0 behind opaque surfaces.
         sound : (k,) bool
-            No hole of a body was on the way.
+            No hole of a body was on the path.
         """
-        # Far away from the scene there is nothing, and short ways keep their digits.
+        # Far away from the scene there is nothing, and short paths keep their digits.
         _, outside = self.tracer.ball(points, -travel)
         length = np.minimum(distance, np.maximum(outside, 0.0))
         rays = Rays(points - length[:, None] * travel, travel, np.zeros((len(points), 2)))
@@ -139,7 +139,7 @@ class LightPaths:
             if body.medium is not None and self.sheets[index] is None:
                 if not body.mesh.diagnosis.solid:
                     sound &= sum_signs(line, len(length)) == 0
-                # What is behind the light tells whether it is inside, also for a light on the surface.
+                # What is behind the light decides whether it is inside, also for a light on the surface.
                 origin = sum_signs(line.where(line.distance < 0), len(length))
                 parts.append(body_intervals(line.before(length), origin, length, index))
         nothing = body_intervals(hits[0].where(slice(0)), np.zeros_like(length, dtype=np.int64), length)
@@ -219,7 +219,7 @@ class SurfaceLight:
         return self._irradiance(points, normals, self._before)
 
     def to_interfaces(self, light: Light, points: Array) -> Array:
-        """(k, 3): transmittance of the ways from one of `LightPaths.lights` to points (k, 3) of interfaces."""
+        """(k, 3): transmittance of the paths from one of `LightPaths.lights` to points (k, 3) of interfaces."""
         return self.passed(points, *direction_and_distance(light, points), self._before)
 
     def _irradiance(self, points: Array, normals: Array, before: float) -> Array:
@@ -235,7 +235,7 @@ class SurfaceLight:
         return np.asarray(irradiance)
 
     def straight(self, light: Light, points: Array, before: float) -> Array:
-        """(k, 3): transmittance of straight ways from one of `LightPaths.lights` that end `before` points (k, 3)."""
+        """(k, 3): transmittance of straight paths from one of `LightPaths.lights` that end `before` points (k, 3)."""
         return self.passed(points, *direction_and_distance(light, points), before)
 
     def _sky_fraction(self, points: Array, normals: Array, before: float) -> Array:
@@ -253,7 +253,7 @@ class SurfaceLight:
         return np.where(total > 0, left / np.where(total > 0, total, 1.0), 1.0)
 
     def passed(self, points: Array, travel: Array, distance: Array, before: float = 0.0) -> Array:
-        """(k, 3): transmittance of ways in directions (k, 3) over distances (k,) that end `before` points (k, 3)."""
+        """(k, 3): transmittance of paths in directions (k, 3) over distances (k,) that end `before` points (k, 3)."""
         passed = np.ones(points.shape)
         for begin in range(0, len(points), PATHS):
             some = slice(begin, begin + PATHS)
@@ -263,7 +263,7 @@ class SurfaceLight:
 
 
 def light_transmittance(scene: Scene, light: int, points: npt.ArrayLike) -> Array:
-    """Transmittance of the straight ways from a light to points: exp(-sum sigma_t d), 0 behind opaque surfaces.
+    """Transmittance of the straight paths from a light to points: exp(-sum sigma_t d), 0 behind opaque surfaces.
 
     What dims the light that reaches opaque objects. Interfaces neither bend nor dim it, and layers (`Surface.opacity`)
     let it pass. A surface that a point or the light lies on, to 1e-9 of the scene's size, does not shadow it.

@@ -64,7 +64,7 @@ def lit_at_interface(
 ) -> tuple[Array, Mask, Array, Array]:
     """As `scattered_at_interface`, with the weight (n, 3) of the light, which is 1 without films.
 
-    And an estimate (lights, n, 3) in 1/sr of how much light turns to each of `to_lights`.
+    And an estimate (lights, n, 3) in 1/sr of how much light is scattered to each of `to_lights`.
 
     At each microfacet, as much as it sends there and as gets past the others (Heitz et al. 2016, section 5.3); the
     density of the random directions, if they were many.
@@ -103,7 +103,7 @@ def lit_at_interface(
         facet = side * _visible_normals(-side * direction, alpha[ray], rng)
         cosine = np.clip(-np.einsum("ki,ki->k", direction, facet), 0.0, 1.0)
         reflectance = _reflectance(ray, above, cosine, relative, films)
-        # As likely as the mean of all colors, each of which counts for as much as there is of it.
+        # Chosen with the mean probability of the colors; weights make each color right on its own.
         chance = reflectance.mean(axis=1)
         passed = rng.random(len(direction)) >= chance
         if films is not None:
@@ -122,7 +122,7 @@ def lit_at_interface(
 
 
 def _reflectance(ray: Integers, above: Mask, cosine: Array, ior: Array, films: Films | None) -> Array:
-    """(k, 3): reflectance of microfacets that rays (k,) of those that are `above` (n,), or below, come to."""
+    """(k, 3): reflectance of microfacets hit by rays (k,), from `above` (n,) the surface or from below."""
     bare = optics.fresnel_dielectric(cosine, ior)
     return np.repeat(bare[:, None], 3, axis=1) if films is None else films(ray, above[ray], bare, cosine, ior)
 
@@ -152,7 +152,7 @@ def _density_towards(
 
 @np.errstate(under="ignore", over="ignore", divide="ignore")
 def _next_height(direction: Array, height: Array, alpha: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
-    """Heights (n,) of the next microfacets on light's way, and whether it leaves the surface instead.
+    """Heights (n,) of the next microfacets on light's path, and whether it leaves the surface instead.
 
     Heights are evenly spread from 0 to 1: of all facets, the fraction `height` is lower.
     """

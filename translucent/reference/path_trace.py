@@ -1,4 +1,4 @@
-"""Monte Carlo path tracing through media and interfaces: all light that finds its way, with error bars.
+"""Monte Carlo path tracing through media and interfaces: all light that reaches the eye, with error bars.
 
 At each interface a path takes one branch, chosen by its fraction of the light: by Fresnel and Snell at polished
 interfaces, by a walk among visible microfacets at rough ones, as `translucent.reference.interactions` says. Free paths
@@ -184,7 +184,7 @@ class InterfacePaths:
             origin = live.inside.windings[:, i].astype(np.int64)
             parts.append(body_intervals(flight.hits[i].before(end), origin, end, i))
         sheets = [None if i in self.own.walls else metres for i, metres in enumerate(self.own.sheets)]
-        # A sheet that lies on an interface is met on one side of it only.
+        # A sheet that lies on an interface is hit on one side of it only.
         at_interface = flight.interfaces.distance <= end
         until = np.where(at_interface, end - SHEET_ON_OPAQUE * self.scene.diagonal, end)
         crossings = scene_crossings(self.scene, rays, flight.hits, sheets, until, self.surface.on_interfaces)

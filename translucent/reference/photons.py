@@ -1,7 +1,7 @@
 """Photons from the lights of a scene through its interfaces onto opaque objects, in float64: the truth of caustics.
 
-They go the ways of `translucent.reference.path_trace` from the other end: interfaces turn the same shares of light
-either way.
+They follow the paths of `translucent.reference.path_trace` from the other end: interfaces scatter the same fractions of
+light in both directions.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from translucent.scene.camera import check_size
 from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Scene
 
-#: Fraction of the way to a photon within which nothing hides it from the eye: it lies on a surface itself.
+#: Fraction of the distance to a photon within which nothing hides it from the eye: it lies on a surface itself.
 _CONTACT = 1e-7
 
 
@@ -53,7 +53,7 @@ class LandedPhotons:
 def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> LandedPhotons:
     """Follow photons from each light to the first opaque surface (Jensen 1996).
 
-    They aim at a ball around all bodies. Interfaces reflect or refract them by chance, media absorb on the way what
+    They aim at a ball around all bodies. Interfaces reflect or refract them by chance, media absorb on the path what
     they absorb, and end what they scatter. Those that come straight are left out, as they are no caustics.
 
     Parameters
@@ -104,7 +104,7 @@ def _joined(parts: list[LandedPhotons]) -> LandedPhotons:
 
 
 class PhotonPaths(InterfacePaths):
-    """Tracer of photons, for channels whose light takes the same ways."""
+    """Tracer of photons, for channels whose light takes the same paths."""
 
     def land(self, rays: Rays, power: Array) -> LandedPhotons:
         """Photons along rays that have landed, of those with this power (n, 3)."""

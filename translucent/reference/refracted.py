@@ -1,7 +1,7 @@
 """Radiance along rays that refract and split at interfaces: exact Fresnel and Snell, in float64.
 
-At every interface a ray becomes two, reflected and refracted, until they carry less than `faintest` or have met as many
-interfaces as asked for; what is dropped is counted. With rough interfaces one of the two is chosen by chance, so that
+At every interface a ray becomes two, reflected and refracted, until they carry less than `faintest` or have hit as many
+interfaces as requested; what is dropped is counted. With rough interfaces one of the two is chosen by chance, so that
 the radiance has noise. Between interfaces media absorb and emit as they do along straight rays.
 
 All radiance is basic radiance L / n^2, which does not change where light enters a denser medium; emission counts as it
@@ -38,7 +38,7 @@ from translucent.reference.surfaces import (
 from translucent.reference.volume import volume_segments
 from translucent.scene.scene import Scene
 
-#: Smallest cosine between a ray and the view with which it meets the backdrop.
+#: Smallest cosine between a ray and the view with which it hits the backdrop.
 ACROSS = 1e-2
 
 
@@ -74,7 +74,7 @@ class RayEnds:
 
 
 def places_on_backdrop(scene: Scene, aspect: float, rays: Rays) -> tuple[Array, Mask]:
-    """Places in the picture at which rays meet a backdrop that stands across the view behind all objects, and a mask.
+    """Places in the picture at which rays hit a backdrop that stands across the view behind all objects, and a mask.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def places_on_backdrop(scene: Scene, aspect: float, rays: Rays) -> tuple[Array, 
     Returns
     -------
     array (n, 2) and mask (n,)
-        Places as in `Rays.backdrop`, and whether rays meet the backdrop at all.
+        Places as in `Rays.backdrop`, and whether rays hit the backdrop at all.
     """
     camera = scene.camera
     low, high = scene.bounds - camera.eye
@@ -139,7 +139,7 @@ class RefractedRays:
     aspect : float
         Width of the picture divided by its height.
     bounces : int
-        Interfaces that a ray may meet.
+        Interfaces that a ray may hit.
     scatter : bool
         Add light that media scatter once, to `tolerance`. Lights reach into media straight on.
     rng : Generator, optional
@@ -246,7 +246,7 @@ class _BranchTree:
             parts.append(body_intervals(hits[i].before(end), origin, end, i))
             self.found.valid[live.owner[self._goes_astray(i, hits[i], origin, interface, wall)]] = False
         sheets = [None if i in self.own.walls else metres for i, metres in enumerate(self.refracted.sheets)]
-        # A sheet that lies on an interface is met on one side of it only.
+        # A sheet that lies on an interface is hit on one side of it only.
         until = np.where(interface < wall, interface - SHEET_ON_OPAQUE * scene.diagonal, wall)
         crossings = scene_crossings(scene, rays, hits, sheets, until, self.refracted.light.on_interfaces)
         segments, filling = volume_segments(scene, volume, rays, merge(parts), crossings)
@@ -261,7 +261,7 @@ class _BranchTree:
             return replace(live, throughput=live.throughput * optics.transmittance(depth))
 
 
-#: Default number of interfaces that a ray may meet.
+#: Default number of interfaces that a ray may hit.
 BOUNCES = 8
 
 #: Default number of rays per pixel before rough interfaces.
@@ -301,7 +301,7 @@ def refracted_light(
     tolerance : float
         Relative error of light that media scatter once.
     bounces : int
-        Interfaces that a ray may meet, from 0.
+        Interfaces that a ray may hit, from 0.
     paths : int
         Rays of each pixel, from 2, if some interface is rough; else one sees all.
     seed : int
@@ -347,7 +347,7 @@ def light_over_pixels(
     size : (width, height)
         In pixels.
     pixels : (h, w) bool
-        Those that are wanted.
+        Those that are requested.
     paths : int
         Rays of each.
     tolerance, bounces, seed

@@ -85,13 +85,13 @@ def render(
         In pixels.
     method : Method, optional
         `ThinLayer` makes every surface of a medium a sheet; a sheet's own declared thickness goes first. All other
-        methods are ways to the same true thickness.
+        methods lead to the same true thickness.
     tolerance : float
         Relative error of scattered light, at most, 1e-12 to 1. All else is exact.
     refraction : bool, optional
         Whether rays bend. Default: if some object has an interface.
     bounces : int
-        Interfaces that a refracted ray may meet.
+        Interfaces that a refracted ray may hit.
     paths : int
         Rays of each pixel if an interface is rough; the error falls with their square root.
     seed : int
@@ -100,8 +100,8 @@ def render(
     Returns
     -------
     Frame
-        Of float64 arrays; `shade_hits` tells what is valid. Also invalid is a pixel whose scattered light misses the
-        tolerance, since its ray meets a point light inside a medium, or comes through the hole of a body. With
+        Of float64 arrays; `shade_hits` says what is valid. Also invalid is a pixel whose scattered light misses the
+        tolerance, since its ray hits a point light inside a medium, or comes through the hole of a body. With
         scattered light, ``provenance["scattering error"]`` is the largest estimated error of a valid pixel, relative to
         its brightest channel. With refracted rays, ``provenance["residual"]`` is the largest fraction of light in a
         valid pixel that was not followed to its end, and ``provenance["standard error"]`` the largest of a valid pixel.
@@ -290,7 +290,7 @@ def hit_counts(scene: Scene, size: tuple[int, int]) -> npt.NDArray[np.int64]:
 def opaque_counts(scene: Scene, size: tuple[int, int]) -> tuple[npt.NDArray[np.int64], ...]:
     """Two images (h, w): number of opaque surfaces on each pixel's ray, and index of the object of the nearest.
 
-    Where neither changes, no edge of an opaque object is seen. Empty, if the scene has none.
+    Where neither changes, no edge of an opaque object is visible. Empty, if the scene has none.
     """
     if not scene.opaque:
         return ()

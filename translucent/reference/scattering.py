@@ -1,7 +1,7 @@
 """Single scattering towards the eye, to a tolerance (Max 1995, sections 5 and 6).
 
 L = integral over the ray of T(t) sum sigma_s p(cos) E(t) dt, with the transmittance T from the eye to t and the
-irradiance E of each light there, attenuated by all bodies on its way and stopped by opaque objects.
+irradiance E of each light there, attenuated by all bodies on its path and stopped by opaque objects.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def outline_edges(traced: TracedObject, light: Light) -> Array:
 
 
 def shadow_edges(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
-    """Indices of rays (k,), and distances (k,) at which light that grazes one of the edges (e, 2, 3) meets them."""
+    """Indices of rays (k,), and distances (k,) at which light that grazes one of the edges (e, 2, 3) crosses them."""
     found = [(np.empty(0, np.int64), np.empty(0))]
     each = max(PAIRS // max(len(edges), 1), 1)
     for begin in range(0, len(rays), each):
@@ -117,8 +117,8 @@ class Scattered:
     error : (n, 3) float64
         Estimated error of the radiance.
     valid : (n,) bool
-        The tolerance is met, the ray does not meet a light, and no light came through a hole of a body. Media so deep
-        that light does not get as far as float64 can tell are left out, and invalid.
+        The tolerance is met, the ray does not hit a light, and no light came through a hole of a body. Media so deep
+        that light does not get as far as float64 resolves are left out, and invalid.
     """
 
     radiance: Array

@@ -103,7 +103,7 @@ def nearest_opaque(scene: Scene, hits: Sequence[Hits], pixels: int) -> OpaqueHit
 def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits, irradiance: Irradiance) -> Array:
     """Diffusely reflected radiance of opaque surfaces towards the origins, and emission, (n, 3); 0 on rays without one.
 
-    Lambert: color / pi times the irradiance on the side that is seen, as `SurfaceLight.on_opaque` gives it.
+    Lambert: color / pi times the irradiance on the visible side, as `SurfaceLight.on_opaque` gives it.
     """
     radiance = np.zeros((len(rays), 3))
     for i, body in enumerate(scene.objects):
@@ -114,11 +114,11 @@ def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits, irradiance
 
 
 def _lambert(body: Object, hits: OpaqueHits, rays: Rays, irradiance: Irradiance) -> Array:
-    """(k, 3): radiance that one object reflects and emits along rays that meet it."""
+    """(k, 3): radiance that one object reflects and emits along rays that hit it."""
     normals = world_normals(body, hits.face)
     away = np.einsum("ki,ki->k", normals, rays.directions) > 0
     normals[away] *= -1.0
-    # From the eye, as the rays are, so that the way to a light keeps its digits far from the world's origin.
+    # From the eye, as the rays are, so that the vector to a light keeps its digits far from the world's origin.
     points = rays.origins + hits.distance[:, None] * rays.directions
     color, emitted = np.broadcast_to(body.base_color, points.shape), np.zeros(3)
     if hits.barycentric is not None:

@@ -258,7 +258,7 @@ def framing_directions(
     fov_y: float = 30.0,
     up: npt.ArrayLike = (0.0, 1.0, 0.0),
 ) -> Array:
-    """Directions (11, 3) such that `Camera.framing` needs no points but those that are farthest along one of them."""
+    """Directions (11, 3) for which `Camera.framing` needs the farthest points alone."""
     return np.concatenate([np.eye(3), -np.eye(3), _framing_axes(size, direction, fov_y, up)[2].T])
 
 

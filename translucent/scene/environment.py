@@ -297,8 +297,8 @@ def checkerboard_share(backdrop: npt.ArrayLike, tiles: npt.ArrayLike) -> Array:
 def equirectangular_uv(direction: npt.ArrayLike, turn: npt.ArrayLike) -> Array:
     """Texture coordinates (..., 2) of a direction (..., 3) in an equirectangular picture: right and down, 0 to 1.
 
-    u wraps around. Straight up (+Y) is v = 0, and -Z is u = 1/2. A picture that is turned about +Y by a positive share
-    of a full turn, counterclockwise as seen from above, has its center there instead.
+    u wraps around. Straight up (+Y) is v = 0, and -Z is u = 1/2. A picture that is rotated about +Y by a positive
+    fraction of a full turn, counterclockwise as seen from above, has its center there instead.
     """
     x, y, z = np.moveaxis(np.asarray(direction, dtype=np.float64), -1, 0)
     u = 0.5 + np.arctan2(x, 0.0 - z) / (2.0 * np.pi) + np.asarray(turn, dtype=np.float64)

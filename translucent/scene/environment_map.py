@@ -91,7 +91,7 @@ class EnvironmentMap(Frozen):
         rows = _overlaps(-np.cos(np.linspace(0, np.pi, own_height + 1)), -np.cos(np.linspace(0, np.pi, height + 1)))
         columns = _overlaps(np.linspace(0, 1, own_width + 1), np.linspace(0, 1, width + 1))
         with np.errstate(under="ignore"):
-            # Most of these shares are 0, and in a large picture rows are by far the most work.
+            # Most of these fractions are 0, and in a large picture rows are by far the most work.
             lower = np.stack([row[part] @ pixels[part] for row, part in zip(rows, map(_held, rows), strict=True)])
             lower = lower.reshape(height, own_width, 3)
             return np.asarray(np.einsum("xj,yjc->yxc", columns, lower, optimize=True))
@@ -142,7 +142,7 @@ def _overlaps(fine: Array, coarse: Array) -> Array:
 
 
 def _held(fractions: Array) -> slice:
-    """From the first to the last of the shares that are not 0."""
+    """From the first to the last of the fractions that are not 0."""
     found = np.flatnonzero(fractions)
     return slice(found[0], found[-1] + 1)
 

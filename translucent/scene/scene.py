@@ -255,10 +255,10 @@ class Scene(Frozen):
         ``union``: each medium once, however many bodies bring it. ``priority``: the medium of the highest priority.
         With the last two, thickness counts a place once.
     ambient : str or array_like (3,)
-        Radiance that reaches every place inside the media alike from all around, as if nothing were in its way: a color
-        as text, or linear RGB. Media scatter it into the view rays, sigma_s times ambient for each metre, whatever
-        their phase function. It approximates light that has been scattered often, or comes from the environment,
-        which by itself lights opaque objects only. Default: none.
+        Radiance that reaches every place inside the media alike from all around, as if nothing were in its path: a
+        color as text, or linear RGB. Media scatter it into the view rays, sigma_s times ambient for each metre,
+        whatever their phase function. It approximates light that has been scattered often, or comes from the
+        environment, which by itself lights opaque objects only. Default: none.
     environment_shadows : int
         Directions of the environment, 0 to 256, in which objects keep its light from opaque ones: the more, the
         smoother the shadows; 32 are good to a few percent. 0: it reaches them through everything.

@@ -12,7 +12,7 @@ from translucent.formulas.sampling import sobol_points
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, texel_directions
 
-#: Rows and columns of the picture whose pixels the directions share out: 1.4 degrees each.
+#: Rows and columns of the picture whose pixels are divided among the directions: 1.4 degrees each.
 SIZE = (128, 256)
 
 #: Fraction of the directions that are spread evenly, wherever the light comes from.
@@ -96,7 +96,7 @@ def _fractions(light: Array, solid_angles: Array) -> Array:
 
 
 def _drawn(fractions: Array, count: int) -> Integers:
-    """(count,): pixels by their shares, row first and then column, from low-discrepancy points."""
+    """(count,): pixels by their fractions, row first and then column, from low-discrepancy points."""
     points = sobol_points(count, scrambled=True)[_strided(count)]
     table = fractions.reshape(SIZE)
     rows = np.cumsum(table.sum(axis=1))

@@ -30,7 +30,7 @@ from translucent.scene.stages import (
 )
 from translucent.scene.surface import Surface
 
-#: Linear color of white light in the default medium on its mean way through a closed mesh, if that is more than
+#: Linear color of white light in the default medium on its mean path through a closed mesh, if that is more than
 #: `DEFAULT_REACH` of the mesh's diagonal, else after that.
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
 DEFAULT_REACH = 0.15
@@ -69,8 +69,8 @@ def showcase(
     ----------
     mesh : Mesh
     medium : Medium, optional
-        Default: jade green on the mean way through the mesh, or after 15 % of its diagonal where that is more, whatever
-        its size; on a stage, with the ior of glass.
+        Default: jade green on the mean path through the mesh, or after 15 % of its diagonal where that is more,
+        whatever its size; on a stage, with the ior of glass.
     size : (width, height)
         Size of the picture in pixels, which the framing and the stage depend on.
     camera : Camera, optional
@@ -154,7 +154,7 @@ def framing(
         points = farthest_vertices(objects, framing_directions(size, FRAMED_FROM, fov_y, up))
         return Camera.framing(points, size, fov_y=fov_y, up=up)
     lights, directions = stage_lights(stage), framing_directions(size, stage.view, fov_y, up)
-    # Shadows are where linear functions of points are: each of what turns unit vectors into those of its shadow.
+    # A shadow is a linear map of its points: one map for each light, applied to unit vectors.
     maps = with_shadows(np.eye(4, 3, -1), lights).reshape(-1, 4, 3)[:, 1:]
     points = farthest_vertices(objects, (directions @ maps.transpose(0, 2, 1)).reshape(-1, 3))
     points = with_shadows(points, lights)

@@ -236,7 +236,7 @@ def stage_lights(stage: Stage) -> list[DirectionalLight]:
 
 
 def with_shadows(points: Array, lights: Sequence[Light]) -> Array:
-    """(n, 3): points, and places on the ground below them most of the way to where lights throw their shadows."""
+    """(n, 3): points, and places on the ground below them most of the distance to where lights throw their shadows."""
     height = points[:, 1:2] - points[:, 1].min()
     feet = points - height * (0.0, 1.0, 0.0)
     directions = [np.asarray(light.direction) for light in lights if isinstance(light, DirectionalLight)]
@@ -284,8 +284,9 @@ def world_vertices(item: Object) -> Array:
 
 
 def farthest_vertices(objects: Sequence[Object], directions: Array) -> Array:
-    """(n, 3): vertices of objects in the world as of `world_vertices`; of large meshes some of them, among which are
-    those that are farthest along each of these directions (k, 3).
+    """(n, 3): vertices of objects in the world, as of `world_vertices`.
+
+    Of large meshes a subset that includes the farthest vertex along each of the directions (k, 3).
     """
     found = []
     for item in objects:
@@ -295,7 +296,7 @@ def farthest_vertices(objects: Sequence[Object], directions: Array) -> Array:
 
 
 def upright(scene: AnyScene, up: npt.ArrayLike) -> AnyScene:
-    """Scene turned, with its camera and lights, the shortest way in which `up` (3,) becomes +Y, as stages need it."""
+    """Scene turned, with its camera and lights, by the shortest rotation of `up` (3,) to +Y, as stages need it."""
     turn = np.eye(4)
     turn[:3, :3] = upright_turn(up)
     if (turn == np.eye(4)).all():

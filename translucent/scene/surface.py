@@ -70,7 +70,7 @@ class Surface(Frozen):
         Tints what passes the surface, once for each body; albedo of the diffuse base: 0 to 1, a color as text or
         linear RGB.
     transmission : float
-        Fraction of the light that enters by refraction, 0 to 1; the rest meets the diffuse base.
+        Fraction of the light that enters by refraction, 0 to 1; the rest reaches the diffuse base.
     diffuse_transmission : float
         Fraction of the light on the diffuse base that passes to the other side, 0 to 1.
     diffuse_transmission_color : str or array_like (3,)

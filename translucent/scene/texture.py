@@ -98,7 +98,7 @@ def _wrapped(index: npt.NDArray[np.int64], size: int, wrap: Wrap) -> npt.NDArray
     return np.clip(index, 0, size - 1) if wrap == "clamp" else index % size
 
 
-#: Texels each way.
+#: Texels in each direction.
 SIZE = 64
 
 

@@ -16,7 +16,7 @@ MAX_LIGHT_POINTS = 16
 
 @dataclass(frozen=True)
 class Method:
-    """A way to find the thickness of bodies along each view ray; see its subclasses.
+    """A method to find the thickness of bodies along each view ray; see its subclasses.
 
     A subclass states its `passes`, and overrides what else is not true of it: traits, `limits`, `check`. What any plan
     has beside (declared sheets, fallbacks of open bodies, opaque objects, shading) is the planner's.

@@ -112,7 +112,7 @@ class PathTraced(Method):
 
 
 def _bends(body: Object) -> bool:
-    """True if it has a polished interface that turns light."""
+    """True if it has a polished interface that refracts light."""
     polished = body.surface is None or body.surface.roughness == 0.0
     return body.has_interface and body.medium is not None and body.medium.ior != 1.0 and polished
 

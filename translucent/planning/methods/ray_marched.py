@@ -30,7 +30,7 @@ Quadrature = Literal["left", "midpoint", "exponential", "jittered", "equiangular
 class RayMarched(Method):
     """Steps along each ray through every interval inside the bodies; the error depends on their number.
 
-    The one way where density varies from place to place. The quadratures and their orders of convergence, by steps N:
+    The only method where density varies from place to place. Quadratures and their orders of convergence, by steps N:
 
     - ``left``: the source at the beginning of each step, 1 / N (Riemann);
     - ``midpoint``: in its middle, 1 / N^2;
