@@ -223,7 +223,7 @@ SHOWN: dict[str, Callable[[Any], str]] = {
     "transmittance": numbers.error_text,
     "radiance": numbers.error_text,
     "ms_per_layer": numbers.ms_text,
-    "coverage_mismatch": numbers.share_text,
+    "coverage_mismatch": numbers.fraction_text,
 }
 
 

@@ -202,7 +202,7 @@ def test_numbers_as_text() -> None:
     assert [numbers.ms_text(x) for x in (0.01234, 1.234, 12.34, 1234.0, 0.0, None)] == [
         *("0.0123", "1.23", "12.3", "1234", "0", "–"),
     ]
-    assert [numbers.share_text(x) for x in (0.0, 5e-5, 0.0123, 0.1, 0.16, 1.0)] == [
+    assert [numbers.fraction_text(x) for x in (0.0, 5e-5, 0.0123, 0.1, 0.16, 1.0)] == [
         *("0", "< 0.01 %", "1.23 %", "10.0 %", "16.0 %", "100.0 %"),
     ]
     assert [numbers.power_text(x) for x in (1e-8, 0.1, 10.0, 1e4)] == ["10⁻⁸", "0.1", "10", "10⁴"]

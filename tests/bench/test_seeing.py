@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from translucent.bench.judgement import JUST_NOTICEABLE, color_difference, lab, seen_words
+from translucent.bench.judgement import JUST_NOTICEABLE, color_difference, lab, visibility_words
 from translucent.bench.record import ColorDifference, MethodRow
 from translucent.media.colors import parse_color
 
@@ -56,5 +56,5 @@ def test_a_step_of_8_bits_is_not_seen_and_eight_are() -> None:
 )
 def test_the_words(found: tuple[float, float, float], words: str) -> None:
     row = MethodRow("a", "a", "", "method", "", True, color_difference=ColorDifference(*found))
-    assert seen_words(row).startswith(words)
-    assert seen_words(dataclasses.replace(row, color_difference=None)) == ""
+    assert visibility_words(row).startswith(words)
+    assert visibility_words(dataclasses.replace(row, color_difference=None)) == ""

@@ -395,7 +395,7 @@ def test_nobody_waits_for_what_is_known(view: ViewportRenderer, work: Workspace,
     near.clear()
     work.do(SetField("material.distance", 0.003))
     assert view.draw(work, SIZE)
-    assert view._shown
+    assert view._rendered
     assert not [task for task in work.busy if task.name == "preparing the picture"]
     near.set()
 

@@ -93,7 +93,7 @@ def test_few_are_read_in_a_frame_and_what_cannot_be_made_has_no_picture(lane: La
     for number in range(500):
         cache.picture(str(number), str(number))
     cache.begin_frame(idle=True)
-    assert len(cache._wanted) == 4, "a folder of 500 files stops no frame"
+    assert len(cache._queue) == 4, "a folder of 500 files stops no frame"
     for _ in range(20):
         cache.picture("0", "0")
         cache.begin_frame(idle=True)

@@ -251,7 +251,7 @@ class Atlas:
         best[texel[pairs[::-1]]] = pairs[::-1]  # the last one stays, which is of the first face
         # Most other pairs are of a texel whose center some face has.
         beside = np.flatnonzero(~inside & (best[texel] < 0))
-        distance, share = _closest_on_edges(self.corners[face[beside]], center[beside])
+        distance, fraction = _closest_on_edges(self.corners[face[beside]], center[beside])
         order = np.lexsort((face[beside], distance, texel[beside]))
         order = order[np.diff(texel[beside[order]], prepend=-1) > 0]
         best[texel[beside[order]]] = beside[order]
@@ -260,9 +260,9 @@ class Atlas:
         within = inside[best]
         barycentric = np.empty((len(best), 3))
         with np.errstate(under="ignore"):
-            shares = area[:, best[within]]
-            barycentric[within] = (shares / (shares[0] + shares[1] + shares[2])).T
-        barycentric[~within] = share[order]
+            fractions = area[:, best[within]]
+            barycentric[within] = (fractions / (fractions[0] + fractions[1] + fractions[2])).T
+        barycentric[~within] = fraction[order]
         rows, columns = np.divmod(found, self.width)
         return Texels(rows + begin, columns, face[best], barycentric, within, overlapping)
 
@@ -320,14 +320,14 @@ def _closest_on_edges(corners: Array, point: Array) -> tuple[Array, Array]:
         j = (i + 1) % 3
         along = corners[:, j] - corners[:, i]
         square = (along * along).sum(axis=1)
-        share = ((point - corners[:, i]) * along).sum(axis=1) / np.where(square > 0, square, 1.0)
-        share = np.clip(np.where(square > 0, share, 0.0), 0.0, 1.0)
-        offset = corners[:, i] + share[:, None] * along - point
+        fraction = ((point - corners[:, i]) * along).sum(axis=1) / np.where(square > 0, square, 1.0)
+        fraction = np.clip(np.where(square > 0, fraction, 0.0), 0.0, 1.0)
+        offset = corners[:, i] + fraction[:, None] * along - point
         away = (offset * offset).sum(axis=1)
         nearer = away < distance
         distance = np.where(nearer, away, distance)
         weights = np.zeros_like(barycentric)
-        weights[:, i], weights[:, j] = 1.0 - share, share
+        weights[:, i], weights[:, j] = 1.0 - fraction, fraction
         barycentric = np.where(nearer[:, None], weights, barycentric)
     return distance, barycentric
 

@@ -131,14 +131,14 @@ def _check_high(high: Mesh | None, cage: Mesh | None, high_distance: float | Non
 def _strips(mesh: Mesh, unwrapped: Unwrapped, settings: BakeSettings, high: Mesh | None, cage: Mesh | None) -> Strips:
     low = PreparedMesh.of(unwrapped.mesh)
     uv = unwrapped.uv[low.faces]
-    shown = np.arange(len(uv)) if settings.tile is None else np.flatnonzero(in_tile(uv, settings.tile))
+    charted = np.arange(len(uv)) if settings.tile is None else np.flatnonzero(in_tile(uv, settings.tile))
     side = settings.size * settings.supersample
-    atlas = Atlas(uv[shown], side, side)
+    atlas = Atlas(uv[charted], side, side)
     if high is None:
-        return Strips(low, shown, atlas, Measure(low, settings), None)
+        return Strips(low, charted, atlas, Measure(low, settings), None)
     detailed = PreparedMesh.of(high)
     projection = Projection.of(low, unwrapped, detailed, mesh, cage, settings.high_distance)
-    return Strips(low, shown, atlas, Measure(detailed, settings), projection)
+    return Strips(low, charted, atlas, Measure(detailed, settings), projection)
 
 
 @checked
@@ -255,9 +255,9 @@ def _map_report(unwrapped: Unwrapped, strips: Strips, canvas: Canvas, traced: in
     hidden = ~canvas.owners[strips.shown]
     a, b, c = strips.low.corners[strips.shown].transpose(1, 0, 2)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    share = float(area[hidden].sum() / area.sum())
-    if share > MOST_HIDDEN and canvas.size**2 > ENOUGH_TEXELS * len(hidden):
-        count = f"{hidden.sum()} of {len(hidden)} faces, {share:.0%} of the surface,"
+    fraction = float(area[hidden].sum() / area.sum())
+    if fraction > MOST_HIDDEN and canvas.size**2 > ENOUGH_TEXELS * len(hidden):
+        count = f"{hidden.sum()} of {len(hidden)} faces, {fraction:.0%} of the surface,"
         doubts.append(f"{count} have no texel: they are too small in UV, or lie below others there")
     if missed := canvas.count("missed") / max(canvas.count("samples"), 1):
         doubts.append(f"{missed:.2%} of the samples found no surface of the high mesh; they get the value beside them")

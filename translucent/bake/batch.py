@@ -86,14 +86,14 @@ class BatchReport:
 
 def asset_line(asset: Record, width: int = 0) -> str:
     """Status line of one asset, with its name `width` characters wide."""
-    told = f"{Path(asset['model']).name:<{width}}  {asset['status']:<7}  {asset['seconds']:>7.1f} s"
+    text = f"{Path(asset['model']).name:<{width}}  {asset['status']:<7}  {asset['seconds']:>7.1f} s"
     if asset["status"] == "failed":
-        return f"{told}  {asset['error']}"
+        return f"{text}  {asset['error']}"
     if found := asset.get("range"):
-        told += f"  {found['min']:.4g} .. {found['max']:.4g} {asset['unit']}"
-        told += f", {asset['parts']} parts" if asset["parts"] > 1 else ""
+        text += f"  {found['min']:.4g} .. {found['max']:.4g} {asset['unit']}"
+        text += f", {asset['parts']} parts" if asset["parts"] > 1 else ""
     turned = [line for line in asset.get("repairs", []) if line.startswith("turned")]
-    return told + "".join(f"; {line}" for line in [*asset.get("doubts", []), *turned, *asset.get("warnings", [])])
+    return text + "".join(f"; {line}" for line in [*asset.get("doubts", []), *turned, *asset.get("warnings", [])])
 
 
 @checked
@@ -157,9 +157,9 @@ def bake_many(
 
 def _here(jobs: list[Job], workers: int) -> Iterator[Record]:
     workers = min(workers, max(len(jobs), 1))
-    share = max(processors() // workers, 1)
+    per_worker = max(processors() // workers, 1)
     died = "its process died; out of memory, or a crash; try a smaller --size"
-    tasks = [{"threads": share, **job} for job in jobs]
+    tasks = [{"threads": per_worker, **job} for job in jobs]
     return in_processes(run_job, tasks, workers, lambda job: failed_entry(job, died))
 
 
@@ -195,12 +195,12 @@ def run_job(job: Job, version: str | None = None) -> Record:
             record = read_record(Path(job["output"])) or {}
         else:
             record, results = bake_file(job, content=content)
-            status, more = "baked", told_of(record, results, Path(job["output"]).parent)
+            status, more = "baked", reported_values(record, results, Path(job["output"]).parent)
     except TranslucentError as error:
         return failed_entry(job, str(error), time.perf_counter() - started)
     except Exception as error:  # noqa: BLE001 - a defect of ours, or a full memory: the others go on
-        told = f"unexpected {type(error).__name__}; {error or 'no details'}"
-        return failed_entry(job, told, time.perf_counter() - started)
+        text = f"unexpected {type(error).__name__}; {error or 'no details'}"
+        return failed_entry(job, text, time.perf_counter() - started)
     if doubts := _doubts(job, record):
         status, more = "suspect", {"doubts": doubts, **more}
     return _entry(job, status, time.perf_counter() - started, **more)
@@ -228,7 +228,7 @@ def _doubts(job: Job, record: Record) -> list[str]:
     return found
 
 
-def told_of(record: Record, results: Any, folder: Path) -> Record:
+def reported_values(record: Record, results: Any, folder: Path) -> Record:
     """Summary of a bake: files, range, unit, rays and warnings of all its parts together."""
     parts, files = parts_of(record), files_of(record)
     ranges = [part["range"] for part in parts if part["range"] is not None]

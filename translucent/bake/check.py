@@ -122,11 +122,11 @@ class MapCheck:
         }
 
     def __str__(self) -> str:
-        share = 100.0 / self.mean_thickness
+        scale = 100.0 / self.mean_thickness
         found, passed = self.thickness, self.transmittance
         bare = f"\n{self.empty:.1%} of what is seen has no value in the map" if self.empty else ""
         return (
-            f"thickness      rms {found.rms:.4g} m, {share * found.rms:.3g} % of the mean {self.mean_thickness:.4g} m; "
+            f"thickness      rms {found.rms:.4g} m, {scale * found.rms:.3g} % of the mean {self.mean_thickness:.4g} m; "
             f"median {found.median:.4g} m, p99 {found.p99:.4g} m, bias {found.bias:+.4g} m\n"
             f"transmittance  rms {passed.rms:.4g}, median {passed.median:.4g}, p99 {passed.p99:.4g}, "
             f"bias {passed.bias:+.4g}{bare}"
@@ -175,9 +175,9 @@ def check_map(
     background = scene.environment.radiance(directions, np.stack([across, down], axis=-1) / size[1])
     inside = scene.bodies[0].medium
     assert inside is not None  # a showcase has one
-    seen = true.coverage & true.valid
+    visible = true.coverage & true.valid
     found = first_uv(mesh, scene.camera, size, body)
-    covered = seen & np.isfinite(found).all(axis=-1)
+    covered = visible & np.isfinite(found).all(axis=-1)
     if body is not None and not covered.any():
         raise NotSeenError(f"check of {mesh.name!r}", "other parts of its body hide it", "give another camera")
     thickness = np.zeros(covered.shape)
@@ -217,9 +217,9 @@ def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | Non
     """
     if mesh.uv is None:
         raise InputError(f"mesh {mesh.name!r}", "it has no uv", "bake a map first; its mesh has them")
-    seen = first_hits(mesh, camera, size, body)
-    found = np.full((len(seen.hit), 2), np.nan)
-    found[seen.hit] = blend(mesh.uv[mesh.faces[seen.face]], seen.weights)
+    visible = first_hits(mesh, camera, size, body)
+    found = np.full((len(visible.hit), 2), np.nan)
+    found[visible.hit] = blend(mesh.uv[mesh.faces[visible.face]], visible.weights)
     return found.reshape(size[1], size[0], 2)
 
 
@@ -288,19 +288,19 @@ def require_uv_of(corners: Corners, mesh: Mesh, path: Path) -> None:
     from scipy.spatial import cKDTree
 
     positions, uv = corners
-    asked = f"check of the map of {mesh.name!r}"
+    requested = f"check of the map of {mesh.name!r}"
     if uv is None:
-        raise RenderError(asked, f"{str(path)!r} has no texture coordinates", "bake it again with --unwrap")
+        raise RenderError(requested, f"{str(path)!r} has no texture coordinates", "bake it again with --unwrap")
     assert mesh.uv is not None
     with np.errstate(under="ignore"):
         known = cKDTree(np.column_stack([(positions - mesh.center) / mesh.diagonal, uv]))
         used = np.unique(mesh.faces)
-        wanted = np.column_stack([(mesh.vertices[used] - mesh.center) / mesh.diagonal, mesh.uv[used]])
-        distance, _ = known.query(wanted, p=np.inf)
+        own = np.column_stack([(mesh.vertices[used] - mesh.center) / mesh.diagonal, mesh.uv[used]])
+        distance, _ = known.query(own, p=np.inf)
     others = float(np.mean(distance > SAME))
     if others > MOST_OTHERS:
         found = f"{others:.0%} of its vertices have other texture coordinates in {str(path)!r}"
-        raise RenderError(asked, found, "the map does not belong to that file; bake it again with --unwrap")
+        raise RenderError(requested, found, "the map does not belong to that file; bake it again with --unwrap")
 
 
 def own_corners(file: GltfFile, part: Record, metres: float, material: GltfMaterial | None = None) -> Corners:
@@ -501,8 +501,8 @@ def look(radiance: npt.NDArray[np.floating]) -> Pixels:
 
 def _difference(check: MapCheck, scale: float) -> Pixels:
     error = (np.asarray(check.baked.thickness, np.float64) - check.true.thickness) / scale
-    share = np.clip(np.abs(error), 0.0, 1.0)[..., None]
+    fraction = np.clip(np.abs(error), 0.0, 1.0)[..., None]
     ends = np.where(error[..., None] < 0, THIN, THICK)
-    colors = np.asarray(RIGHT) * (1 - share) + ends * share
-    shown = check.baked.coverage & check.true.coverage & check.true.valid
-    return np.rint(np.where(shown[..., None], colors, NO_BODY)).astype(np.uint8)
+    colors = np.asarray(RIGHT) * (1 - fraction) + ends * fraction
+    visible = check.baked.coverage & check.true.coverage & check.true.valid
+    return np.rint(np.where(visible[..., None], colors, NO_BODY)).astype(np.uint8)

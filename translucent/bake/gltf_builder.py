@@ -240,9 +240,9 @@ class GlbBuilder:
         name = f"{mesh.name} thickness"
         view = self.add_view(stream.getvalue())
         image = self.add("images", {"name": name, "bufferView": view, "mimeType": "image/png"})
-        wanted = {"magFilter": _LINEAR, "minFilter": _MIPMAPS, **wrapping(mesh)}
+        requested = {"magFilter": _LINEAR, "minFilter": _MIPMAPS, **wrapping(mesh)}
         samplers = self.tree.setdefault("samplers", [])
-        sampler = samplers.index(wanted) if wanted in samplers else self.add("samplers", wanted)
+        sampler = samplers.index(requested) if requested in samplers else self.add("samplers", requested)
         return self.add("textures", {"name": name, "sampler": sampler, "source": image})
 
 

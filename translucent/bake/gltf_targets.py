@@ -185,8 +185,8 @@ def first_transforms(file: GltfFile) -> dict[int, Array]:
         known = first.setdefault(node["mesh"], matrix)
         if not np.allclose(_sizes(known), _sizes(matrix), rtol=SAME_SIZE, atol=SAME_SIZE * np.abs(_sizes(known)).max()):
             name = file.item("meshes", node["mesh"]).get("name", f"mesh {node['mesh']}")
-            told = f"glTF {str(file.path)!r}: nodes show {name!r} in several sizes; its map is that of the first"
-            warnings.warn(told, TranslucentWarning, stacklevel=2)
+            text = f"glTF {str(file.path)!r}: nodes show {name!r} in several sizes; its map is that of the first"
+            warnings.warn(text, TranslucentWarning, stacklevel=2)
     return first
 
 
@@ -290,8 +290,8 @@ def find_targets(
             found.append(Target(key, read_primitive(file, key, metres), medium=medium))
             continue
         # That of the thickness texture, if the primitive has it.
-        wanted = material.thickness_transform.tex_coord if material and material.has_thickness_texture else 0
-        sets = [n for n in (wanted, 0) if f"TEXCOORD_{n}" in builder.primitive(*key)["attributes"] and not new_uv]
+        requested = material.thickness_transform.tex_coord if material and material.has_thickness_texture else 0
+        sets = [n for n in (requested, 0) if f"TEXCOORD_{n}" in builder.primitive(*key)["attributes"] and not new_uv]
         tex_coord, keeps = next(iter(sets), None), False
         if made := tex_coord is None:
             tex_coord = add_uv(builder, key, size)
@@ -302,8 +302,8 @@ def find_targets(
             mesh = bodies.wound(key, mesh)
         found.append(Target(key, mesh, tex_coord, keeps, medium, made, around))
     if not found:
-        told = f"all that lets light in are thin walls without an inside: {', '.join(_names(file, list(lit)))}"
-        raise file.refused(told, "give one of them a volume, or a closed mesh")
+        text = f"all that lets light in are thin walls without an inside: {', '.join(_names(file, list(lit)))}"
+        raise file.refused(text, "give one of them a volume, or a closed mesh")
     return found
 
 
@@ -373,15 +373,15 @@ def add_uv(builder: GlbBuilder, key: PrimitiveKey, size: int) -> int:
     """
     file, primitive = builder.file(), builder.primitive(*key)
     accessors, name = Accessors(file), primitive_name(file, key)
-    asked = f"new UVs for {name!r} of {str(file.path)!r}"
+    requested = f"new UVs for {name!r} of {str(file.path)!r}"
     if primitive.get("mode", 4) != 4:
-        raise InputError(asked, "it is a strip or fan", "export it as a list of triangles, or with UVs")
+        raise InputError(requested, "it is a strip or fan", "export it as a list of triangles, or with UVs")
     if COMPRESSIONS[0] in primitive.get("extensions", {}):
-        raise InputError(asked, "its vertices are compressed", "export it without compression")
+        raise InputError(requested, "its vertices are compressed", "export it without compression")
     positions = accessors.vectors(primitive["attributes"].get("POSITION"), "VEC3")
     corners = accessors.indices(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
     if len(corners) % 3 or corners.max(initial=0) >= len(positions):
-        raise InputError(asked, "its indices make no triangles", "export the file again")
+        raise InputError(requested, "its indices make no triangles", "export the file again")
     made = unwrap(Mesh(positions, corners.reshape(-1, 3).astype(np.int32), name=name), size, None)
     assert made.mesh.uv is not None
     for holder in [primitive["attributes"], *primitive.get("targets", [])]:

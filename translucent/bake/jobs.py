@@ -101,8 +101,8 @@ def check_job(job: Job) -> None:
     if missing := [key for key in ("model", "output") if not isinstance(job.get(key), str)]:
         raise InputError("bake job", f"no {missing[0]}", "give a path as text")
     metres_per_unit(job.get("unit", "m"))
-    if not 0 <= (share := job.get("max_escaped", 0)) <= 1:
-        raise InputError(f"max_escaped {share!r}", "not in 0..1", "give a share of the rays, for example 0.05")
+    if not 0 <= (fraction := job.get("max_escaped", 0)) <= 1:
+        raise InputError(f"max_escaped {fraction!r}", "not in 0..1", "give a share of the rays, for example 0.05")
     suffixes = VERTEX_SUFFIXES if job.get("vertices") else MAP_SUFFIXES
     output = Path(job["output"])
     suffix = check_map_output(output, suffixes, **_storing(job))
@@ -122,7 +122,7 @@ def _settings(job: Job, diagonal: float) -> Job:
     given = dict(job.get("settings", {}))
     for key in _LENGTHS:
         if isinstance(given.get(key), str):
-            given[key] = diagonal * _share(key, given[key])
+            given[key] = diagonal * _fraction(key, given[key])
     known = {field.name for field in dataclasses.fields(BakeSettings)} - {"medium"}
     if unknown := sorted(set(given) - known):
         raise InputError(f"bake setting {unknown[0]!r}", "not a known setting", f"use {', '.join(sorted(known))}")
@@ -134,14 +134,14 @@ def _settings(job: Job, diagonal: float) -> Job:
     return given
 
 
-def _share(key: str, text: str) -> float:
+def _fraction(key: str, text: str) -> float:
     try:
-        share = float(text.removesuffix("%")) / 100 if text.endswith("%") else float("nan")
+        fraction = float(text.removesuffix("%")) / 100 if text.endswith("%") else float("nan")
     except ValueError:
-        share = float("nan")
-    if not 0 < share < float("inf"):
+        fraction = float("nan")
+    if not 0 < fraction < float("inf"):
         raise InputError(f"{key} {text!r}", "not a share such as '10%'", "give one, or a number of metres")
-    return share
+    return fraction
 
 
 def has_parts(job: Job) -> bool:
@@ -230,13 +230,13 @@ def bake_one(
     for key in ("high", "cage"):
         if job.get(key) is not None:
             given[key] = load_mesh(job[key], unit=job.get("unit", "m"), allow_outside=bool(job.get("outside")))
-    tell = None
+    report = None
     if progress is not None:
 
-        def tell(done: int, total: int, rays: int) -> None:
+        def report(done: int, total: int, rays: int) -> None:
             progress(done / max(total, 1), rays)
 
-    given |= {"threads": job.get("threads"), "progress": tell}
+    given |= {"threads": job.get("threads"), "progress": report}
     if job.get("vertices"):
         return bake_vertex_thickness(mesh, **{key: value for key, value in given.items() if key not in _TEXELS})
     if job.get("resume"):
@@ -277,14 +277,14 @@ def _bake_targets(job: Job, targets: list[Target], progress: Progress | None) ->
     results: Results = {}
     rays_before = 0
     for number, target in enumerate(targets):
-        tell = None
+        report = None
         if progress is not None:
 
-            def tell(share: float, rays: int, number: int = number, before: int = rays_before) -> None:
-                progress((number + share) / len(targets), before + rays)
+            def report(fraction: float, rays: int, number: int = number, before: int = rays_before) -> None:
+                progress((number + fraction) / len(targets), before + rays)
 
         part = f".{number}" if len(targets) > 1 else ""
-        result = bake_one(job, target.mesh, target.medium, tell, part, target.around)
+        result = bake_one(job, target.mesh, target.medium, report, part, target.around)
         rays_before += result.report.rays
         results[target.key] = result
     return results
@@ -300,17 +300,17 @@ def _save_maps(
     all. Where UVs were made, the mesh that has them is beside the map, as ``thickness.exr.uv.glb``.
     """
     file, output = builder.file(), Path(job["output"])
-    told: list[Record] = []
+    records: list[Record] = []
     paths = _paths(file, output, list(results)) if len(results) > 1 else dict.fromkeys(results, output)
     with OutputFiles() as files:
         if any(target.made_uv for target in targets):
             about = {**about, "uv_file": add_uv_file(files, file, output)}
         for target, (key, result) in zip(targets, results.items(), strict=True):
             one: Record = {**about, "place": list(key), "tex_coord": target.tex_coord}
-            told.append(add_map(files, result, paths[key], **_storing(job), about=one))
-        if len(told) == 1:
-            return told[0]
-        return add_record(files, output, {**about, **shared(told), "maps": told})
+            records.append(add_map(files, result, paths[key], **_storing(job), about=one))
+        if len(records) == 1:
+            return records[0]
+        return add_record(files, output, {**about, **shared(records), "maps": records})
 
 
 def _paths(file: GltfFile, output: Path, keys: list[PrimitiveKey]) -> dict[PrimitiveKey, Path]:

@@ -94,9 +94,9 @@ class Lithophane:
     @checked
     def save_check(self, path: str | Path) -> None:
         """Write a .png of what is asked for, and beside it of what the relief shows; as bright as its colors allow."""
-        asked = np.repeat(self.target[..., None], 3, axis=-1)
-        most = max(1.0, float(asked.max()), float(self.shown.max()))
-        both = labeled(("asked for", look(asked / most)), ("as the relief shows it", look(self.shown / most)))
+        requested = np.repeat(self.target[..., None], 3, axis=-1)
+        most = max(1.0, float(requested.max()), float(self.shown.max()))
+        both = labeled(("asked for", look(requested / most)), ("as the relief shows it", look(self.shown / most)))
         write_atomically(Path(path), lambda temporary: both.save(temporary, format="PNG"))
 
 
@@ -158,9 +158,9 @@ def lithophane(
     depth = np.interp(-np.log(target), -np.log(passed / passed[0]), tabled)
     mesh = _plate(depth, width / (columns - 1))
     between = 0.25 * (target[1:, 1:] + target[1:, :-1] + target[:-1, 1:] + target[:-1, :-1])
-    shown = _shown(mesh, medium, (columns - 1, rows - 1)) / passed[0]
-    rms = float(np.sqrt(((luminance(shown) - between) ** 2).mean()))
-    return Lithophane(mesh, depth, between, shown, contrast, rms)
+    rendered = _rendered(mesh, medium, (columns - 1, rows - 1)) / passed[0]
+    rms = float(np.sqrt(((luminance(rendered) - between) ** 2).mean()))
+    return Lithophane(mesh, depth, between, rendered, contrast, rms)
 
 
 def _passed(medium: Medium, least: float, largest: float) -> tuple[Array, Array]:
@@ -173,8 +173,8 @@ def _passed(medium: Medium, least: float, largest: float) -> tuple[Array, Array]
         passed = np.asarray(luminance(medium.transmittance(tabled)))
     if passed[-1] < LEAST_PASSED or passed[0] < LEAST_CONTRAST * passed[-1]:
         ends = (
-            f"{100 * share:.3g} % of light passes {1e3 * d:g} mm"
-            for share, d in zip(passed[[0, -1]], (least, largest), strict=True)
+            f"{100 * fraction:.3g} % of light passes {1e3 * d:g} mm"
+            for fraction, d in zip(passed[[0, -1]], (least, largest), strict=True)
         )
         found = ", ".join(ends)
         raise InputError("lithophane", found, "change the thickness, or take a lighter or a darker medium")
@@ -207,7 +207,7 @@ def _plate(depth: Array, pitch: float) -> Mesh:
     return Mesh(vertices, np.concatenate([np.stack(face, axis=-1) for face in faces]), name="lithophane")
 
 
-def _shown(mesh: Mesh, medium: Medium, size: tuple[int, int]) -> Array:
+def _rendered(mesh: Mesh, medium: Medium, size: tuple[int, int]) -> Array:
     """Linear color of a plate before an even white light, seen from far before it."""
     height = float(np.ptp(mesh.vertices[:, 1]))
     camera = Camera.orthographic((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), height=height)

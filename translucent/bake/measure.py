@@ -235,9 +235,9 @@ class Measure:
         while True:
             if self.stop.is_set():
                 raise StoppedError
-            asked = points if len(live) == len(points) else points[live]
-            directions = self.directions.at(asked, begin, end)
-            found, more = self.rays.distances(asked, directions)
+            requested = points if len(live) == len(points) else points[live]
+            directions = self.directions.at(requested, begin, end)
+            found, more = self.rays.distances(requested, directions)
             traced, cast, escaped = traced + more, cast + found.size, escaped + int(np.count_nonzero(np.isinf(found)))
             distance = found if begin == 0 else np.concatenate([distance, found], axis=1)
             edges = np.concatenate([edges, block_edges(begin, end, edges.shape[1])])

@@ -325,24 +325,24 @@ class InwardRays:
         missed = hits["primID"] < 0
         walk.end(missed, np.where(walk.depth[walk.live] > 0, np.inf, walk.length[walk.live]))
         live = walk.live
-        face, seen = hits["primID"][~missed].astype(np.int64), hits["tfar"][~missed].astype(np.float64)
-        distance, cosine = self._cross(walk, face, walk.position[live] + seen)
+        face, reached = hits["primID"][~missed].astype(np.int64), hits["tfar"][~missed].astype(np.float64)
+        distance, cosine = self._cross(walk, face, walk.position[live] + reached)
         again = face == walk.last[live]
         walk.gap[live] = np.where(again, 2.0 * walk.gap[live], NEAR)
         walk.last[live] = face
-        walk.position[live] = np.maximum(walk.position[live] + seen, distance) + walk.gap[live]
+        walk.position[live] = np.maximum(walk.position[live] + reached, distance) + walk.gap[live]
         leaves = (cosine > GRAZING) & (distance >= -BEHIND) & ~again
         # On the way in, the face of the start and its neighbors are behind; farther off, another part begins.
         enters = (cosine < -GRAZING) & (distance > NEAR) & ~again
         self._cross_surface(walk, np.maximum(distance, 0.0), leaves, enters)
 
-    def _cross(self, walk: _RayWalk, face: Integers, seen: Array) -> tuple[Array, Array]:
-        """Distance to the planes of faces, and cosine at them; along a plane, the distance that Embree has `seen`."""
+    def _cross(self, walk: _RayWalk, face: Integers, reached: Array) -> tuple[Array, Array]:
+        """Distance to the planes of faces, and cosine at them; along a plane, the distance `reached` by Embree."""
         plane, origin, direction = self.surface.planes[face], walk.origin[walk.live], walk.direction[walk.live]
         cosine = plane[:, 0] * direction[:, 0] + plane[:, 1] * direction[:, 1] + plane[:, 2] * direction[:, 2]
         height = plane[:, 3] - plane[:, 0] * origin[:, 0] - plane[:, 1] * origin[:, 1] - plane[:, 2] * origin[:, 2]
         across = np.abs(cosine) > GRAZING
-        return np.where(across, height / np.where(across, cosine, 1.0), seen), cosine
+        return np.where(across, height / np.where(across, cosine, 1.0), reached), cosine
 
     def _cross_surface(
         self, walk: _RayWalk, distance: Array, leaves: npt.NDArray[np.bool_], enters: npt.NDArray[np.bool_]

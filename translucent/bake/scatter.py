@@ -96,11 +96,11 @@ def read_scatter_exr(path: Path) -> tuple[Floats, Mask, Record]:
     RenderError
         If the OpenEXR package is missing.
     """
-    asked = f"scatter map {str(path)!r}"
-    require_file(path, asked)
-    header, channels = read_exr(path, asked)
+    requested = f"scatter map {str(path)!r}"
+    require_file(path, requested)
+    header, channels = read_exr(path, requested)
     if missing := [name for name in (*_CHANNELS, "coverage.Y") if name not in channels]:
-        raise InputError(asked, f"it has no channel {missing[0]}", "give a file of translucent bake --mode scatter")
+        raise InputError(requested, f"it has no channel {missing[0]}", "give a file of translucent bake --mode scatter")
     values = np.stack([channels[name] for name in _CHANNELS], axis=-1).astype(np.float32)
     meaning: Record = json.loads(header.get("scatter", "{}"))
     return values.reshape(*values.shape[:2], COUNT, 3), channels["coverage.Y"] > 0, meaning
@@ -436,8 +436,8 @@ def _transfer(mesh: Mesh, medium: Medium, resolution: int, roughness: float) -> 
     depth = float((np.asarray(medium.scattering) * (1.0 - medium.anisotropy)).max() * body.mean_thickness)
     if depth > LEAST_DEPTH:
         return alone.transfer(), []
-    told = f"light is scattered {depth:.2g} times on its way through, where diffusion wants {LEAST_DEPTH:g} and more"
-    return alone.transfer(), [told]
+    note = f"light is scattered {depth:.2g} times on its way through, where diffusion wants {LEAST_DEPTH:g} and more"
+    return alone.transfer(), [note]
 
 
 def _warn(mesh: Mesh, said: list[str]) -> None:

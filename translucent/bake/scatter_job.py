@@ -303,9 +303,9 @@ def check_scatter(one: Baked, values: Floats, size: tuple[int, int] = (320, 320)
         mean, true_mean = scattered_radiance(looked_up, environment.harmonics()), exit_radiance(field, points)
         passed = 1.0 - optics.fresnel_dielectric(outside, ior)
         true = field.radiance(points, optics.refracted_cosine(outside, ior)) * passed[:, None]
-        seen = mean * exit_lobe(outside, ior, baked.entering)[:, None]
-        pictures = _picture(hit, seen, size), _picture(hit, true, size)
-        looks[name] = ScatterLook(*pictures, hit.reshape(size[::-1]), _nrmse(mean, true_mean), _nrmse(seen, true))
+        leaving = mean * exit_lobe(outside, ior, baked.entering)[:, None]
+        pictures = _picture(hit, leaving, size), _picture(hit, true, size)
+        looks[name] = ScatterLook(*pictures, hit.reshape(size[::-1]), _nrmse(mean, true_mean), _nrmse(leaving, true))
     return looks
 
 
@@ -351,10 +351,10 @@ def write_scatter_picture(checks: Collection[ScatterCheck], path: Path) -> None:
 def _row(name: str, found: ScatterLook) -> Image.Image:
     # Bright bodies are shown darker, both alike.
     scale = max(float(np.quantile(found.true[found.seen], 0.99)), 1.0)
-    shown = [np.where(found.seen[..., None], look(part / scale), NO_BODY) for part in (found.baked, found.true)]
+    displayed = [np.where(found.seen[..., None], look(part / scale), NO_BODY) for part in (found.baked, found.true)]
     difference = MAGNIFIED * np.abs(found.baked - found.true) / scale
     return labeled(
-        (f"{name}: baked", shown[0].astype(np.uint8)),
-        ("light that diffuses, as in pictures", shown[1].astype(np.uint8)),
+        (f"{name}: baked", displayed[0].astype(np.uint8)),
+        ("light that diffuses, as in pictures", displayed[1].astype(np.uint8)),
         (f"difference, {MAGNIFIED:g} times", look(difference)),
     )

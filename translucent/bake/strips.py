@@ -297,14 +297,14 @@ class Checkpoint:
         """
         if not os.path.isfile(self._path):
             return
-        asked = f"checkpoint {str(self._path)!r}"
-        found = read_arrays(self._path, asked, ("key", *self._ARRAYS), "remove it")
+        requested = f"checkpoint {str(self._path)!r}"
+        found = read_arrays(self._path, requested, ("key", *self._ARRAYS), "remove it")
         if str(found.pop("key")) != self._key:
-            raise InputError(asked, "it is of another mesh or other settings", "remove it, or bake as before")
+            raise InputError(requested, "it is of another mesh or other settings", "remove it, or bake as before")
         for name, array in found.items():
             own = getattr(canvas, name)
             if (array.shape, array.dtype) != (own.shape, own.dtype):
-                raise InputError(asked, f"{name} of shape {array.shape}, not {own.shape}", "remove it")
+                raise InputError(requested, f"{name} of shape {array.shape}, not {own.shape}", "remove it")
             setattr(canvas, name, array)
 
     def keep(self, canvas: Canvas) -> None:

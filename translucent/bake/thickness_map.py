@@ -257,19 +257,19 @@ def check_map_output(
     path: Path, suffixes: tuple[str, ...] = MAP_SUFFIXES, *, normalize: bool = False, invert: bool = False
 ) -> str:
     """Check the output path of a map before any work is done, as `save_map` does; returns the suffix in lower case."""
-    asked, suffix = f"output {str(path)!r}", path.suffix.lower()
+    requested, suffix = f"output {str(path)!r}", path.suffix.lower()
     others = [other for other in suffixes if other != ".exr"]
     if suffix not in suffixes:
         *more, last = suffixes
         known = f"{', '.join(more)} or {last}" if more else last
-        raise InputError(asked, f"suffix {path.suffix!r}", f"use {known}")
-    require_output(path, asked)
+        raise InputError(requested, f"suffix {path.suffix!r}", f"use {known}")
+    require_output(path, requested)
     if not os.access(path.parent, os.W_OK):
-        raise RenderError(asked, f"the folder {str(path.parent)!r} is read-only", "choose another folder")
+        raise RenderError(requested, f"the folder {str(path.parent)!r} is read-only", "choose another folder")
     if suffix == ".glb" and (normalize or invert):
-        raise InputError(asked, "glTF stores t / max and the max", "leave --normalize and --invert out")
+        raise InputError(requested, "glTF stores t / max and the max", "leave --normalize and --invert out")
     if suffix == ".exr":
-        require_package("OpenEXR", asked, f"write {' or '.join(others)}" if others else "")
+        require_package("OpenEXR", requested, f"write {' or '.join(others)}" if others else "")
     return suffix
 
 
@@ -438,7 +438,7 @@ def write_maps(
     RenderError
         If a file cannot be written.
     """
-    told: list[Record] = []
+    records: list[Record] = []
     for key, result in results.items():
         if result.settings.unit != "m":
             raise InputError(f"output {str(path)!r}", f"mode {result.settings.mode!r} has no unit", "bake lengths")
@@ -454,11 +454,11 @@ def write_maps(
             one |= {"material": material, "texture": texture, "thickness_factor": factor, "tex_coord": uv[0]}
         else:
             one["warnings"] = ["no thickness: its material is left as it is"]
-        told.append(one)
-    if not any("material" in one for one in told):
+        records.append(one)
+    if not any("material" in one for one in records):
         raise InputError(f"output {str(path)!r}", "the thickness is 0 everywhere", "give a model with an inside")
     write_gltf(builder.file(), path)
-    return write_record(path, {**(about or {}), **shared(told), "maps": told})
+    return write_record(path, {**(about or {}), **shared(records), "maps": records})
 
 
 def write_vertices(
@@ -492,7 +492,7 @@ def write_vertices(
     RenderError
         If a file cannot be written.
     """
-    told: list[Record] = []
+    records: list[Record] = []
     for key, result in results.items():
         unit = result.settings.unit
         per_unit = metres if unit == "m" else 1.0
@@ -500,9 +500,9 @@ def write_vertices(
         values = result.values[nearest(result.mesh.vertices, positions_of(builder.file(), key) * metres)]
         with np.errstate(under="ignore"):
             attributes[ATTRIBUTE] = builder.add_accessor((values / per_unit).astype(np.float32))
-        told.append({"place": list(key), "attribute": ATTRIBUTE, **result.record(Encoding(per_unit, unit=unit))})
+        records.append({"place": list(key), "attribute": ATTRIBUTE, **result.record(Encoding(per_unit, unit=unit))})
     write_gltf(builder.file(), path)
-    return write_record(path, {**(about or {}), **shared(told), "primitives": told})
+    return write_record(path, {**(about or {}), **shared(records), "primitives": records})
 
 
 @checked
@@ -525,42 +525,42 @@ def load_thickness_map(path: str | Path) -> Array:
         If ``.exr`` is to be read without the OpenEXR package.
     """
     path = Path(path)
-    asked = f"thickness map {str(path)!r}"
+    requested = f"thickness map {str(path)!r}"
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
-        raise InputError(asked, f"suffix {path.suffix!r}", f"give one of {', '.join(_READERS)}")
-    require_file(path, asked)
+        raise InputError(requested, f"suffix {path.suffix!r}", f"give one of {', '.join(_READERS)}")
+    require_file(path, requested)
     try:
-        scale, offset, stored = reader(path, asked)
+        scale, offset, stored = reader(path, requested)
         return Encoding(float(scale), float(offset)).decode(stored)
     except TranslucentError:
         raise
     except Exception as error:  # each of the readers raises its own kinds
-        raise InputError(asked, f"it cannot be read ({type(error).__name__}: {error})", "bake it again") from error
+        raise InputError(requested, f"it cannot be read ({type(error).__name__}: {error})", "bake it again") from error
 
 
-def _read_exr(path: Path, asked: str) -> tuple[Any, ...]:
-    header, channels = read_exr(path, asked)
+def _read_exr(path: Path, requested: str) -> tuple[Any, ...]:
+    header, channels = read_exr(path, requested)
     return header["scale"], header["offset"], channels["Y"]
 
 
-def _read_png(path: Path, asked: str) -> tuple[Any, ...]:
-    with open_picture(read_bytes(path, asked), asked, ("PNG",), per_pixel=16) as image:
+def _read_png(path: Path, requested: str) -> tuple[Any, ...]:
+    with open_picture(read_bytes(path, requested), requested, ("PNG",), per_pixel=16) as image:
         text, stored = getattr(image, "text", {}), np.array(image)
     if f"{PNG_PREFIX}scale" not in text:
-        raise InputError(asked, "it does not say its scale", "keep the metadata when copying the image")
+        raise InputError(requested, "it does not say its scale", "keep the metadata when copying the image")
     if stored.ndim != 2 or stored.max(initial=0) > PNG_LEVELS:
-        raise InputError(asked, "it is not 16-bit gray", "give the file as it was baked")
+        raise InputError(requested, "it is not 16-bit gray", "give the file as it was baked")
     return text[f"{PNG_PREFIX}scale"], text[f"{PNG_PREFIX}offset"], stored
 
 
-def _read_npz(path: Path, asked: str) -> tuple[Any, ...]:
-    return tuple(read_arrays(path, asked, ("scale", "offset", "values"), "bake it again").values())
+def _read_npz(path: Path, requested: str) -> tuple[Any, ...]:
+    return tuple(read_arrays(path, requested, ("scale", "offset", "values"), "bake it again").values())
 
 
-def _read_npy(path: Path, asked: str) -> tuple[Any, ...]:
-    with open_file(path, asked) as stream:
-        stored = read_array(stream, os.fstat(stream.fileno()).st_size, asked, "bake it again")
+def _read_npy(path: Path, requested: str) -> tuple[Any, ...]:
+    with open_file(path, requested) as stream:
+        stored = read_array(stream, os.fstat(stream.fileno()).st_size, requested, "bake it again")
     encoding = (read_record(path) or {}).get("encoding", {})
     return encoding.get("scale", 1.0), encoding.get("offset", 0.0), stored
 

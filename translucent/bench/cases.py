@@ -193,7 +193,7 @@ def _wall(size: Size) -> Scene:
     return _framed([Object(toolkit("leaf"), glass, sheet_thickness=2e-3)], size, Environment.studio())
 
 
-def _seen(body: Object, lights: Sequence[Light] = (), environment: Environment = SKY, turn: float = 0.6) -> Scene:
+def _scene(body: Object, lights: Sequence[Light] = (), environment: Environment = SKY, turn: float = 0.6) -> Scene:
     """A body from the front, a little to the side and above, as large as the picture."""
     camera = Camera.framing(body.mesh.vertices, (1, 1), direction=(-turn, -0.45, -1.0), fov_y=28.0)
     return Scene([body], camera, lights, environment)
@@ -206,21 +206,21 @@ def _milky(depth: float, length: float, albedo: Sequence[float], ior: float, ani
 
 
 def _jade(_: Size) -> Scene:
-    return _seen(Object(lying_torus(64, 1.0, 0.3), _milky(8.0, 0.6, (0.9, 0.985, 0.96), 1.6)), turn=0.2)
+    return _scene(Object(lying_torus(64, 1.0, 0.3), _milky(8.0, 0.6, (0.9, 0.985, 0.96), 1.6)), turn=0.2)
 
 
 def _soap(_: Size) -> Scene:
     mesh = toolkit("soap")
     soap = _milky(6.0, float(mesh.bounds[1][1] - mesh.bounds[0][1]), (0.999, 0.995, 0.97), 1.45)
-    return _seen(Object(mesh, soap, surface=Surface(roughness=0.35)))
+    return _scene(Object(mesh, soap, surface=Surface(roughness=0.35)))
 
 
 def _milk(_: Size) -> Scene:
-    return _seen(Object(Sphere().tessellate(64), _milky(40.0, 2.0, (0.9999, 0.9996, 0.998), 1.33, anisotropy=0.5)))
+    return _scene(Object(Sphere().tessellate(64), _milky(40.0, 2.0, (0.9999, 0.9996, 0.998), 1.33, anisotropy=0.5)))
 
 
 def _bear(_: Size) -> Scene:
-    return _seen(Object(toolkit("bear"), preset("skim_milk").medium), turn=-0.3)
+    return _scene(Object(toolkit("bear"), preset("skim_milk").medium), turn=-0.3)
 
 
 def _marble(_: Size) -> Scene:
@@ -228,19 +228,19 @@ def _marble(_: Size) -> Scene:
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
     area = float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
     marble = _milky(8.0, 4.0 * abs(mesh.volume) / area, (0.999, 0.998, 0.996), 1.5)
-    return _seen(Object(mesh, marble), turn=0.2)
+    return _scene(Object(mesh, marble), turn=0.2)
 
 
 def _wax(_: Size) -> Scene:
     block = Box((-0.6, -0.5, -0.3), (0.6, 0.5, 0.3)).tessellate()
     light = PointLight((-0.95, 0.35, -0.75), (1.6, 1.3, 1.0))
-    return _seen(Object(block, _milky(12.0, 1.2, (0.995, 0.98, 0.94), 1.0)), [light], EVENING)
+    return _scene(Object(block, _milky(12.0, 1.2, (0.995, 0.98, 0.94), 1.0)), [light], EVENING)
 
 
 def _lantern(_: Size) -> Scene:
     shell = SphericalShell(1.0, 0.8).tessellate(64)
     light = PointLight((0.0, 0.0, 0.0), (1.5, 1.1, 0.6))
-    return _seen(Object(shell, _milky(2.5, 0.2, (0.99, 0.99, 0.99), 1.0)), [light], EVENING)
+    return _scene(Object(shell, _milky(2.5, 0.2, (0.99, 0.99, 0.99), 1.0)), [light], EVENING)
 
 
 #: Cases by effect: those of interfaces take long, and all but one are left out by ``--quick``. Those of light that is

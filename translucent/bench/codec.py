@@ -58,10 +58,10 @@ class Packed:
         finite = np.isfinite(array)
         scale = float(np.max(np.abs(array), where=finite, initial=0.0)) or 1.0
         with np.errstate(under="ignore"):
-            shares = np.where(finite, array / scale, np.nan).astype(np.float16)
-        bits = shares.view(np.uint16)
+            fractions = np.where(finite, array / scale, np.nan).astype(np.float16)
+        bits = fractions.view(np.uint16)
         # A picture shows no more than some percent of an error, and zeros compress.
-        rounded = np.where(np.isnan(shares), bits, bits & np.uint16(0xFFC0))
+        rounded = np.where(np.isnan(fractions), bits, bits & np.uint16(0xFFC0))
         return cls((height, width), "float16", scale, _deflate(rounded.tobytes()))
 
     def array(self) -> npt.NDArray[Any]:
@@ -144,8 +144,8 @@ class _Strict(Converter):
 
     def _require(self, held: bool, value: Any, expected: str) -> None:
         if not held:
-            shown = repr(value)
-            raise self._error(f"is {shown if len(shown) < 60 else shown[:57] + '...'}, not {expected}")
+            text = repr(value)
+            raise self._error(f"is {text if len(text) < 60 else text[:57] + '...'}, not {expected}")
 
     def _error(self, said: str) -> ValueError:
         self._wrong += 1

@@ -229,8 +229,8 @@ class Contender:
         over all pixels that truth or picture cover. That of sheets is declared.
         """
         if self.engine is not None:
-            seen = visible_points(bench.renderer, scene, truth.size)
-            return dataclasses.replace(self, engine=self.engine.fitted(seen, truth.radiance))
+            visible = visible_points(bench.renderer, scene, truth.size)
+            return dataclasses.replace(self, engine=self.engine.fitted(visible, truth.radiance))
         if not (self.fits or (self.method.makes_sheets and not _sheets(scene))):
             return self
         probe = float(scene.diagonal)
@@ -261,8 +261,8 @@ class Contender:
 
 
 def _engine_frame(renderer: Renderer, scene: Scene, size: Size, engine: Engine) -> Frame:
-    seen = visible_points(renderer, scene, size)
-    return seen.frame(engine.light(seen))
+    visible = visible_points(renderer, scene, size)
+    return visible.frame(engine.light(visible))
 
 
 class Drawn(NamedTuple):
@@ -478,14 +478,14 @@ def contenders(effect: Effect, *, quick: bool, brief: bool = False, only: Iterab
     """Contenders on a case of this effect, with ``--quick`` or in a brief case fewer; `only` names contenders or
     families, as `check_names` accepts them.
     """
-    wanted = {_slug(name) for name in only}
+    requested = {_slug(name) for name in only}
     return tuple(
         one
         for one in CONTENDERS
         if effect in one.effects
-        and (wanted or one.brief or not (quick or brief))
-        and (wanted or one.quick or not quick)
-        and (not wanted or wanted & {_slug(one.name), _slug(one.family)})
+        and (requested or one.brief or not (quick or brief))
+        and (requested or one.quick or not quick)
+        and (not requested or requested & {_slug(one.name), _slug(one.family)})
     )
 
 

@@ -118,8 +118,8 @@ class VisiblePoints:
         found = np.pi * sky.reshape(-1, RAYS, 3).mean(axis=1)
         for light in self.scene.lights:
             towards, far = _towards(light, points)
-            seen = self.distance(points, towards, normals) > far * (1.0 - 1e-6)
-            found = found + light.irradiance_on(points, normals) * (seen | ~np.isfinite(far))[:, None]
+            visible = self.distance(points, towards, normals) > far * (1.0 - 1e-6)
+            found = found + light.irradiance_on(points, normals) * (visible | ~np.isfinite(far))[:, None]
         return np.asarray(found)
 
     def frame(self, light: Array) -> Frame:
@@ -185,11 +185,11 @@ class Engine:
     name: ClassVar[str]
     promise: ClassVar[str]
 
-    def light(self, seen: VisiblePoints) -> Array:
+    def light(self, visible: VisiblePoints) -> Array:
         """Radiance (k, 3) that leaves the visible points, on top of reflections and unscattered light."""
         raise NotImplementedError
 
-    def fitted(self, seen: VisiblePoints, truth: Array) -> Self:
+    def fitted(self, visible: VisiblePoints, truth: Array) -> Self:
         """The settings of least squared error against the truth (h, w, 3); itself where there are none."""
         return self
 
@@ -201,21 +201,21 @@ class PaintLayer(Engine):
     name: ClassVar[str] = "layer without inner mirrors"
     promise: ClassVar[str] = "none: what its interfaces mirror back inside is left out; computed here in NumPy"
 
-    def light(self, seen: VisiblePoints) -> Array:
+    def light(self, visible: VisiblePoints) -> Array:
         """Radiance of the layer: light enters and leaves by the diffuse transmittance of the interface."""
 
         def falling(normals: Array) -> Array:  # unshadowed, as layers have it
-            lights = sum(light.irradiance_on(seen.points, normals) for light in seen.scene.lights)
-            return np.asarray(seen.scene.environment.irradiance_on(normals) + lights)
+            lights = sum(light.irradiance_on(visible.points, normals) for light in visible.scene.lights)
+            return np.asarray(visible.scene.environment.irradiance_on(normals) + lights)
 
-        medium, depth = seen.medium, seen.thickness[:, None]
+        medium, depth = visible.medium, visible.thickness[:, None]
         absorbed = two_stream_absorption(medium.absorption) * depth
         turned = two_stream_scattering(medium.scattering, medium.anisotropy) * depth
         with np.errstate(under="ignore"):
             through = two_stream_transmittance(absorbed, turned)
             unscattered = np.minimum(np.exp(-np.minimum(np.asarray(medium.extinction) * depth, 700.0)), through)
-            back = two_stream_reflectance(absorbed, turned) * falling(seen.normals)
-            return np.asarray(seen.entering * (back + (through - unscattered) * falling(-seen.normals)) / np.pi)
+            back = two_stream_reflectance(absorbed, turned) * falling(visible.normals)
+            return np.asarray(visible.entering * (back + (through - unscattered) * falling(-visible.normals)) / np.pi)
 
 
 @dataclass(frozen=True)
@@ -238,19 +238,19 @@ class NormalizedDiffusion(Engine):
 
     samples: int = 3000
 
-    def light(self, seen: VisiblePoints) -> Array:
+    def light(self, visible: VisiblePoints) -> Array:
         """Blurred light of the samples."""
-        points, normals, area = self._samples(seen.mesh)
-        entered = seen.entering * seen.irradiance(points, normals)
-        color = seen.diffuse_color
-        rate = (1.9 - color + 3.5 * (color - 0.8) ** 2) * seen.reduced_extinction
+        points, normals, area = self._samples(visible.mesh)
+        entered = visible.entering * visible.irradiance(points, normals)
+        color = visible.diffuse_color
+        rate = (1.9 - color + 3.5 * (color - 0.8) ** 2) * visible.reduced_extinction
         # What is nearer than samples are apart is one of them: R has no end at r = 0.
         nearest = 0.5 * np.sqrt(area / np.pi / self.samples)
-        found = np.empty((len(seen.points), 3))
+        found = np.empty((len(visible.points), 3))
         with np.errstate(under="ignore"):
-            for begin in range(0, len(seen.points), 512):
+            for begin in range(0, len(visible.points), 512):
                 some = slice(begin, begin + 512)
-                away = np.maximum(np.linalg.norm(seen.points[some, None] - points, axis=-1), nearest)
+                away = np.maximum(np.linalg.norm(visible.points[some, None] - points, axis=-1), nearest)
                 for channel in range(3):
                     exponent = np.minimum(rate[channel] * away, 700.0)
                     weight = (np.exp(-exponent) + np.exp(-exponent / 3.0)) / away
@@ -299,52 +299,52 @@ class Frostbite(Engine):
     scale: float = 1.0
     ambient: float = 0.2
 
-    def light(self, seen: VisiblePoints) -> Array:
+    def light(self, visible: VisiblePoints) -> Array:
         """Sum of its three terms."""
-        terms = self._terms(seen, _local_thickness(seen))
+        terms = self._terms(visible, _local_thickness(visible))
         return np.asarray(np.tensordot([self.front, self.scale, self.ambient], terms, 1))
 
-    def fitted(self, seen: VisiblePoints, truth: Array) -> Self:
+    def fitted(self, visible: VisiblePoints, truth: Array) -> Self:
         """The best of settings on a grid, with the best weights of the terms for each."""
-        wanted = truth.reshape(-1, 3)[seen.pixels] - seen.base.radiance.reshape(-1, 3)[seen.pixels]
-        thickness = _local_thickness(seen)
-        lights = bool(seen.scene.lights)
+        requested = truth.reshape(-1, 3)[visible.pixels] - visible.base.radiance.reshape(-1, 3)[visible.pixels]
+        thickness = _local_thickness(visible)
+        lights = bool(visible.scene.lights)
         grid = itertools.product(
             (0.0, 0.5), (0.0, 0.3) if lights else (0.0,), (2.0, 8.0) if lights else (2.0,), (0.3, 1.0, 3.0)
         )
         found: list[tuple[float, Self]] = []
         for wrap, distortion, power, reach in grid:
             one = replace(self, wrap=wrap, distortion=distortion, power=power, reach=reach)
-            best = lsq_linear(one._terms(seen, thickness).reshape(3, -1).T, wanted.ravel(), (0.0, MOST))
+            best = lsq_linear(one._terms(visible, thickness).reshape(3, -1).T, requested.ravel(), (0.0, MOST))
             front, scale, ambient = (round(float(weight), 3) for weight in best.x)
             found.append((float(best.cost), replace(one, front=front, scale=scale, ambient=ambient)))
         return min(found, key=lambda each: each[0])[1]
 
     @np.errstate(under="ignore")
-    def _terms(self, seen: VisiblePoints, thickness: Array) -> Array:
+    def _terms(self, visible: VisiblePoints, thickness: Array) -> Array:
         """(3, k, 3): light in front, from lights behind, and from all around behind, each times the diffuse color."""
-        color = seen.entering * seen.diffuse_color / np.pi
-        thin = np.exp(-thickness / (self.reach * seen.scene.objects[0].mean_thickness))[:, None]
-        front = seen.scene.environment.irradiance_on(seen.normals)
+        color = visible.entering * visible.diffuse_color / np.pi
+        thin = np.exp(-thickness / (self.reach * visible.scene.objects[0].mean_thickness))[:, None]
+        front = visible.scene.environment.irradiance_on(visible.normals)
         behind = np.zeros_like(front)
-        for light in seen.scene.lights:
-            towards, far = _towards(light, seen.points)
+        for light in visible.scene.lights:
+            towards, far = _towards(light, visible.points)
             if isinstance(light, PositionalLight):
                 strength = light.intensity_along(-towards) / far[:, None] ** 2
             else:
                 strength = np.asarray(light.irradiance)
-            wrapped = ((seen.normals * towards).sum(axis=1) + self.wrap) / (1.0 + self.wrap) ** 2
+            wrapped = ((visible.normals * towards).sum(axis=1) + self.wrap) / (1.0 + self.wrap) ** 2
             front = front + np.maximum(wrapped, 0.0)[:, None] * strength
-            bent = towards + self.distortion * seen.normals
-            ahead = np.maximum((seen.directions * bent).sum(axis=1), 0.0)  # V . -(L + N distortion), V towards the eye
+            bent = towards + self.distortion * visible.normals
+            ahead = np.maximum((visible.directions * bent).sum(axis=1), 0.0)  # V . -(L + N distortion), V to the eye
             behind = behind + (ahead**self.power)[:, None] * strength
-        around = seen.scene.environment.irradiance_on(-seen.normals)
+        around = visible.scene.environment.irradiance_on(-visible.normals)
         return np.stack([color * front, color * thin * behind, color * thin * around])
 
 
-def _local_thickness(seen: VisiblePoints) -> Array:
+def _local_thickness(visible: VisiblePoints) -> Array:
     """(k,): mean distance to the far side below the visible points, by the cosine to the inverted normal, in metres."""
-    below = cosine_directions(-seen.normals).reshape(-1, 3)
-    inwards = np.repeat(-seen.normals, RAYS, axis=0)
-    found = seen.distance(np.repeat(seen.points, RAYS, axis=0), below, inwards)
+    below = cosine_directions(-visible.normals).reshape(-1, 3)
+    inwards = np.repeat(-visible.normals, RAYS, axis=0)
+    found = visible.distance(np.repeat(visible.points, RAYS, axis=0), below, inwards)
     return np.asarray(np.where(np.isfinite(found), found, 0.0).reshape(-1, RAYS).mean(axis=1))

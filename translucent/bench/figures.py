@@ -143,7 +143,7 @@ def ms_text(value: float | None) -> str:
     return f"{value:.{min(6, max(0, 2 - math.floor(math.log10(abs(value)))))}f}"
 
 
-def share_text(value: float | None) -> str:
+def fraction_text(value: float | None) -> str:
     """A fraction in percent; ``0`` is exactly that."""
     if value is None:
         return "–"
@@ -152,7 +152,7 @@ def share_text(value: float | None) -> str:
     return "< 0.01 %" if value < 1e-4 else f"{100 * value:.2f} %" if value < 0.09995 else f"{100 * value:.1f} %"
 
 
-def signed_share_text(value: float) -> str:
+def signed_fraction_text(value: float) -> str:
     """A fraction in percent with its sign: ``+3.2 %``."""
     return f"{100 * value:+.1f} %".replace("-", "−")
 
@@ -305,8 +305,8 @@ def to_svg(figure: Figure, name: str, description: str, tooltips: dict[str, str]
     text = re.sub(r'xlink:href="#([^"]+)"', rf'href="#{name}-\1"', text)
     text = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", text)
     for gid, tooltip in (tooltips or {}).items():
-        shown = escape(printable(tooltip))
-        text = text.replace(f'<g id="{name}-{gid}">', f'<g id="{name}-{gid}"><title>{shown}</title>')
+        title = escape(printable(tooltip))
+        text = text.replace(f'<g id="{name}-{gid}">', f'<g id="{name}-{gid}"><title>{title}</title>')
     view = re.search(r'viewBox="[^"]*"', text)
     assert view is not None, "matplotlib always writes one"
     label = escape(printable(description))
@@ -358,15 +358,15 @@ def end_labels(axes: Axes, ends: Sequence[tuple[str, str, float, float]]) -> Non
         text.set_position(tuple(back.transform(end)))
 
 
-def spread(wanted: Array, gap: float, low: float, high: float) -> Array:
-    """Positions on a line, as near as possible to those `wanted`, in order, at least `gap` apart, within bounds."""
+def spread(positions: Array, gap: float, low: float, high: float) -> Array:
+    """Positions on a line, as near as possible to those `positions`, in order, at least `gap` apart, within bounds."""
     from scipy.optimize import isotonic_regression
 
-    if not len(wanted):
-        return wanted
-    order = np.argsort(wanted, kind="stable")
+    if not len(positions):
+        return positions
+    order = np.argsort(positions, kind="stable")
     offsets = gap * np.arange(len(order))
-    settled = isotonic_regression(np.clip(wanted[order], low, high) - offsets).x
+    settled = isotonic_regression(np.clip(positions[order], low, high) - offsets).x
     found = np.empty(len(order))
     found[order] = np.clip(settled, low, max(low, high - offsets[-1])) + offsets
     return found

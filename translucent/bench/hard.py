@@ -165,7 +165,7 @@ def hard(
     return define
 
 
-def _shown(mesh: Mesh, medium: Medium = GLASS, size: Size = SIZE) -> Scene:
+def _scene(mesh: Mesh, medium: Medium = GLASS, size: Size = SIZE) -> Scene:
     return showcase(mesh, medium, size, stage="none")
 
 
@@ -237,14 +237,14 @@ def _depths(checks: Checks) -> None:
     checks.holds("T at 1e4 is 0", optics.transmittance(1e4) == 0)
     ball = Sphere().tessellate(32)
     for extinction, what in ((5e3, "1e4"), (1e30, "1e30")):
-        frame = checks.render(_shown(ball, Medium(absorption=(extinction,) * 3)))
+        frame = checks.render(_scene(ball, Medium(absorption=(extinction,) * 3)))
         middle = frame.transmittance[SIZE[1] // 2, SIZE[0] // 2]
         checks.holds(f"a body of depth {what} is black, nothing is NaN", (middle == 0).all())
         checks.holds("and finite", np.isfinite(frame.radiance).all() and np.isfinite(frame.optical_depth).all())
     clear = Medium(absorption=(1e-30,) * 3)
-    thin = checks.render(_shown(ball, dataclasses.replace(clear, emission=(1e-3,) * 3)))
+    thin = checks.render(_scene(ball, dataclasses.replace(clear, emission=(1e-3,) * 3)))
     expected = thin.thickness.astype(np.float64) * 1e-3
-    emitted = thin.radiance[..., 0] - checks.render(_shown(ball, clear)).radiance[..., 0]
+    emitted = thin.radiance[..., 0] - checks.render(_scene(ball, clear)).radiance[..., 0]
     # The two pictures differ by the emission, each rounded to float32 near 1.
     checks.holds("emission without extinction is q d", np.abs(emitted - expected).max() <= 4 * np.finfo(np.float32).eps)
 
@@ -289,7 +289,7 @@ def _densities(checks: Checks) -> None:
     checks.refused("a negative density", lambda: DensityGrid([[[-1.0]]]), "densit")
     ball = Sphere().tessellate(32)
     medium = Medium(absorption=(1.0, 0.5, 0.2))
-    plain = _shown(ball, medium)
+    plain = _scene(ball, medium)
     truth = reference.render(plain, SIZE)
 
     def filled(values: object) -> Scene:
@@ -346,7 +346,7 @@ def _far(checks: Checks) -> None:
 )
 def _slab(checks: Checks) -> None:
     thin = 1e-4
-    scene = _shown(Box.slab(thickness=thin).tessellate())
+    scene = _scene(Box.slab(thickness=thin).tessellate())
     frame, truth = checks.both(scene)
     checks.error("of its own thickness", checks.compared(frame, truth, scene).p999 / thin)
     checks.holds("no pixel marked", frame.valid.all())
@@ -366,7 +366,7 @@ def _units(checks: Checks) -> None:
     for unit in (1e-6, 1e6):
         medium = Medium(absorption=np.array((0.5, 1.0, 2.0)) / unit)
         scaled = Mesh(mesh.vertices * unit, mesh.faces, name="torus")
-        checks.picture(f"{unit:g} m", _shown(scaled, medium))
+        checks.picture(f"{unit:g} m", _scene(scaled, medium))
 
 
 @hard("H11", "90 and 150 degrees of view, corner pixels", f"{EXACTLY}, relative to each path", unit="relative")
@@ -446,7 +446,7 @@ def _two_sizes(checks: Checks) -> None:
 )
 def _holes(checks: Checks) -> None:
     ball = Sphere().tessellate(48)
-    scene = _shown(ball)
+    scene = _scene(ball)
     towards = ball.vertices[ball.faces].mean(axis=1) @ (scene.camera.pose[:3, 3] - ball.center)
     facing = np.argsort(-towards)
     for count, what in ((1, "a missing face"), (40, "a hole of 40 faces")):
@@ -462,8 +462,8 @@ def _holes(checks: Checks) -> None:
 def _inverted(checks: Checks) -> None:
     ball = Sphere().tessellate(48)
     turned = Mesh(ball.vertices, ball.faces[:, ::-1], name="inverted")
-    checks.picture("all faces turned: thickness", _shown(turned))
-    scene = _shown(ball, size=(192, 192))
+    checks.picture("all faces turned: thickness", _scene(turned))
+    scene = _scene(ball, size=(192, 192))
     towards = ball.vertices[ball.faces].mean(axis=1) @ (scene.camera.pose[:3, 3] - ball.center)
     faces = ball.faces.copy()
     faces[towards.argmax()] = faces[towards.argmax()][::-1]
@@ -482,11 +482,11 @@ def _doubled(checks: Checks) -> None:
     box = Box((-1, -1, -1), (1, 1, 1)).tessellate()
     twice = Mesh(box.vertices, np.concatenate([box.faces, box.faces]), name="twice")
     checks.holds(f"{twice.diagnosis.duplicate_faces.count} repeated faces found", bool(twice.diagnosis.duplicate_faces))
-    doubled = _shown(twice)
+    doubled = _scene(twice)
     checks.holds("and told by the plan", checks.renderer.plan(doubled).says(NoteKind.DUPLICATED_FACES))
     left, right = Box((-1, -1, -1), (0, 1, 1)).tessellate(), Box((0, -1, -1), (1, 1, 1)).tessellate()
     for method in (SignedDepth(), FragmentLists(), DepthPeeling()):
-        scene = Scene([Object(left, GLASS), Object(right, RED)], _shown(box).camera)
+        scene = Scene([Object(left, GLASS), Object(right, RED)], _scene(box).camera)
         frame, truth = checks.both(scene, method=method)
         found = checks.compared(frame, truth, scene)
         checks.error(f"two bodies share a face, {type(method).__name__}", found.p999 / scene.diagonal)
@@ -509,7 +509,7 @@ def _slivers(checks: Checks) -> None:
         [np.delete(ball.faces, 100, axis=0), [(a, count, c), (count, b, c), (a, b, count), (a, a, b)]]
     )
     sliver = Mesh(vertices, faces, name="slivers")
-    checks.picture("zero-area faces and an unused vertex", _shown(sliver))
+    checks.picture("zero-area faces and an unused vertex", _scene(sliver))
     needle = Mesh(ball.vertices * (1.0, 1.0, 1e-4), ball.faces, name="needles")
     camera = Camera.look_at((0.0, 3.0, 2.0), (0, 0, 0), fov_y=45)
     checks.picture("needles", Scene([Object(needle, GLASS)], camera))
@@ -529,9 +529,9 @@ def _overlaps(checks: Checks) -> None:
         frame, truth = checks.picture(policy, scene)
         depth = checks.compared(frame, truth, scene, "transmittance")
         checks.error(f"{policy}, transmittance", depth.p999)
-    checks.picture("nested shells", _shown(nested_shells(3, 48)))
+    checks.picture("nested shells", _scene(nested_shells(3, 48)))
     crossing = joined([(ball.vertices, ball.faces) for ball in (one, other)], "crossing")
-    checks.picture("a mesh that passes through itself", _shown(crossing))
+    checks.picture("a mesh that passes through itself", _scene(crossing))
 
 
 @hard("H17", "100 layers", f"{EXACTLY}; methods with fewer mark the pixels and count what they leave out")

@@ -129,8 +129,8 @@ def _hollow(checks: Checks) -> None:
     for depth in (2.5, 10.0):
         shell = Object(mesh, Medium(scattering=depth / 0.4, ior=1.33))
         frame = checks.renderer.render(Scene([shell], camera, [light], black), (side, side), scattering=Diffusion())
-        shown = float(frame.radiance[..., 0].sum()) * (height / side) ** 2
-        checks.error(f"wall of {depth:g} mean free paths: power", shown / (1.0 - np.exp(-depth)) - 1.0)
+        rendered = float(frame.radiance[..., 0].sum()) * (height / side) ** 2
+        checks.error(f"wall of {depth:g} mean free paths: power", rendered / (1.0 - np.exp(-depth)) - 1.0)
         checks.holds("no pixel marked", frame.valid.all())
 
 

@@ -185,14 +185,14 @@ def lab(linear: npt.ArrayLike) -> Array:
 
 
 @np.errstate(under="ignore")
-def color_difference(shown: npt.ArrayLike, right: npt.ArrayLike) -> ColorDifference:
+def color_difference(rendered: npt.ArrayLike, right: npt.ArrayLike) -> ColorDifference:
     """Color difference of linear colors (n, 3), one or more: Euclidean distances in CIELAB 1976."""
-    distance = np.linalg.norm(lab(shown) - lab(right), axis=-1)
+    distance = np.linalg.norm(lab(rendered) - lab(right), axis=-1)
     median, p999 = np.quantile(distance, (0.5, 0.999))
     return ColorDifference(float(median), float(p999), float(distance.max()))
 
 
-def seen_words(row: MethodRow) -> str:
+def visibility_words(row: MethodRow) -> str:
     """Words on whether the difference from the truth is visible; empty where it was not measured."""
     found = row.color_difference
     if found is None:

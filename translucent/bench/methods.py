@@ -168,8 +168,9 @@ class MethodComparison(Experiment[Case]):
         if not on.record.compared_pixels:
             return dataclasses.replace(on.record, failure=_untrusted(on.scene))
         quantity = on.record.quantity
-        shown = [("reference", on.truth.frame), *((one.row.method, one.frame) for one in rows if one.frame is not None)]
-        pictures = tuple(on.truth.picture(name, frame, quantity) for name, frame in shown)
+        frames = [("reference", on.truth.frame)]
+        frames += [(one.row.method, one.frame) for one in rows if one.frame is not None]
+        pictures = tuple(on.truth.picture(name, frame, quantity) for name, frame in frames)
         working = {one.row.method: one for one in rows if one.row.failure is None and one.row.refusal is None}
 
         def maker(one: Trial) -> Callable[[Targets], Drawing]:

@@ -27,8 +27,8 @@ from translucent.bench.judgement import (
     WORST,
     advise,
     error_of,
-    seen_words,
     summarize,
+    visibility_words,
 )
 from translucent.bench.plots import AXES, UNITS, pareto_svg, plotted, scaling_groups, scaling_svg, shadow_plots
 from translucent.bench.record import CaseRecord, MethodRow, Report, ReportPicture, Shadows, Slab, TimedRow
@@ -89,8 +89,8 @@ def _flat(case: CaseRecord, row: MethodRow) -> dict[str, Any]:
         for part, number in value.items() if isinstance(value, dict) else [("", value)]:
             if number is not None or part:
                 # Numbers of the channels with spaces between them.
-                shown = " ".join(map(str, number)) if isinstance(number, tuple) else number
-                line[f"{name}.{part}" if part else name] = shown
+                text = " ".join(map(str, number)) if isinstance(number, tuple) else number
+                line[f"{name}.{part}" if part else name] = text
     return line
 
 
@@ -314,14 +314,14 @@ def _environment() -> Environment:
         signed=figures.signed_error_text,
         ratio=figures.ratio_text,
         ms=figures.ms_text,
-        share=figures.share_text,
+        share=figures.fraction_text,
         change=figures.change_text,
-        signed_share=figures.signed_share_text,
+        signed_share=figures.signed_fraction_text,
         count=figures.count_text,
         rounded=figures.rounded_text,
         data=_data_address,
         heat=heat_map,
-        seen=seen_words,
+        seen=visibility_words,
     )
     environment.globals.update(swatch=figures.swatch, mark=_mark)
     return environment

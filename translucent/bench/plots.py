@@ -111,8 +111,8 @@ def overview_svg(report: Report) -> str | None:
     cases = [case for case in cases if plotted(case)]
     if not cases:
         return None
-    wanted = [case for case in cases if case.closed and case.absorption_only and not case.convex]
-    case = (wanted or cases)[0]
+    requested = [case for case in cases if case.closed and case.absorption_only and not case.convex]
+    case = (requested or cases)[0]
     names = {row.method: row.method for row in case.rows}
     device = "software rasterizer" if report.provenance.software else report.provenance.renderer
     title = f"{case.title}, {case.size[0]} × {case.size[1]}, {device}"
@@ -299,8 +299,8 @@ def scaling_svg(axis: str, group: Sequence[Series]) -> str:
         x, y = np.array([(p.x, p.wall.median) for p in series.points if p.wall is not None]).T
         style = style_of(series.family)
         dashes = (0, (4, 3)) if series.family == "depth only" else "-"
-        shown = {"color": placeholder(style.color), "marker": style.marker, "markersize": 6, "linewidth": 1.5}
-        axes.plot(x, y, linestyle=dashes, **shown)
+        style_of_line = {"color": placeholder(style.color), "marker": style.marker, "markersize": 6, "linewidth": 1.5}
+        axes.plot(x, y, linestyle=dashes, **style_of_line)
         ends.append((series.method, style.color, float(x[-1]), float(y[-1])))
     axes.set_xscale("log")
     axes.set_yscale("log")

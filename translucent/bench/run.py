@@ -211,8 +211,8 @@ def _steps(
     bench: BenchContext, every: Sequence[Experiment[Any]], parts: Sequence[Part]
 ) -> list[tuple[str, Experiment[Any], Any]]:
     """Name, experiment and scene of each step of these parts."""
-    wanted = [(one, scene) for one in every if one.part in parts for scene in one.scenes(bench)]
-    return [(f"{one.label}{scene.name}", one, scene) for one, scene in wanted]
+    requested = [(one, scene) for one in every if one.part in parts for scene in one.scenes(bench)]
+    return [(f"{one.label}{scene.name}", one, scene) for one, scene in requested]
 
 
 @contextmanager

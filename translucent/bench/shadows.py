@@ -400,9 +400,9 @@ class Ground:
         if not self._pictured:
             return
         light = np.where(self.seen[..., None], found * self.bare, self.frame.radiance) / self.bright
-        shown = dataclasses.replace(self.frame, radiance=light.astype(np.float32)).to_srgb8()
+        rendered = dataclasses.replace(self.frame, radiance=light.astype(np.float32)).to_srgb8()
         error = None if found is self.truth else found - self.truth
-        self.pictures.append(picture_of(method, shown, error, self.seen))
+        self.pictures.append(picture_of(method, rendered, error, self.seen))
 
     def _unblocked(self, objects: Sequence[int]) -> Array:
         """Transmittance by opaque shadow maps of these objects."""
@@ -419,15 +419,15 @@ class Ground:
             depth = extinction * float(np.linalg.norm(item.bounds[1] - item.bounds[0]))
             parts.append((self._unblocked([i]), depth))
 
-        def shown(fraction: float) -> Array:
+        def rendered(fraction: float) -> Array:
             with np.errstate(under="ignore"):
                 dimmed = [left + (1.0 - left) * np.exp(-fraction * depth) for left, depth in parts]
                 return np.asarray(np.prod(dimmed, axis=0))
 
         def off(fraction: float) -> float:
-            return float(((shown(fraction) - self.truth)[self.near] ** 2).mean())
+            return float(((rendered(fraction) - self.truth)[self.near] ** 2).mean())
 
-        return shown(float(minimize_scalar(off, bounds=(1e-3, 1.0), method="bounded").x))
+        return rendered(float(minimize_scalar(off, bounds=(1e-3, 1.0), method="bounded").x))
 
     def _with(self, stones: Sequence[Object]) -> Scene:
         """The scene with these objects in place of its own, and a clear body, since a scene needs one."""
@@ -514,9 +514,9 @@ def halve(bench: BenchContext, scene: Scene, size: int) -> None:
     Signed distances are added up as in pictures, from the center of the media; only their sums have 11 bits.
     """
     renderer, camera = bench.renderer, map_camera(scene)
-    seen = dataclasses.replace(scene, objects=list(scene.bodies), camera=camera, lights=[])
+    rendered = dataclasses.replace(scene, objects=list(scene.bodies), camera=camera, lights=[])
     targets = Targets(bench.gl, (size, size))
-    drawing = ShortcutDrawing(bench, seen, targets, renderer.plan(seen), bench.own(HalfFloatPass))
+    drawing = ShortcutDrawing(bench, rendered, targets, renderer.plan(rendered), bench.own(HalfFloatPass))
     try:
         drawing.draw()
         frame = drawing.read()
@@ -559,22 +559,22 @@ def _map_and_floor(
     small, large = Targets(gl, (16, 16)), Targets(gl, (size, size))
     job = FrameJob(gl, plan, small, bench.resources)
     lit = dataclasses.replace(scene, camera=map_camera(scene))
-    seen = FrameJob(gl, dataclasses.replace(plan, scene=lit), large, bench.resources)
+    rendered = FrameJob(gl, dataclasses.replace(plan, scene=lit), large, bench.resources)
     maps, floor = bench.step(spec.name), bench.own(DepthOnlyPass)
     job.place((0.0, 0.0))
-    seen.place((0.0, 0.0), with_depth=True)
+    rendered.place((0.0, 0.0), with_depth=True)
 
     def make() -> None:
         job.resources.shadows.held = None
         maps.run(job, spec)
 
     def draw() -> None:
-        seen.uniforms.bind()
-        floor.run(seen, objects)
+        rendered.uniforms.bind()
+        floor.run(rendered, objects)
 
     try:
         yield partial(bench.timed, make), partial(bench.timed, draw)
     finally:
-        for one in (job, seen, small, large):
+        for one in (job, rendered, small, large):
             one.release()
         bench.resources.shadows.release()

@@ -111,11 +111,13 @@ def _layer(medium: Medium) -> Array:
     whole_back, whole_through = (
         find(back, through, reflected) for find in (mirrored_reflectance, mirrored_transmittance)
     )
-    seen = np.minimum([slabs.entering_transmittance(float(depth), medium.ior) for depth in medium.extinction], through)
+    entering = np.minimum(
+        [slabs.entering_transmittance(float(depth), medium.ior) for depth in medium.extinction], through
+    )
     return np.maximum(
         [
-            whole_back - seen * reflected * whole_through,
-            whole_through - seen * (1.0 - reflected + reflected * whole_back),
+            whole_back - entering * reflected * whole_through,
+            whole_through - entering * (1.0 - reflected + reflected * whole_back),
         ],
         0.0,
     )

@@ -186,13 +186,13 @@ class CaseTruth:
         if self.halves is None or not used.any():
             return None
         mean = float(self.frame.radiance[used].mean())
-        shown = np.asarray(frame.radiance, np.float64)
+        rendered = np.asarray(frame.radiance, np.float64)
         whole = _blocks(used.astype(np.float64)[..., None])[..., 0] == 1.0
         block = 0.0
         if whole.any():
-            parts = (_blocks(picture)[whole] for picture in (shown, *self.halves))
+            parts = (_blocks(picture)[whole] for picture in (rendered, *self.halves))
             block = math.sqrt(max(noise_free_square(*parts)[0], 0.0)) / mean
-        red, green, blue = (shown[used].mean(axis=0) / self.frame.radiance[used].mean(axis=0) - 1.0).tolist()
+        red, green, blue = (rendered[used].mean(axis=0) / self.frame.radiance[used].mean(axis=0) - 1.0).tolist()
         return LightErrors(self._rms_without_noise(frame) / mean, block, (red, green, blue), solve_seconds)
 
     def color_difference(self, frame: Frame, quantity: Quantity) -> ColorDifference | None:
@@ -200,8 +200,8 @@ class CaseTruth:
         used = self.compared & frame.coverage & frame.valid
         if not used.any():
             return None
-        shown = "transmittance" if quantity == "thickness" else quantity
-        return color_difference(getattr(frame, shown)[used], getattr(self.frame, shown)[used])
+        rendered = "transmittance" if quantity == "thickness" else quantity
+        return color_difference(getattr(frame, rendered)[used], getattr(self.frame, rendered)[used])
 
     def picture(self, method: str, frame: Frame, quantity: Quantity) -> ReportPicture:
         """Picture of a frame with its errors; the reference has none."""
@@ -221,25 +221,25 @@ def _blocks(picture: Array) -> Array:
     return np.asarray(cut.reshape(h, BLOCK, w, BLOCK, -1).mean(axis=(1, 3)))
 
 
-def noise_free_square(shown: Array, one: Array, other: Array) -> tuple[float, float]:
+def noise_free_square(rendered: Array, one: Array, other: Array) -> tuple[float, float]:
     """Mean square error against two truths, and its standard error.
 
     The noise of the truths is not correlated, so it is not in their product (shown - one)(shown - other).
     """
-    squares = ((shown - one) * (shown - other)).mean(axis=-1)
+    squares = ((rendered - one) * (rendered - other)).mean(axis=-1)
     return float(squares.mean()), float(squares.std()) * max(squares.size, 1) ** -0.5
 
 
 def picture_of(
     method: str,
-    shown: npt.NDArray[np.uint8],
+    rendered: npt.NDArray[np.uint8],
     error: Array | None = None,
     known: Mask | bool = True,
     marked: Mask | None = None,
 ) -> ReportPicture:
     """Picture (h, w, 3) for the record, with its signed error (h, w) or (h, w, 3), where that is known, and marks."""
     stream = io.BytesIO()
-    Image.fromarray(shown).save(stream, format="PNG", optimize=True)
+    Image.fromarray(rendered).save(stream, format="PNG", optimize=True)
     png = base64.b64encode(stream.getvalue()).decode("ascii")
     if error is None:
         return ReportPicture(method, png)

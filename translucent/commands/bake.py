@@ -197,18 +197,18 @@ def _read_job(model: str, output: Path, given: BakeOptions) -> Job:
     if given.file.allow_outside:
         job["outside"] = True
     if given.max_escaped is not None:
-        job["max_escaped"] = _read_share("max_escaped", given.max_escaped)
+        job["max_escaped"] = _read_fraction("max_escaped", given.max_escaped)
     return job | {name: True for name in _FLAGS if getattr(given, name)}
 
 
-def _read_share(name: str, text: str) -> float:
+def _read_fraction(name: str, text: str) -> float:
     try:
-        share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+        fraction = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
     except ValueError:
-        share = -1.0
-    if not 0 <= share <= 1:
+        fraction = -1.0
+    if not 0 <= fraction <= 1:
         raise InputError(f"{_option(name)} {text!r}", "not a share", "write for example 5%")
-    return share
+    return fraction
 
 
 def _read_length(name: str, text: str, unit: str) -> float | str:
@@ -249,7 +249,7 @@ def _read_scatter_job(model: str, output: Path, given: BakeOptions) -> ScatterJo
 
 
 def _bake_one(job: Job, given: BakeOptions, as_json: bool) -> None:
-    from translucent.bake.batch import told_of
+    from translucent.bake.batch import reported_values
     from translucent.bake.jobs import bake_file
 
     if given.check and given.vertices:
@@ -258,18 +258,18 @@ def _bake_one(job: Job, given: BakeOptions, as_json: bool) -> None:
         raise InputError("--check", "mode 'local' is no length", "choose another mode")
     with _progress(Path(job["model"]).name) as progress:
         record, results = bake_file(job, progress)
-    told = {"output": job["output"], **told_of(record, results, Path(job["output"]).parent)}
+    reported = {"output": job["output"], **reported_values(record, results, Path(job["output"]).parent)}
     checks = {}
     if given.check:
         from translucent.bake.check import check_output, write_picture
 
         found = check_output(job, record, results)
-        checks = _told_checks(found, job["output"], write_picture, "with the map, true, difference")
-    _print({**told, "record": record, **checks}, [*_lines(record, told), *checks.get("lines", [])], as_json)
+        checks = _check_report(found, job["output"], write_picture, "with the map, true, difference")
+    _print({**reported, "record": record, **checks}, [*_lines(record, reported), *checks.get("lines", [])], as_json)
 
 
-def _print(told: dict[str, Any], lines: list[str], as_json: bool) -> None:
-    for line in [json.dumps(told)] if as_json else lines:
+def _print(reported: dict[str, Any], lines: list[str], as_json: bool) -> None:
+    for line in [json.dumps(reported)] if as_json else lines:
         echo(line)
 
 
@@ -285,29 +285,29 @@ def _progress(label: str) -> Iterator[Progress | None]:
         range(STEPS), label=printable(label), file=sys.stderr, show_eta=True, item_show_func=lambda _: rate
     ) as bar:
 
-        def tell(share: float, rays: int) -> None:
+        def report(fraction: float, rays: int) -> None:
             nonlocal rate
             rate = f"{rays / 1e6 / max(time.perf_counter() - began, 1e-9):.2f} Mrays/s"
-            bar.update(int(share * STEPS) - bar.pos)
+            bar.update(int(fraction * STEPS) - bar.pos)
 
-        yield tell
+        yield report
 
 
-def _lines(record: Record, told: Record) -> Iterator[str]:
+def _lines(record: Record, reported: Record) -> Iterator[str]:
     """Lines of text about a bake."""
     from translucent.bake.record import parts_of
 
     parts = parts_of(record)
-    unit = "" if told["unit"] == "1" else f" {told['unit']}"
+    unit = "" if reported["unit"] == "1" else f" {reported['unit']}"
     in_files = len(parts) > 1 and "file" in parts[0]
     if not in_files:
-        yield _size_line(told["output"], record, told["range"], unit)
+        yield _size_line(reported["output"], record, reported["range"], unit)
     for part in parts:
         report, encoding = part["report"], part["encoding"]
         name = f"{part['mesh']['name']}: " if len(parts) > 1 else ""
         if in_files:
-            file = str(Path(told["output"]).with_name(part["file"]))
-            yield _size_line(file, part, part["range"] or told["range"], unit)
+            file = str(Path(reported["output"]).with_name(part["file"]))
+            yield _size_line(file, part, part["range"] or reported["range"], unit)
         if part.get("warnings"):
             yield f"{name}{'; '.join(part['warnings'])}"
             continue
@@ -317,9 +317,9 @@ def _lines(record: Record, told: Record) -> Iterator[str]:
             f"{name}{report['rays'] / 1e6:.3g} million rays in {report['seconds']:.1f} s, standard error "
             f"{report['mean_standard_error']:.2g} on average, {report['max_standard_error']:.2g} at most{factor}{step}"
         )
-    if told["uv_file"]:
-        yield f"{told['uv_file']}: the model with the UVs that were made for this map"
-    yield from (f"left out, {line}" for line in told["left_out"])
+    if reported["uv_file"]:
+        yield f"{reported['uv_file']}: the model with the UVs that were made for this map"
+    yield from (f"left out, {line}" for line in reported["left_out"])
 
 
 def _size_line(file: str, record: Record, found: Record, unit: str) -> str:
@@ -327,7 +327,9 @@ def _size_line(file: str, record: Record, found: Record, unit: str) -> str:
     return f"{file}: {size}{record['mode']}, {found['min']:.4g} to {found['max']:.4g}{unit}"
 
 
-def _told_checks(checks: Mapping[str, Any], output: object, write: Callable[..., None], shown: str) -> dict[str, Any]:
+def _check_report(
+    checks: Mapping[str, Any], output: object, write: Callable[..., None], content: str
+) -> dict[str, Any]:
     """Errors of what was baked, by mesh; their picture goes beside the output. None is a mesh that nothing shows."""
     path, hidden = Path(f"{output}.check.png"), "it is hidden behind other parts of its body"
     write([one for one in checks.values() if one is not None], path)
@@ -335,7 +337,7 @@ def _told_checks(checks: Mapping[str, Any], output: object, write: Callable[...,
     return {
         "check": {name: None if one is None else one.summary() for name, one in checks.items()},
         "check_picture": str(path),
-        "lines": [*lines, f"{path}: {shown}"],
+        "lines": [*lines, f"{path}: {content}"],
     }
 
 
@@ -346,10 +348,10 @@ def _bake_scatter(job: ScatterJob, given: BakeOptions, as_json: bool) -> None:
     record, results = run_scatter_job(job)
     checks = {}
     if given.check:
-        found, shown = check_scatter_output(job.output, results), "baked, diffused in pictures, difference"
-        checks = _told_checks(found, job.output, write_scatter_picture, shown)
-    told = {"output": str(job.output), "record": record, **checks}
-    _print(told, [*_scatter_lines(job, record), *checks.get("lines", [])], as_json)
+        found, description = check_scatter_output(job.output, results), "baked, diffused in pictures, difference"
+        checks = _check_report(found, job.output, write_scatter_picture, description)
+    reported = {"output": str(job.output), "record": record, **checks}
+    _print(reported, [*_scatter_lines(job, record), *checks.get("lines", [])], as_json)
 
 
 def _scatter_lines(job: ScatterJob, record: dict[str, Any]) -> list[str]:
@@ -374,7 +376,7 @@ def _bake_many(models: tuple[str, ...], out_dir: Path, given: BakeOptions, as_js
         raise InputError(f"--jobs {given.jobs}", "--dask is given, too", do)
     if given.dask is not None and given.resume:
         raise InputError("--resume", "--dask is given, too", "a job is done again from its start; leave --resume out")
-    wanted, absent = [], []
+    requested, absent = [], []
     for model in models:
         output = out_dir / f"{Path(model).stem}.{given.format}"
         try:
@@ -382,38 +384,38 @@ def _bake_many(models: tuple[str, ...], out_dir: Path, given: BakeOptions, as_js
         except InputError as error:
             absent.append(failed_entry({"model": model, "output": str(output)}, str(error)))
         else:
-            wanted.append(_read_job(model, output, given))
-    tell = _teller([*wanted, *absent], as_json)
+            requested.append(_read_job(model, output, given))
+    notify = _reporter([*requested, *absent], as_json)
     with made_folder(out_dir), _executor(given.dask) as executor:
-        report = bake_many(wanted, executor, given.jobs, tell)
+        report = bake_many(requested, executor, given.jobs, notify)
         for entry in absent:
-            tell(entry)
+            notify(entry)
         report = BatchReport((*report.assets, *absent), report.seconds)
         echo(json.dumps(report.summary()) if as_json else report.total)
         if failed := report.count("failed"):
             raise TranslucentError(f"{failed} of {len(models)} models failed", "the others are done", "see above")
 
 
-def _teller(assets: list[Record], as_json: bool) -> Callable[[Record], None]:
+def _reporter(assets: list[Record], as_json: bool) -> Callable[[Record], None]:
     """Callback that prints a line for each asset when it is done, with the time left; not between the lines of a JSON
     result.
     """
     from translucent.bake.batch import asset_line
 
     width = max(len(Path(asset["model"]).name) for asset in assets)
-    began, told, worked = time.perf_counter(), 0, 0
+    began, done, worked = time.perf_counter(), 0, 0
 
-    def tell(entry: Record) -> None:
-        nonlocal told, worked
-        told += 1
+    def report(entry: Record) -> None:
+        nonlocal done, worked
+        done += 1
         worked += entry["status"] != "skipped"
-        left = len(assets) - told
+        left = len(assets) - done
         after = ""
         if left and worked:
             after = f"; about {time_text((time.perf_counter() - began) / worked * left)} left"
-        echo(f"{told:>{len(str(len(assets)))}}/{len(assets)}  {asset_line(entry, width)}{after}", err=as_json)
+        echo(f"{done:>{len(str(len(assets)))}}/{len(assets)}  {asset_line(entry, width)}{after}", err=as_json)
 
-    return tell
+    return report
 
 
 @contextlib.contextmanager
@@ -493,7 +495,7 @@ def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
         made.save_check(picture_file)
     low, high = made.mesh.vertices.min(axis=0), made.mesh.vertices.max(axis=0)
     size = [float(1e3 * length) for length in high - low]
-    told = {
+    reported = {
         "output": str(output),
         "size_mm": size,
         "triangles": len(made.mesh.faces),
@@ -501,9 +503,9 @@ def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
         "rms": made.rms,
     }
     if given.check:
-        told["check_picture"] = str(picture_file)
+        reported["check_picture"] = str(picture_file)
     if as_json:
-        echo(json.dumps(told))
+        echo(json.dumps(reported))
         return
     echo(f"{output}: {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} mm, {len(made.mesh.faces)} triangles")
     echo(f"contrast {made.contrast:.3g} : 1; black is shown as {100 / made.contrast:.3g} % of white")

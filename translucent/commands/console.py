@@ -82,28 +82,28 @@ class ProgressLine:
     def __init__(self, what: str) -> None:
         self._what = what
         self._begun: tuple[float, float] | None = None
-        self._told = 0.0
+        self._reported = 0.0
         self._terminal = is_terminal(sys.stderr)
         self._width = 0
 
-    def __call__(self, share: float) -> None:
-        """Tell the share, 0 to 1, if it is time."""
+    def __call__(self, fraction: float) -> None:
+        """Report the fraction, 0 to 1, if it is time."""
         now = time.monotonic()
-        # Shaders are compiled before the first share is known: that says nothing about the rest.
-        begun, least = self._begun = self._begun or (now, share)
+        # Shaders are compiled before the first fraction is known: that says nothing about the rest.
+        begun, least = self._begun = self._begun or (now, fraction)
         spent = now - begun
-        if share >= 1.0:
-            self._begun, self._told = None, 0.0  # the next picture begins anew
+        if fraction >= 1.0:
+            self._begun, self._reported = None, 0.0  # the next picture begins anew
             if self._width:
                 overwrite(" " * self._width)
                 overwrite("")
                 self._width = 0
             return
         before, between = TERMINAL if self._terminal else FILE
-        if share <= least or spent < before or (self._told and now - self._told < between):
+        if fraction <= least or spent < before or (self._reported and now - self._reported < between):
             return
-        self._told = now
-        text = f"{self._what}: {share:.0%}, about {time_text(spent * (1.0 - share) / (share - least))} left"
+        self._reported = now
+        text = f"{self._what}: {fraction:.0%}, about {time_text(spent * (1.0 - fraction) / (fraction - least))} left"
         if self._terminal:
             overwrite(text.ljust(self._width))
             self._width = max(self._width, len(text))

@@ -54,23 +54,23 @@ def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
     """
     from translucent.planning.plan import plan_scene
 
-    asked = SceneRequest(
+    requested = SceneRequest(
         medium=given.medium.read(),
         file=given.file,
         environment_shadows=given.choices.environment_shadows,
         roughness=given.medium.surface_roughness(),
         stage=given.stage,
     )
-    scene, request = read_scene(model, asked), given.choices.read()
+    scene, request = read_scene(model, requested), given.choices.read()
     chosen = plan_scene(scene, request) if scene.bodies else None
     if as_json:
         found = None if chosen is None else {**chosen.summary(), "traffic": _traffic(scene, chosen).summary()}
         echo(json.dumps({**_summary(model, scene), "plan": found}))
         return
     if is_scene_file(model):
-        _tell_scene(model, scene)
+        _echo_scene(model, scene)
     else:
-        _tell_mesh(scene.objects[0].mesh)
+        _echo_mesh(scene.objects[0].mesh)
     if chosen is None:
         echo("plan: none, since no object is translucent; see with --preset NAME, or --color C and --distance D")
     else:
@@ -104,7 +104,7 @@ def _kind(item: Object) -> str:
     return "body" if item.sheet_thickness is None else "thin wall"
 
 
-def _tell_mesh(mesh: Mesh) -> None:
+def _echo_mesh(mesh: Mesh) -> None:
     low, high = mesh.bounds
     echo(
         f"{mesh.name}: {len(mesh.vertices)} vertices, {len(mesh.faces)} faces, "
@@ -115,7 +115,7 @@ def _tell_mesh(mesh: Mesh) -> None:
         echo(f"repaired: {repair}")
 
 
-def _tell_scene(model: str, scene: Scene) -> None:
+def _echo_scene(model: str, scene: Scene) -> None:
     low, high = scene.shown_bounds
     echo(
         f"{model}: {len(scene.shown)} objects, {len(scene.bodies)} of them translucent, {len(scene.lights)} lights, "

@@ -140,29 +140,29 @@ def extinction(
     if given.batch is not None:
         return _convert_table(given.batch, given)
     if given.fit:
-        fit, stated, told, report = _fitted(given)
-        _tell(told, fit, stated, given, as_json)
+        fit, stated, reported, report = _fitted(given)
+        _echo(reported, fit, stated, given, as_json)
         return None if as_json or given.target is not None else echo(report)
     medium = _given_medium(given)
     if medium is None and (color is None or (distance is None and given.model is None)):
         missing, hint = ("'COLOR'", QUOTE_HINT) if color is None else ("'DISTANCE'", _distance_hint(color))
         raise click.MissingParameter(hint[:1].upper() + hint[1:], context, param_hint=missing, param_type="argument")
     frame = _frame(given.model, given) if given.model is not None else None
-    told, medium = _converted(medium, color, distance if given.td is None else given.td, frame, given)
-    stated = told["distance"]
+    reported, medium = _converted(medium, color, distance if given.td is None else given.td, frame, given)
+    stated = reported["distance"]
     if frame is not None:
-        told["on"] = {"model": given.model, **appearance_of(frame, medium).summary()}
-        told["warnings"] += [
-            f"the average {name} is made by the edges: {share:.0%} of it comes from the thinnest 5 % of the pixels"
-            for name, share in zip(("red", "green", "blue"), told["on"]["thin_share"], strict=True)
-            if share > MOST_THIN_SHARE
+        reported["on"] = {"model": given.model, **appearance_of(frame, medium).summary()}
+        reported["warnings"] += [
+            f"the average {name} is made by the edges: {fraction:.0%} of it comes from the thinnest 5 % of the pixels"
+            for name, fraction in zip(("red", "green", "blue"), reported["on"]["thin_share"], strict=True)
+            if fraction > MOST_THIN_SHARE
         ]
         # Without a distance of the user's own, an engine gets the color at the model's thickness.
-        stated = stated if distance is not None else told["on"]["mean_thickness"]
+        stated = stated if distance is not None else reported["on"]["mean_thickness"]
     named = given.source is not None or given.preset is not None
     if given.ior is None and not named and given.target not in (None, *_WITHOUT_SURFACE):
         echo("note: its index of refraction is 1, which mirrors and bends nothing; for glass, --ior 1.5", err=True)
-    return _tell(told, medium, stated, given, as_json)
+    return _echo(reported, medium, stated, given, as_json)
 
 
 def _check_usage(given: ExtinctionOptions, color: str | None, as_json: bool) -> None:
@@ -242,22 +242,22 @@ def _converted(
     from translucent.media.medium import Medium, color_at
     from translucent.units import parse_length
 
-    wanted, changes = clamped(color) if given.clamp is not False and color is not None else (color or "", [])
+    requested, changes = clamped(color) if given.clamp is not False and color is not None else (color or "", [])
     if distance is not None:
         metres = parse_length(distance, given.unit)
         if medium is None:
-            medium, triple = Medium.from_color(wanted, metres), parse_color(wanted)
+            medium, triple = Medium.from_color(requested, metres), parse_color(requested)
         else:
             triple, metres = color_at(medium, metres)
     else:
         thickness = np.empty(0) if frame is None else thickness_samples(frame)
-        medium = medium or medium_for_average_color(thickness, wanted)
+        medium = medium or medium_for_average_color(thickness, requested)
         # At the mean thickness of the model; without a model, or where that is black, where 1/e is left.
         near = None if medium.extinction.any() else 1.0
         triple, metres = color_at(medium, near if frame is None else float(thickness.mean()))
-    told = summary(triple, metres, medium.extinction, given.unit_out)
-    told["warnings"][:0] = changes
-    return told, medium
+    reported = summary(triple, metres, medium.extinction, given.unit_out)
+    reported["warnings"][:0] = changes
+    return reported, medium
 
 
 def _fitted(given: ExtinctionOptions) -> tuple[Medium, float, dict[str, Any], str]:
@@ -269,8 +269,8 @@ def _fitted(given: ExtinctionOptions) -> tuple[Medium, float, dict[str, Any], st
             f"--fit {fits[1]}", f"--fit {fits[0]} is given, too", "give one table or .toml, or photographs"
         )
     if described and photographed:
-        asked = "--white" if given.white is not None else "--patch"
-        raise InputError(asked, "only a photograph takes it", "leave it out, or write it into the .toml")
+        requested = "--white" if given.white is not None else "--patch"
+        raise InputError(requested, "only a photograph takes it", "leave it out, or write it into the .toml")
     return _fitted_to_table(given) if _is_table(fits) else _fitted_to_photographs(given)
 
 
@@ -287,15 +287,15 @@ def _fitted_to_table(given: ExtinctionOptions) -> tuple[Medium, float, dict[str,
 
     fit = fit_wedge(given.fit[0], given.unit)
     distance = float(np.median(fit.distances))
-    told = summary(fit.medium.transmittance(distance), distance, fit.medium.extinction, given.unit_out)
-    told["warnings"][:0] = [f"{name} brightens with distance; its extinction is 0" for name in fit.clipped]
+    reported = summary(fit.medium.transmittance(distance), distance, fit.medium.extinction, given.unit_out)
+    reported["warnings"][:0] = [f"{name} brightens with distance; its extinction is 0" for name in fit.clipped]
     error = None if fit.standard_error is None else fit.standard_error.tolist()
-    told |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
+    reported |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
     known = "unknown with one sample" if fit.standard_error is None else f"{triple_text(fit.standard_error)} 1/m"
     lines = [f"standard error  {known}", f"residuals of {len(fit.distances)} samples, log(color / fit):"]
     for metres, residual in zip(fit.distances, fit.residuals, strict=True):
         lines.append(f"at {metres:<12.4g} m {triple_text(residual)}")
-    return fit.medium, distance, told, "\n".join(lines)
+    return fit.medium, distance, reported, "\n".join(lines)
 
 
 def _fitted_to_photographs(given: ExtinctionOptions) -> tuple[Medium, float, dict[str, Any], str]:
@@ -319,12 +319,12 @@ def _fitted_to_photographs(given: ExtinctionOptions) -> tuple[Medium, float, dic
         listed = [patch for text in given.patch for patch in parse_patches(text, given.unit)]
         shots = [Photograph(one, parse_rectangle(given.white), listed) for one in given.fit]
     fit = fit_photographs(shots, given.ior)
-    told = summary(fit.medium.transmittance(fit.distance), fit.distance, fit.medium.extinction, given.unit_out)
-    told["warnings"][:0] = fit.warnings
+    reported = summary(fit.medium.transmittance(fit.distance), fit.distance, fit.medium.extinction, given.unit_out)
+    reported["warnings"][:0] = fit.warnings
     if fit.distance >= _THICK:
         doubt = "lengths that name no unit are in metres, unless --unit mm is given"
-        told["warnings"].insert(0, f"plates about {length_text(fit.distance)} thick: {doubt}")
-    told |= {
+        reported["warnings"].insert(0, f"plates about {length_text(fit.distance)} thick: {doubt}")
+    reported |= {
         "samples": fit.samples.tolist(),
         "standard_error": fit.standard_error.tolist(),
         "interval": fit.interval.tolist(),
@@ -338,21 +338,21 @@ def _fitted_to_photographs(given: ExtinctionOptions) -> tuple[Medium, float, dic
         f"scatter         {triple_text(fit.chi2_per_degree)} chi2 per degree of freedom, 1 where it is noise alone",
         f"from            {samples} patches in {len(shots)} photograph{'s' if len(shots) > 1 else ''}",
     ]
-    return fit.medium, fit.distance, told, "\n".join(report)
+    return fit.medium, fit.distance, reported, "\n".join(report)
 
 
-def _tell(told: dict[str, Any], medium: Medium, stated: float, given: ExtinctionOptions, as_json: bool) -> None:
+def _echo(reported: dict[str, Any], medium: Medium, stated: float, given: ExtinctionOptions, as_json: bool) -> None:
     """Print the facts about a medium, or its material for an engine, with its color stated at a distance."""
     from translucent.media.filament import TD_TRANSMITTANCE, td_of
 
     left = TD_TRANSMITTANCE if given.td_transmittance is None else given.td_transmittance
     td = td_of(medium.extinction, left)
-    told["transmission_distance"] = {"distance": td if math.isfinite(td) else None, "transmittance": left}
+    reported["transmission_distance"] = {"distance": td if math.isfinite(td) else None, "transmittance": left}
     if given.target is None:
-        return echo(json.dumps(told) if as_json else _report(told))
+        return echo(json.dumps(reported) if as_json else _report(reported))
     from translucent.materials import load_medium, load_roughness, text_block
 
-    for line in told["warnings"]:
+    for line in reported["warnings"]:
         echo(f"warning: {line}", err=True)
     roughness = MediumOptions(preset=given.preset).surface_roughness(given.roughness)
     if given.roughness is None and given.source is not None:
@@ -363,42 +363,43 @@ def _tell(told: dict[str, Any], medium: Medium, stated: float, given: Extinction
     return echo(text_block(given.target, medium, medium.transmittance(stated), stated, roughness=roughness or 0.0))
 
 
-def _report(told: dict[str, Any]) -> str:
+def _report(reported: dict[str, Any]) -> str:
     from translucent.formulas.color import to_hex
     from translucent.media.colors import terminal_strip
 
-    distance, colors, td = told["distance"], told["transmittance"], told["transmission_distance"]
+    distance, colors, td = reported["distance"], reported["transmittance"], reported["transmission_distance"]
     reached = "never" if td["distance"] is None else f"{1e3 * td['distance']:.5g} mm"
-    lines = _appearance_lines(told["on"]) if "on" in told else []
+    color = reported["color"]
+    lines = _appearance_lines(reported["on"]) if "on" in reported else []
     lines += [
-        f"color           {triple_text(told['color'])} linear, {to_hex(told['color'])} sRGB, after {distance:g} m",
-        f"extinction      {triple_text(told['extinction'])} 1/m",
+        f"color           {triple_text(color)} linear, {to_hex(color)} sRGB, after {distance:g} m",
+        f"extinction      {triple_text(reported['extinction'])} 1/m",
     ]
-    if told["unit"] != "m":
-        lines.append(f"                {triple_text(told['extinction_per_unit'])} 1/{told['unit']}")
+    if reported["unit"] != "m":
+        lines.append(f"                {triple_text(reported['extinction_per_unit'])} 1/{reported['unit']}")
     lines += [
-        f"mean free path  {triple_text(_infinite(told['mean_free_path']))} m",
-        f"half-value      {triple_text(_infinite(told['half_value_thickness']))} m",
+        f"mean free path  {triple_text(_infinite(reported['mean_free_path']))} m",
+        f"half-value      {triple_text(_infinite(reported['half_value_thickness']))} m",
         f"                light has the color at {distance:g} m, 1/e (37 %) at a mean free path, half at a half-value",
         f"filament TD     {reached}: where {100.0 * td['transmittance']:g} % of the luminance of white light is left",
     ]
     if takes_colors(sys.stdout):
-        if "on" in told:
-            parts = [told["on"]["average_color"], *(part["color"] for part in told["on"]["parts"])]
+        if "on" in reported:
+            parts = [reported["on"]["average_color"], *(part["color"] for part in reported["on"]["parts"])]
             lines.append(f"on the model    {terminal_strip(parts)}")
         lines.append(f"swatches        {terminal_strip(list(colors.values()))}")
     for factor, row in colors.items():
         lines.append(f"after {float(factor) * distance:<9.4g} m {triple_text(row)} linear, {to_hex(row)}")
-    return "\n".join([*lines, *(f"warning         {line}" for line in told["warnings"])])
+    return "\n".join([*lines, *(f"warning         {line}" for line in reported["warnings"])])
 
 
-def _appearance_lines(told: dict[str, Any]) -> list[str]:
+def _appearance_lines(reported: dict[str, Any]) -> list[str]:
     """Lines of text about the appearance of a medium on a model."""
     lines = [
-        f"on {told['model']}: {told['pixels']} pixels, {told['mean_thickness']:.4g} m thick on average",
-        f"average color   {triple_text(told['average_color'])} linear, {told['average_hex']} sRGB",
+        f"on {reported['model']}: {reported['pixels']} pixels, {reported['mean_thickness']:.4g} m thick on average",
+        f"average color   {triple_text(reported['average_color'])} linear, {reported['average_hex']} sRGB",
     ]
-    for part in told["parts"]:
+    for part in reported["parts"]:
         color = f"{triple_text(part['color'])} linear, {part['hex']}"
         lines.append(f"at {part['thickness']:<9.4g} m  {color}; {part['thinner']:.0%} of it is thinner")
     return lines
@@ -422,8 +423,8 @@ def _convert_table(table: Path, given: ExtinctionOptions) -> None:
     else:
         done.write(output)
     if done.clamped:
-        told = f"{done.clamped} of {len(done.records)} colors clamped to {CLAMP:g} where they were below"
-        echo(f"warning: {told}; their warnings say so", err=True)
+        reported = f"{done.clamped} of {len(done.records)} colors clamped to {CLAMP:g} where they were below"
+        echo(f"warning: {reported}; their warnings say so", err=True)
     for line in done.errors:
         echo(f"error: {line}", err=True)
     if done.errors:

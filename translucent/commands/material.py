@@ -168,8 +168,8 @@ def check(model: str, given: CheckOptions, as_json: bool) -> None:
 
     output, outside = given.output, given.allow_outside
     if given.fix != (output is not None):
-        asked, missing = ("--fix", "-o OUTPUT is missing") if given.fix else (f"-o {output}", "--fix is missing")
-        raise InputError(asked, missing, "give both, or neither")
+        requested, missing = ("--fix", "-o OUTPUT is missing") if given.fix else (f"-o {output}", "--fix is missing")
+        raise InputError(requested, missing, "give both, or neither")
     found = left = check_materials(model, allow_outside=outside)
     if output is not None:
         refuse_overwriting(output, model)
@@ -178,30 +178,30 @@ def check(model: str, given: CheckOptions, as_json: bool) -> None:
         fixed = {} if output is None else {"fixed": left.summary()}
         echo(json.dumps({**found.summary(), **fixed}))
     else:
-        _tell(model, found)
+        _echo(model, found)
         if output is not None:
-            _tell(str(output), left)
+            _echo(str(output), left)
     if left.errors:
         count = len(left.errors)
-        asked = f"material check {model if output is None else output}"
-        told = f"{count} finding{'' if count == 1 else 's'} of severity error"
-        raise RenderError(asked, told, left.errors[0].do)
+        requested = f"material check {model if output is None else output}"
+        reported = f"{count} finding{'' if count == 1 else 's'} of severity error"
+        raise RenderError(requested, reported, left.errors[0].do)
 
 
-def _tell(model: str, found: MaterialCheck) -> None:
+def _echo(model: str, found: MaterialCheck) -> None:
     counts = found.summary()["counts"]
-    told = ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for name, n in counts.items())
-    echo(f"{model}: {len(found.bodies)} bod{'y' if len(found.bodies) == 1 else 'ies'} that light passes; {told}")
+    reported = ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for name, n in counts.items())
+    echo(f"{model}: {len(found.bodies)} bod{'y' if len(found.bodies) == 1 else 'ies'} that light passes; {reported}")
     for one in found.findings:
         echo(f"{one.severity:8}{one.code}: {one.where}")
         echo(f"        {one.text}")
         echo(f"        do: {one.do}")
     for body in found.bodies:
         if body["colors"] and body["stated"]:
-            _tell_body(body)
+            _echo_body(body)
 
 
-def _tell_body(body: dict[str, Any]) -> None:
+def _echo_body(body: dict[str, Any]) -> None:
     """Thickness of a body and what passes it, in a few lines."""
     from translucent.formulas.color import to_hex
 

@@ -95,30 +95,30 @@ def is_scene_file(model: str) -> bool:
     return Path(model).suffix.lower() in SUFFIXES
 
 
-def read_scene(model: str, asked: SceneRequest) -> Scene:
+def read_scene(model: str, requested: SceneRequest) -> Scene:
     """The scene of a glTF file, or one mesh on show, as it is requested."""
     from translucent.scene.showcase import framing, objects_named, with_roughness
     from translucent.scene.stages import staged, upright
 
-    options, (stage, turn) = asked.camera, _turned(asked.stage)
+    options, (stage, turn) = requested.camera, _turned(requested.stage)
     if options.camera is not None and options.defining:
         raise InputError(
             f"--camera {options.camera}", f"{', '.join(options.defining)} given, too", "give one or the other"
         )
-    scene, chosen = (_file_scene if is_scene_file(model) else _mesh_scene)(model, asked, stage)
-    named = {id(item) for one in asked.media for item in objects_named(scene, one.name)}
-    scene = with_roughness(scene, asked.roughness, [item for item in scene.objects if id(item) not in named])
-    for one in asked.media:
+    scene, chosen = (_file_scene if is_scene_file(model) else _mesh_scene)(model, requested, stage)
+    named = {id(item) for one in requested.media for item in objects_named(scene, one.name)}
+    scene = with_roughness(scene, requested.roughness, [item for item in scene.objects if id(item) not in named])
+    for one in requested.media:
         scene = with_roughness(scene, one.roughness, objects_named(scene, one.name))
     if options.defining:
-        scene = dataclasses.replace(scene, camera=_defined_camera(scene, options, asked.size, chosen))
+        scene = dataclasses.replace(scene, camera=_defined_camera(scene, options, requested.size, chosen))
     if chosen is not None:
         scene = upright(scene, read_vector("--up", options.up or DEFAULT_UP))
         if options.eye is None and not getattr(scene, "has_camera", False):
             fov = DEFAULT_FOV if options.fov is None else options.fov
-            scene = dataclasses.replace(scene, camera=framing(scene.objects, asked.size, fov_y=fov, stage=chosen))
-        scene = staged(scene, chosen, asked.environment, turn)
-    count = asked.environment_shadows
+            scene = dataclasses.replace(scene, camera=framing(scene.objects, requested.size, fov_y=fov, stage=chosen))
+        scene = staged(scene, chosen, requested.environment, turn)
+    count = requested.environment_shadows
     return scene if count is None else dataclasses.replace(scene, environment_shadows=count)
 
 
@@ -132,43 +132,45 @@ def _turned(stage: str | None) -> tuple[str | None, float]:
     return (name if comma else stage), turn
 
 
-def _mesh_scene(model: str, asked: SceneRequest, stage: str | None) -> tuple[Scene, Stage | None]:
+def _mesh_scene(model: str, requested: SceneRequest, stage: str | None) -> tuple[Scene, Stage | None]:
     from translucent.scene.showcase import default_medium, showcase
     from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, stage_named
 
-    if (camera := asked.camera.camera) is not None:
+    if (camera := requested.camera.camera) is not None:
         raise InputError(f"--camera {camera}", f"{model} is no glTF file and has no cameras", "use --eye")
-    for option, value in (("--variant", asked.variant), ("--time", asked.time)):
+    for option, value in (("--variant", requested.variant), ("--time", requested.time)):
         if value is not None:
             raise InputError(f"{option} {value}", f"{model} is no glTF file", "leave it out")
-    chosen = stage_named(stage or (DEFAULT_STAGE if asked.environment is None else NO_STAGE))
-    mesh = read_mesh(model, asked.file)
-    filling = asked.medium or default_medium(mesh, chosen)
-    scene = showcase(mesh, filling, asked.size, environment=asked.environment, stage=NO_STAGE)
-    return _with_media(scene, asked.media), chosen
+    chosen = stage_named(stage or (DEFAULT_STAGE if requested.environment is None else NO_STAGE))
+    mesh = read_mesh(model, requested.file)
+    filling = requested.medium or default_medium(mesh, chosen)
+    scene = showcase(mesh, filling, requested.size, environment=requested.environment, stage=NO_STAGE)
+    return _with_media(scene, requested.media), chosen
 
 
-def _file_scene(model: str, asked: SceneRequest, stage: str | None) -> tuple[Scene, Stage | None]:
+def _file_scene(model: str, requested: SceneRequest, stage: str | None) -> tuple[Scene, Stage | None]:
     from translucent.gltf.load import load_scene
     from translucent.scene.showcase import filled
     from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, has_ground, stage_named
 
     scene = load_scene(
         model,
-        asked.file.unit,
-        None if asked.camera.defining else asked.camera.camera or 0,
-        asked.size,
-        variant=asked.variant,
-        time=asked.time,
-        allow_outside=asked.file.allow_outside,
-        draft_extensions=asked.file.draft_extensions,
+        requested.file.unit,
+        None if requested.camera.defining else requested.camera.camera or 0,
+        requested.size,
+        variant=requested.variant,
+        time=requested.time,
+        allow_outside=requested.file.allow_outside,
+        draft_extensions=requested.file.draft_extensions,
     )
-    if asked.medium is not None:
-        scene = filled(scene, asked.medium)
-    scene = _with_media(scene, asked.media)
-    bare = not (scene.has_camera or scene.lights or has_ground(scene)) and asked.environment is None
+    if requested.medium is not None:
+        scene = filled(scene, requested.medium)
+    scene = _with_media(scene, requested.media)
+    bare = not (scene.has_camera or scene.lights or has_ground(scene)) and requested.environment is None
     chosen = stage_named(stage or (DEFAULT_STAGE if bare and scene.bodies else NO_STAGE))
-    return scene if asked.environment is None else dataclasses.replace(scene, environment=asked.environment), chosen
+    if requested.environment is not None:
+        scene = dataclasses.replace(scene, environment=requested.environment)
+    return scene, chosen
 
 
 def _with_media(scene: AnyScene, media: Sequence[NamedMedium]) -> AnyScene:

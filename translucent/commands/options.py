@@ -195,8 +195,8 @@ class NamesOf(click.Choice):  # type: ignore[type-arg] # click below 8.4 has no 
 
 def clamp_option() -> Any:
     """Field for colors with a channel of 0, which no finite extinction makes."""
-    told = "Take channels below 1e-4 for 1e-4 and say so, or refuse those of 0. Default: --clamp."
-    return option(names=("--clamp/--no-clamp",), help=told)
+    reported = "Take channels below 1e-4 for 1e-4 and say so, or refuse those of 0. Default: --clamp."
+    return option(names=("--clamp/--no-clamp",), help=reported)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,8 +217,8 @@ class MediumOptions:
         color, distance = self.color, self.distance
         if self.preset is not None:
             if color is not None or distance is not None:
-                asked, found = f"--preset {self.preset}", "--color or --distance is given, too"
-                raise InputError(asked, found, "give one or the other")
+                requested, found = f"--preset {self.preset}", "--color or --distance is given, too"
+                raise InputError(requested, found, "give one or the other")
             chosen = preset(self.preset)
             if chosen.warning and not shows_scattering:
                 echo(f"warning: {chosen.warning}", err=True)
@@ -228,8 +228,8 @@ class MediumOptions:
             raise InputError(given, f"{missing} is missing", "give both: a color has a meaning only at a distance")
         if color is None or distance is None:
             return None
-        wanted, warnings = clamped(color) if self.clamp is not False else (color, [])
-        medium = Medium.from_color(wanted, parse_length(distance))
+        applied, warnings = clamped(color) if self.clamp is not False else (color, [])
+        medium = Medium.from_color(applied, parse_length(distance))
         for line in warnings:
             echo(f"warning: {line}", err=True)
         return medium
@@ -339,8 +339,8 @@ def stage_option() -> Any:
 
 def roughness_option() -> Any:
     """Field for the surfaces of media."""
-    told = "Of the interfaces of media, 0 (polished) to 1. Default: the preset's, else the file's, or 0."
-    return option(type=click.FloatRange(0.0, 1.0), metavar="R", help=told)
+    reported = "Of the interfaces of media, 0 (polished) to 1. Default: the preset's, else the file's, or 0."
+    return option(type=click.FloatRange(0.0, 1.0), metavar="R", help=reported)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -488,8 +488,8 @@ class ChoiceOptions:
         stated = {"depth": self.interface_depth, "forks": self.interface_forks}
         given = {key: value for key, value in stated.items() if value is not None}
         if given and self.interfaces != TracedInterfaces.name:
-            asked = f"--interface-{next(iter(given))}"
-            raise InputError(asked, "only --interfaces traced takes it", "add --interfaces traced")
+            requested = f"--interface-{next(iter(given))}"
+            raise InputError(requested, "only --interfaces traced takes it", "add --interfaces traced")
         return (
             TracedInterfaces(**given) if given else None if self.interfaces is None else INTERFACES[self.interfaces]()
         )

@@ -164,7 +164,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     _check_together(given, request, pictures)
     pictures.check()
     refuse_overwriting(given.output, model, given.look.environment, given.look.background)
-    asked = SceneRequest(
+    requested = SceneRequest(
         medium=given.medium.read(),
         camera=given.camera,
         file=given.file,
@@ -177,7 +177,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
         variant=given.variant,
         time=given.time,
     )
-    scene = read_scene(model, asked)
+    scene = read_scene(model, requested)
     if given.look.tone is None and len(scene.shown) < len(scene.objects):
         pictures = Pictures(given, STAGED_TONE, pixels)
     require_translucent(model, scene)
@@ -242,9 +242,9 @@ def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pict
         "--caustics": (request.caustics is not None, "which draws what light lands on"),
         f"--size {given.size}": (pictures.tiled, "which draws all of it at once"),
     }
-    for asked, (clash, why) in clashes.items():
+    for requested, (clash, why) in clashes.items():
         if clash:
-            raise InputError(asked, f"--opaque-with, {why}", "leave out one of the two")
+            raise InputError(requested, f"--opaque-with, {why}", "leave out one of the two")
 
 
 class Pictures:
@@ -292,14 +292,14 @@ class Pictures:
         from translucent.files.reading import require_memory
 
         width, height = self.size
-        asked, pixels = f"--size {width}x{height}", width * height
+        requested, pixels = f"--size {width}x{height}", width * height
         if pixels > MOST_PIXELS:
             found = f"{pixels / 1e6:.0f} million pixels, and {MOST_PIXELS / 1e6:.0f} million are the most"
-            raise InputError(asked, found, "give a smaller size, at most about 32768x32768")
+            raise InputError(requested, found, "give a smaller size, at most about 32768x32768")
         if not self.tiled:
             do = "give a smaller size" if self.turntable else "give a smaller size, or write an .exr or .png, in tiles"
             found = f"{pixels / 1e6:.0f} million pixels at once"
-            require_memory(asked, found, _PIXEL_BYTES * pixels, do)
+            require_memory(requested, found, _PIXEL_BYTES * pixels, do)
 
     def write(self, scene: Scene, draw: Callable[[Scene], Frame]) -> Frame:
         """Draw and write all of them; returns the first frame."""
@@ -361,21 +361,21 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
     own : bool
         The model comes with the toolkit, so that its unit is known.
     """
-    seen = frame.coverage & frame.valid
-    if not seen.any():
+    visible = frame.coverage & frame.valid
+    if not visible.any():
         return
     from translucent.planning.limits import scattered_back
 
-    passed = float(frame.transmittance[seen].mean())
+    passed = float(frame.transmittance[visible].mean())
     media = [body.medium for body in scene.bodies if body.medium is not None and body.has_interface]
     if passed >= NEARLY_BLACK or any(scattered_back(scene, one) >= HARDLY_LIT for one in media if one.scatters):
         return
-    depth = frame.optical_depth[seen].astype(np.float64)
+    depth = frame.optical_depth[visible].astype(np.float64)
     low, high = (
         np.min([body.bounds[0] for body in scene.bodies], 0),
         np.max([body.bounds[1] for body in scene.bodies], 0),
     )
-    thickness = float(np.median(frame.thickness[seen]))
+    thickness = float(np.median(frame.thickness[visible]))
     # Of the channel that gets farthest.
     clearest = float(np.median(depth, axis=0).min())
     tenth = thickness * math.log(10.0) / clearest if clearest > 0 else math.inf
@@ -392,15 +392,15 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
 
 def warn_if_white(frame: Frame, exposure: float, tone: str) -> None:
     """Warn if much of what media cover is beyond the white of a picture that clamps, with what shows it."""
-    seen = frame.coverage & frame.valid
-    if tone != "none" or not seen.any():
+    visible = frame.coverage & frame.valid
+    if tone != "none" or not visible.any():
         return
-    bright = frame.radiance[seen].astype(np.float64).min(axis=-1) * 2.0**exposure
-    if (share := float((bright > WHITE).mean())) < BURNT_OUT:
+    bright = frame.radiance[visible].astype(np.float64).min(axis=-1) * 2.0**exposure
+    if (fraction := float((bright > WHITE).mean())) < BURNT_OUT:
         return
     darker = exposure - math.ceil(math.log2(float(np.quantile(bright, 0.95))))
     echo(
-        f"warning: {share:.0%} of what media cover is brighter than white, and shown as white; "
+        f"warning: {fraction:.0%} of what media cover is brighter than white, and shown as white; "
         f"--tone neutral keeps its shape, and --exposure {darker:g} its brightness",
         err=True,
     )

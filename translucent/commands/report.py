@@ -84,8 +84,8 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
         raise InputError(f"--limit {given.limit:g}", "not above 0", "give seconds, such as 600")
     medium = filling.read()
     if medium is not None and not models:
-        asked = "--color" if filling.preset is None else f"--preset {filling.preset}"
-        raise InputError(asked, "no MODEL to fill; the toolkit's scenes keep their media", "add a MODEL")
+        requested = "--color" if filling.preset is None else f"--preset {filling.preset}"
+        raise InputError(requested, "no MODEL to fill; the toolkit's scenes keep their media", "add a MODEL")
     limited = False
     before = None if given.compare is None else read_report(given.compare)
     made = None if source is None else read_report(source)
@@ -102,14 +102,14 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
     if as_json:
         echo(json.dumps(_summary(made, files, changes, agreed)))
     else:
-        _tell(made, files, changes, agreed)
+        _echo(made, files, changes, agreed)
     if output is None and before is None and not as_json:
         echo(table(made))
     if not made.complete and (source is None or parts):
         if not limited:
             raise click.exceptions.Abort
-        told = message_of(f"not measured within {given.limit:g} s: {', '.join(made.unmeasured)}")
-        echo(f"warning: {told}", err=True)
+        reported = message_of(f"not measured within {given.limit:g} s: {', '.join(made.unmeasured)}")
+        echo(f"warning: {reported}", err=True)
     worse = [change for change in changes or () if change.worse]
     if made.failures:
         raise RenderError(
@@ -129,11 +129,11 @@ def _measured(
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
 
     pixels = read_size(given.size) if given.size is not None else QUICK_SIZE if given.quick else FULL_SIZE
-    asked = SceneRequest(medium=medium, file=given.file, size=pixels)
+    requested = SceneRequest(medium=medium, file=given.file, size=pixels)
     scenes = {}
     for model in models:
         echo(f"reading {printable(model)}", err=True)
-        scenes[model] = read_scene(model, asked)
+        scenes[model] = read_scene(model, requested)
         require_translucent(model, scenes[model])
 
     def keep(part: Report) -> None:
@@ -141,18 +141,18 @@ def _measured(
             write_report(part, given.output / "report.json")
 
     watched = is_terminal(sys.stderr)
-    with click.progressbar(length=1, file=sys.stderr if watched else io.StringIO(), item_show_func=_shown) as bar:
-        told = 0, -FILE[1]
+    with click.progressbar(length=1, file=sys.stderr if watched else io.StringIO(), item_show_func=_item_text) as bar:
+        reported = 0, -FILE[1]
 
         def progress(what: str, done: int, steps: int) -> None:
-            nonlocal told
+            nonlocal reported
             bar.length = steps
             bar.update(done - bar.pos, what)
             bar.render_progress()  # without a step it would show nothing new
             now = time.monotonic()
             # Nobody watches the bar in a file: lines tell of each scene, and now and then of what is done for it.
-            if not watched and (done >= told[0] or now - told[1] >= FILE[1]):
-                told = done + 1, now
+            if not watched and (done >= reported[0] or now - reported[1] >= FILE[1]):
+                reported = done + 1, now
                 echo(f"measuring {done + 1} of {steps}: {printable(what)}", err=True)
 
         return measure_all(
@@ -170,7 +170,7 @@ def _measured(
         )
 
 
-def _shown(what: str | None) -> str:
+def _item_text(what: str | None) -> str:
     return printable(what or "")
 
 
@@ -232,7 +232,7 @@ def _shadow(case: ShadowCase) -> dict[str, Any]:
 
 
 def _answer(case: CaseRecord) -> dict[str, Any]:
-    from translucent.bench.judgement import advise, error_of, seen_words
+    from translucent.bench.judgement import advise, error_of, visibility_words
 
     advice = advise(case)
     if advice is None or advice.row.ratio is None:
@@ -245,13 +245,13 @@ def _answer(case: CaseRecord) -> dict[str, Any]:
         "rms_error": error_of(advice.row, case.quantity),
         "p999_error": None if (errors := advice.row.errors(case.quantity)) is None else errors.p999,
         "good_enough": advice.good_enough,
-        "seen": seen_words(advice.row) or None,
+        "seen": visibility_words(advice.row) or None,
         "cheaper": None if advice.cheaper is None else advice.cheaper.method,
-        "cheaper_seen": None if advice.cheaper is None else seen_words(advice.cheaper) or None,
+        "cheaper_seen": None if advice.cheaper is None else visibility_words(advice.cheaper) or None,
     }
 
 
-def _tell_seen(answer: dict[str, Any]) -> None:
+def _echo_visibility(answer: dict[str, Any]) -> None:
     """Print whether the difference is visible, in the model's own medium."""
     if answer["seen"]:
         echo(f"  with it, {answer['seen']}")
@@ -259,7 +259,7 @@ def _tell_seen(answer: dict[str, Any]) -> None:
         echo(f"  with {answer['cheaper']}, which is cheaper, {answer['cheaper_seen']}")
 
 
-def _tell(made: Report, files: list[Path], changes: Any, agreed: Agreement | None) -> None:
+def _echo(made: Report, files: list[Path], changes: Any, agreed: Agreement | None) -> None:
     echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
     if made.cases:
         echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10} {'p99.9':>8}")
@@ -271,7 +271,7 @@ def _tell(made: Report, files: list[Path], changes: Any, agreed: Agreement | Non
         numbers = f"{answer['ratio']:>8.2f} {answer['rms_error']:>10.1e} {answer['p999_error']:>8.1e}"
         echo(f"{answer['case']:<20} {answer['method']:<30} {numbers} {answer['quantity']}{mark}")
         if answer["case"].startswith(MODEL_CASE):
-            _tell_seen(answer)
+            _echo_visibility(answer)
     for case in made.shadows.cases:
         if case.texels is not None and case.order is not None:
             found = f"p99.9 {case.texels.p999:.1e} in rays of texels, order {case.order:.1f} with outlines"

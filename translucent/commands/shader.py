@@ -122,7 +122,7 @@ def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Languag
         text, version = lifted.text, lifted.version
     if not as_json:
         return echo(text, nl=False)
-    told = {
+    reported = {
         "name": lifted.name,
         "target": target,
         "version": version,
@@ -131,7 +131,7 @@ def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Languag
         "blocks": [_placed(block) for block in lifted.blocks],
         "text": text,
     }
-    return echo(json.dumps(told))
+    return echo(json.dumps(reported))
 
 
 def _placed(block: UniformBlock) -> dict[str, object]:
@@ -148,11 +148,11 @@ def _list(as_json: bool) -> None:
 
     found = {name: switches(name) for name in shader_names()}
     if as_json:
-        rows = [{"name": name, "switches": asked} for name, asked in found.items()]
+        rows = [{"name": name, "switches": requested} for name, requested in found.items()]
         return echo(json.dumps({"shaders": rows}))
     wide = max(map(len, found))
-    for name, asked in found.items():
-        echo(f"{name:<{wide}}  {' '.join(asked)}".rstrip())
+    for name, requested in found.items():
+        echo(f"{name:<{wide}}  {' '.join(requested)}".rstrip())
     return None
 
 
@@ -271,13 +271,13 @@ def _call_all(text: str) -> str:
 
 
 def _by_spirv_cross(what: str, source: str, stage: str, language: Language) -> str:
-    asked = f"--target {language}"
+    requested = f"--target {language}"
     do = "install them: apt-get install glslang-tools spirv-cross, brew install glslang spirv-cross, or the Vulkan SDK"
     glslang = shutil.which("glslangValidator") or shutil.which("glslang")
     cross = shutil.which("spirv-cross")
     if glslang is None or cross is None:
         absent = [name for name, path in (("glslang", glslang), ("SPIRV-Cross", cross)) if path is None]
-        raise InputError(asked, f"{' and '.join(absent)} {'is' if len(absent) == 1 else 'are'} not installed", do)
+        raise InputError(requested, f"{' and '.join(absent)} {'is' if len(absent) == 1 else 'are'} not installed", do)
     with tempfile.TemporaryDirectory(prefix="translucent-") as folder:
         written, spirv = Path(folder) / f"shader.{stage}", Path(folder) / "shader.spv"
         written.write_text(source, encoding="utf-8")
@@ -317,8 +317,8 @@ def _run(what: str, command: Sequence[str], folder: str) -> str:
         tool = Path(command[0]).name
         # It names the file that it was given, first alone and then with the line.
         output = (done.stdout + done.stderr).replace(f"{command[-1]}:", "line ")
-        told = _first_line("\n".join(line for line in output.splitlines() if folder not in line))
-        raise InputError(what, f"{tool}: {told or 'it stopped'}", "take another target")
+        reported = _first_line("\n".join(line for line in output.splitlines() if folder not in line))
+        raise InputError(what, f"{tool}: {reported or 'it stopped'}", "take another target")
     return done.stdout
 
 

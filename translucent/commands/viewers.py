@@ -95,8 +95,8 @@ def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
     work = run(document, pixels, given.scale, todo, shot, given.file.allow_outside)
     failure = None if todo is None else work.failure
     if as_json:
-        told = [{"kind": message.kind, "text": message.text} for message in work.messages]
-        echo(json.dumps({"model": work.document.model.path, "messages": told}))
+        reported = [{"kind": message.kind, "text": message.text} for message in work.messages]
+        echo(json.dumps({"model": work.document.model.path, "messages": reported}))
     elif todo is not None:
         for message in work.messages:
             # The error by which the script fails is the last line, as that of any verb.
@@ -170,7 +170,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
     refuse_overwriting(output, model, look.environment, look.background)
     pixels = check_page_size(read_size(given.size))
     picture = _read_poster(given.poster)
-    asked = SceneRequest(
+    requested = SceneRequest(
         medium=given.medium.read(),
         camera=given.camera,
         file=given.file,
@@ -180,7 +180,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
         roughness=given.medium.surface_roughness(look.roughness),
         stage=given.stage,
     )
-    scene = read_scene(model, asked)
+    scene = read_scene(model, requested)
     require_translucent(model, scene)
     before = triangles(scene)
     if given.simplify is not None:
@@ -200,7 +200,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
     written = len(text.encode())
     media = medium_lines(scene, planned.panel_distance)  # as the panel shows them
     if as_json:
-        told = {
+        reported = {
             "output": str(output),
             "bytes": written,
             "triangles": triangles(scene),
@@ -208,7 +208,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
             "notes": [{"kind": str(note.kind), "text": str(note)} for note in planned.notes],
             "medium": "; ".join(media),
         }
-        echo(json.dumps(told))
+        echo(json.dumps(reported))
         return
     echo(f"{output}: {written / 1e6:.2f} MB")
     if given.simplify is not None:

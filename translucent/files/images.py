@@ -156,7 +156,7 @@ PICTURES = ("PNG", "JPEG", "BMP", "GIF", "TIFF", "WEBP", "TGA", "PPM")
 
 
 def read_array(
-    stream: IO[bytes], size: int, asked: str, do: str = "write it with numpy.save", kinds: str = "biuf"
+    stream: IO[bytes], size: int, requested: str, do: str = "write it with numpy.save", kinds: str = "biuf"
 ) -> npt.NDArray[Any]:
     """Read the array of a .npy file.
 
@@ -165,7 +165,7 @@ def read_array(
     stream : file
     size : int
         Bytes of the file.
-    asked : str
+    requested : str
         What the error says was asked for.
     do : str
         What the user can do about it.
@@ -185,24 +185,24 @@ def read_array(
             warnings.simplefilter("ignore")  # of Python's parser, about the header
             shape, _, dtype = read_header(stream)
     except MemoryError:  # what Python's parser says of too many brackets
-        raise InputError(asked, "not a NumPy array", do) from None
+        raise InputError(requested, "not a NumPy array", do) from None
     except Exception as error:  # a header is Python, and what is broken in it raises whatever Python does
-        raise InputError(asked, f"not a NumPy array ({shown(error)})", do) from error
+        raise InputError(requested, f"not a NumPy array ({shown(error)})", do) from error
     if dtype.hasobject or dtype.kind not in kinds or not dtype.itemsize:
-        raise InputError(asked, f"its type is {str(dtype)!r}, not numbers", do)
+        raise InputError(requested, f"its type is {str(dtype)!r}, not numbers", do)
     needed, held = math.prod(shape) * dtype.itemsize, size - stream.tell()
     if not 0 <= needed <= held:
-        raise InputError(asked, f"it is cut short: {held} of {needed} bytes", do)
+        raise InputError(requested, f"it is cut short: {held} of {needed} bytes", do)
     stream.seek(0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return np.lib.format.read_array(stream, allow_pickle=False)
 
 
-def read_arrays(path: str | Path, asked: str, names: Iterable[str], do: str) -> dict[str, npt.NDArray[Any]]:
+def read_arrays(path: str | Path, requested: str, names: Iterable[str], do: str) -> dict[str, npt.NDArray[Any]]:
     """Read arrays of a .npz file by their names; raises `InputError` if one is missing or broken."""
     found = {}
-    with open_file(path, asked) as stream:
+    with open_file(path, requested) as stream:
         whole = os.fstat(stream.fileno()).st_size
         try:
             with zipfile.ZipFile(stream) as archive:
@@ -210,19 +210,19 @@ def read_arrays(path: str | Path, asked: str, names: Iterable[str], do: str) -> 
                     member = archive.getinfo(f"{name}.npy")
                     # What is said to be stored makes room for itself, too, whether it is there or not.
                     size, stored = max(member.file_size, member.compress_size), min(member.compress_size, whole)
-                    require_room(asked, f"{name} would", size, stored, do)
-                    found[name] = read_array(io.BytesIO(archive.read(member)), member.file_size, asked, do, "biufU")
+                    require_room(requested, f"{name} would", size, stored, do)
+                    found[name] = read_array(io.BytesIO(archive.read(member)), member.file_size, requested, do, "biufU")
         except InputError:
             raise
         except Exception as error:  # of zipfile and of each kind of compression
-            raise InputError(asked, f"it cannot be read ({shown(error)})", do) from error
+            raise InputError(requested, f"it cannot be read ({shown(error)})", do) from error
     return found
 
 
 @contextlib.contextmanager
 def open_picture(
     data: bytes,
-    asked: str,
+    requested: str,
     formats: tuple[str, ...] = PICTURES,
     *,
     per_pixel: int,
@@ -237,7 +237,7 @@ def open_picture(
     ----------
     data : bytes
         Of a whole file: a chunk may say that it is longer than that, and what reads on in a file makes room first.
-    asked : str
+    requested : str
         What the error says was asked for.
     formats : tuple of str
         Of Pillow.
@@ -258,17 +258,17 @@ def open_picture(
         try:
             image = Image.open(io.BytesIO(data), formats=formats)
         except Image.DecompressionBombError:
-            raise InputError(asked, "it has too many pixels", "make it smaller") from None
+            raise InputError(requested, "it has too many pixels", "make it smaller") from None
         except Exception as error:  # each of Pillow's readers raises its own kinds
             found = f"it is not an image that can be read: none of {', '.join(formats)}"
-            raise UnreadableError(asked, found, do) from error
+            raise UnreadableError(requested, found, do) from error
         width, height = image.size
-        require_room(asked, f"{width}x{height} pixels", per_pixel * width * height, len(data))
+        require_room(requested, f"{width}x{height} pixels", per_pixel * width * height, len(data))
         with image:
             yield image
 
 
-def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+def read_exr(path: str | Path, requested: str) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
     """Read header and channels of the first part of an OpenEXR file; the package has to be installed.
 
     Raises
@@ -276,22 +276,22 @@ def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, np
     InputError
         If it is none, is damaged, or has too many pixels for its file.
     """
-    OpenEXR = require_package("OpenEXR", asked)
-    with open_file(path, asked) as stream:
+    OpenEXR = require_package("OpenEXR", requested)
+    with open_file(path, requested) as stream:
         stored = os.fstat(stream.fileno()).st_size
     try:
         with _silent(), OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
             sizes = [_exr_size(part.header) for part in file.parts]
         width, height, _ = sizes[0]
-        require_room(asked, f"{width}x{height} pixels", sum(12 * w * h * n for w, h, n in sizes), stored)
+        require_room(requested, f"{width}x{height} pixels", sum(12 * w * h * n for w, h, n in sizes), stored)
         with _silent(), OpenEXR.File(str(path), separate_channels=True) as file:
             if not file.parts:  # of damaged pixels the library leaves their part out
-                raise InputError(asked, "its pixels are damaged", "copy the file again")
+                raise InputError(requested, "its pixels are damaged", "copy the file again")
             return dict(file.header()), {name: np.array(channel.pixels) for name, channel in file.channels().items()}
     except InputError:
         raise
     except Exception as error:  # of the library's C++
-        raise InputError(asked, f"not an OpenEXR file ({shown(error)})", "check the file") from error
+        raise InputError(requested, f"not an OpenEXR file ({shown(error)})", "check the file") from error
 
 
 @contextlib.contextmanager

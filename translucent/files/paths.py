@@ -24,13 +24,13 @@ if sys.platform != "win32":
 # os.path says False of a name that no file can have, where pathlib may raise.
 
 
-def require_file(path: Path, asked: str) -> None:
+def require_file(path: Path, requested: str) -> None:
     """Raise unless the path is a file that can be read.
 
     Parameters
     ----------
     path : Path
-    asked : str
+    requested : str
         What the error says was asked for.
 
     Raises
@@ -41,19 +41,19 @@ def require_file(path: Path, asked: str) -> None:
     if os.path.isfile(path):
         return
     if os.path.isdir(path):
-        raise InputError(asked, "it is a folder", "give a file in it")
+        raise InputError(requested, "it is a folder", "give a file in it")
     if os.path.exists(path):
-        raise InputError(asked, "it is a pipe or a device", "copy its content into a file, and give that")
-    raise InputError(asked, "no such file", "check the path")
+        raise InputError(requested, "it is a pipe or a device", "copy its content into a file, and give that")
+    raise InputError(requested, "no such file", "check the path")
 
 
-def require_output(path: Path, asked: str) -> None:
+def require_output(path: Path, requested: str) -> None:
     """Raise unless a file can be written to the path.
 
     Parameters
     ----------
     path : Path
-    asked : str
+    requested : str
         What the error says was asked for.
 
     Raises
@@ -65,33 +65,33 @@ def require_output(path: Path, asked: str) -> None:
     """
     folder = path.parent
     if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise InputError(asked, f"{str(folder)!r} is no folder", "choose another one")
+        raise InputError(requested, f"{str(folder)!r} is no folder", "choose another one")
     if not os.path.isdir(folder):
-        raise InputError(asked, f"no folder {str(folder)!r}", "make the folder first")
-    _require_replaceable(path, asked)
-    _require_writable(path, asked)
+        raise InputError(requested, f"no folder {str(folder)!r}", "make the folder first")
+    _require_replaceable(path, requested)
+    _require_writable(path, requested)
 
 
-def _require_replaceable(path: Path, asked: str) -> None:
+def _require_replaceable(path: Path, requested: str) -> None:
     """Raise `InputError` where a written file would take the place of anything but a file."""
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError) as error:  # nothing is there, or what makes a file says why it cannot be there
         if isinstance(error, OSError) and error.errno == errno.ELOOP:
-            raise InputError(asked, "links of that name lead to each other", "choose another name") from error
+            raise InputError(requested, "links of that name lead to each other", "choose another name") from error
         return
     if not stat.S_ISREG(mode):
         what = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
-        raise InputError(asked, f"{what} of that name is there", "choose another name")
+        raise InputError(requested, f"{what} of that name is there", "choose another name")
 
 
-def require_folder(path: Path, asked: str) -> None:
+def require_folder(path: Path, requested: str) -> None:
     """Raise unless the path is a folder, or one that can be made with its parents.
 
     Parameters
     ----------
     path : Path
-    asked : str
+    requested : str
         What the error says was asked for.
 
     Raises
@@ -105,18 +105,18 @@ def require_folder(path: Path, asked: str) -> None:
     if there is None:
         return
     if not os.path.isdir(there):
-        raise InputError(asked, f"{str(there)!r} is no folder", "choose another one")
-    _require_writable(there / path.name, asked)
+        raise InputError(requested, f"{str(there)!r} is no folder", "choose another one")
+    _require_writable(there / path.name, requested)
 
 
-def _require_writable(path: Path, asked: str) -> None:
+def _require_writable(path: Path, requested: str) -> None:
     """Raise `RenderError` unless a file can be made beside the path."""
     try:  # rights do not tell: disks may be read-only, and full; and a name may be too long
         with suppress(FileNotFoundError):
             os.lstat(path)
         temporary, held = _temporary_file(Path(os.path.realpath(path)))
     except OSError as error:
-        raise RenderError(asked, f"it cannot be written ({error.strerror})", "check the folder") from error
+        raise RenderError(requested, f"it cannot be written ({error.strerror})", "check the folder") from error
     held.close()
     temporary.unlink(missing_ok=True)
 

@@ -46,13 +46,13 @@ _TOML_TEXT = re.compile(
 )
 
 
-def open_file(path: str | Path, asked: str, limit: int = MAX_FILE) -> BinaryIO:
+def open_file(path: str | Path, requested: str, limit: int = MAX_FILE) -> BinaryIO:
     """Open a regular file for reading.
 
     Parameters
     ----------
     path : str or Path
-    asked : str
+    requested : str
         What the error says was asked for.
     limit : int
         Bytes that it may have.
@@ -62,18 +62,20 @@ def open_file(path: str | Path, asked: str, limit: int = MAX_FILE) -> BinaryIO:
     InputError
         If there is no such file, it cannot be read, it is a folder, a pipe or a device, or it is larger.
     """
-    require_file(Path(path), asked)
+    require_file(Path(path), requested)
     try:
         stream = open(path, "rb", opener=_open_at_once)  # noqa: SIM115
     except OSError as error:
-        raise InputError(asked, f"it cannot be read ({error.strerror})", "check its permissions") from None
+        raise InputError(requested, f"it cannot be read ({error.strerror})", "check its permissions") from None
     found = os.fstat(stream.fileno())
     if stat.S_ISREG(found.st_mode) and found.st_size <= limit:
         return stream
     stream.close()
     if not stat.S_ISREG(found.st_mode):
-        raise InputError(asked, "it is no file", "give a regular file")
-    raise InputError(asked, f"it has {size_text(found.st_size)}, more than {size_text(limit)}", "split it, or check it")
+        raise InputError(requested, "it is no file", "give a regular file")
+    raise InputError(
+        requested, f"it has {size_text(found.st_size)}, more than {size_text(limit)}", "split it, or check it"
+    )
 
 
 def _open_at_once(path: str, flags: int) -> int:
@@ -81,24 +83,24 @@ def _open_at_once(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
-def read_bytes(path: str | Path, asked: str, limit: int = MAX_FILE) -> bytes:
+def read_bytes(path: str | Path, requested: str, limit: int = MAX_FILE) -> bytes:
     """Read the bytes of a file; raises `InputError` like `open_file`."""
-    with open_file(path, asked, limit) as stream:
+    with open_file(path, requested, limit) as stream:
         try:
             return stream.read(os.fstat(stream.fileno()).st_size)
         except OSError as error:
-            raise InputError(asked, f"it cannot be read ({error.strerror})", "check the disk") from None
+            raise InputError(requested, f"it cannot be read ({error.strerror})", "check the disk") from None
 
 
-def read_text(path: str | Path, asked: str, limit: int = MAX_TEXT, do: str = "save it as text") -> str:
+def read_text(path: str | Path, requested: str, limit: int = MAX_TEXT, do: str = "save it as text") -> str:
     """Read a file of UTF-8 text; raises `InputError` like `open_file`, or if it is not UTF-8."""
     try:
-        return read_bytes(path, asked, limit).decode("utf-8-sig")
+        return read_bytes(path, requested, limit).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(asked, "not UTF-8 text", do) from None
+        raise InputError(requested, "not UTF-8 text", do) from None
 
 
-def linked_file(folder: Path, link: str, asked: str, allow_outside: bool = False) -> Path:
+def linked_file(folder: Path, link: str, requested: str, allow_outside: bool = False) -> Path:
     """Path of a file that another file in `folder` links to.
 
     Parameters
@@ -106,7 +108,7 @@ def linked_file(folder: Path, link: str, asked: str, allow_outside: bool = False
     folder : Path
     link : str
         Relative, percent-encoded or not.
-    asked : str
+    requested : str
         What the error says was asked for.
     allow_outside : bool
         Whether the link may lead out of the folder: to where its user could not have meant.
@@ -118,22 +120,22 @@ def linked_file(folder: Path, link: str, asked: str, allow_outside: bool = False
     """
     name = unquote(link)
     if _SCHEME.match(name):
-        raise InputError(asked, f"{link!r} is no path", "keep its files together, and link them by relative paths")
+        raise InputError(requested, f"{link!r} is no path", "keep its files together, and link them by relative paths")
     if "\0" in name:
-        raise InputError(asked, f"{link!r} names no file", "export it again")
+        raise InputError(requested, f"{link!r} names no file", "export it again")
     path = folder / name
     if not allow_outside and not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
         do = "keep its files together, or say --allow-outside (in Python, allow_outside=True)"
-        raise InputError(asked, f"{link!r} is outside its folder", do)
+        raise InputError(requested, f"{link!r} is outside its folder", do)
     return path
 
 
-def require_room(asked: str, found: str, size: int, stored: int, do: str = "make it smaller") -> None:
+def require_room(requested: str, found: str, size: int, stored: int, do: str = "make it smaller") -> None:
     """Raise unless reading may take this much memory.
 
     Parameters
     ----------
-    asked : str
+    requested : str
         What the error says was asked for.
     found : str
         What takes it, such as ``"16384x16384 pixels"``.
@@ -151,7 +153,7 @@ def require_room(asked: str, found: str, size: int, stored: int, do: str = "make
     """
     if size > (allowed := max(FREE, RATIO * stored)):
         limit = f"of so small a file at most {size_text(allowed)} are read"
-        raise InputError(asked, f"{found} take {size_text(size)}; {limit}", do)
+        raise InputError(requested, f"{found} take {size_text(size)}; {limit}", do)
 
 
 def size_text(size: int) -> str:
@@ -256,12 +258,12 @@ def free_memory() -> int | None:
         return free
 
 
-def require_memory(asked: str, found: str, size: int, do: str) -> None:
+def require_memory(requested: str, found: str, size: int, do: str) -> None:
     """Raise `InputError` where as much memory is not free.
 
     Parameters
     ----------
-    asked : str
+    requested : str
         What the error says was asked for.
     found : str
         What takes it, such as ``"50000000 triangles"``.
@@ -272,11 +274,11 @@ def require_memory(asked: str, found: str, size: int, do: str) -> None:
     """
     if size <= SMALL or (free := free_memory()) is None or size <= free:
         return
-    raise InputError(asked, f"{found} take about {size_text(size)} of memory, and {size_text(free)} are free", do)
+    raise InputError(requested, f"{found} take about {size_text(size)} of memory, and {size_text(free)} are free", do)
 
 
-def require_allowed(asked: str, size: int) -> None:
-    """Raise `RenderError` where the limit of the process (``ulimit -v``) leaves less memory than `asked` takes.
+def require_allowed(requested: str, size: int) -> None:
+    """Raise `RenderError` where the limit of the process (``ulimit -v``) leaves less memory than `requested` takes.
 
     Libraries that are written in C end the process where they get no more.
     """
@@ -290,4 +292,4 @@ def require_allowed(asked: str, size: int) -> None:
     free = max(limit - resource.getpagesize() * int(Path("/proc/self/statm").read_text().split()[0]), 0)
     if free < size:
         found = f"it takes {size_text(size)} of memory, and the limit of this process leaves {size_text(free)}"
-        raise RenderError(asked, found, "raise the limit (ulimit -v)")
+        raise RenderError(requested, found, "raise the limit (ulimit -v)")

@@ -155,8 +155,8 @@ def raw_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
         found = f"{name!r}: index {corners.max()} points outside the {len(positions)} vertices"
         raise accessors.file.refused(found)
     count = len(corners) // 3 if mode == _TRIANGLES else len(corners)
-    asked, do = f"glTF {str(accessors.file.path)!r}", "close other programs, or decimate the mesh"
-    require_memory(asked, f"the {count} triangles of {name!r}", PER_TRIANGLE * count, do)
+    requested, do = f"glTF {str(accessors.file.path)!r}", "close other programs, or decimate the mesh"
+    require_memory(requested, f"the {count} triangles of {name!r}", PER_TRIANGLE * count, do)
     faces = _faces(accessors, mode, corners, name)
     stored = len(positions)
     positions, faces, kept = _compact(positions, faces)

@@ -121,18 +121,18 @@ class GltfFile:
         return memoryview(self.chunks)[CHUNK.size : CHUNK.size + CHUNK.unpack_from(self.chunks)[0]]
 
     def _linked(self, uri: str) -> bytes:
-        asked = f"glTF {str(self.path)!r}"
+        requested = f"glTF {str(self.path)!r}"
         if uri.startswith("data:"):
             try:
                 return binascii.a2b_base64(uri.partition(",")[2], strict_mode=True)
             except ValueError as error:
                 found = f"{uri[:57]!r}... cannot be read ({error})"
-                raise UnreadableError(asked, found, "export the file again") from error
-        path = linked_file(self.path.parent, uri, asked, self.allow_outside)
+                raise UnreadableError(requested, found, "export the file again") from error
+        path = linked_file(self.path.parent, uri, requested, self.allow_outside)
         try:
             return read_bytes(path, "")
         except InputError as error:
-            raise UnreadableError(asked, f"{uri!r} cannot be read ({error})", "keep its files together") from None
+            raise UnreadableError(requested, f"{uri!r} cannot be read ({error})", "keep its files together") from None
 
 
 def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
@@ -150,35 +150,35 @@ def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
         If the file is missing, empty, cut short, or its JSON is broken.
     """
     path = Path(path)
-    asked = f"glTF {str(path)!r}"
-    with open_file(path, asked) as stream:
+    requested = f"glTF {str(path)!r}"
+    with open_file(path, requested) as stream:
         binary, size = stream.read(len(MAGIC)) == MAGIC, os.fstat(stream.fileno()).st_size
     if path.suffix.lower() not in (".glb", ".gltf") and not binary:
-        raise InputError(asked, f"suffix {path.suffix!r}", "give a .glb or .gltf file")
+        raise InputError(requested, f"suffix {path.suffix!r}", "give a .glb or .gltf file")
     if not size:
-        raise InputError(asked, "it is empty", "copy or export the file again")
+        raise InputError(requested, "it is empty", "copy or export the file again")
     if not binary:
-        _require_short(asked, size)
-    data, chunks = _split(asked, read_bytes(path, asked)) if binary else (read_bytes(path, asked), b"")
+        _require_short(requested, size)
+    data, chunks = _split(requested, read_bytes(path, requested)) if binary else (read_bytes(path, requested), b"")
     try:
         text = data.decode("utf-8-sig")
         del data  # half of the memory
         tree = json_value(text)
     except ValueError as error:
-        raise InputError(asked, f"its JSON is broken ({error})", "copy or export the file again") from error
+        raise InputError(requested, f"its JSON is broken ({error})", "copy or export the file again") from error
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
-        raise InputError(asked, "its JSON has no asset, so it is not glTF 2.0", "give a .glb or .gltf file")
+        raise InputError(requested, "its JSON has no asset, so it is not glTF 2.0", "give a .glb or .gltf file")
     return GltfFile(path, tree, chunks, allow_outside)
 
 
-def _split(asked: str, data: bytes) -> tuple[bytes, bytes]:
+def _split(requested: str, data: bytes) -> tuple[bytes, bytes]:
     """Split a .glb into its JSON and everything after it."""
-    cut = InputError(asked, f"cut short at {len(data)} bytes", "copy or export the file again")
+    cut = InputError(requested, f"cut short at {len(data)} bytes", "copy or export the file again")
     if len(data) < HEADER.size + CHUNK.size:
         raise cut
     _, version, length = HEADER.unpack_from(data)
     if version != GLB_VERSION:
-        raise InputError(asked, f"GLB version {version}", "export it as glTF 2.0")
+        raise InputError(requested, f"GLB version {version}", "export it as glTF 2.0")
     if length > len(data):
         raise cut
     start, parts = HEADER.size, []
@@ -191,17 +191,17 @@ def _split(asked: str, data: bytes) -> tuple[bytes, bytes]:
         parts.append((kind, start, start + CHUNK.size + size))
         start = parts[-1][2]
     if not parts or parts[0][0] != JSON_CHUNK:
-        raise InputError(asked, "its first chunk is not JSON", "copy or export the file again")
-    _require_short(asked, parts[0][2] - parts[0][1])
+        raise InputError(requested, "its first chunk is not JSON", "copy or export the file again")
+    _require_short(requested, parts[0][2] - parts[0][1])
     return data[parts[0][1] + CHUNK.size : parts[0][2]], data[parts[0][2] : length]
 
 
-def _require_short(asked: str, size: int) -> None:
+def _require_short(requested: str, size: int) -> None:
     """Raise `InputError` where a JSON of so many bytes takes too much memory, most of it for data in its links."""
     do = "save it as .glb, or keep its data in files beside it"
     if size > MAX_JSON:
-        raise InputError(asked, f"its JSON has {size_text(size)}, more than {size_text(MAX_JSON)}", do)
-    require_memory(asked, f"its {size_text(size)} of JSON", 3 * size, do)
+        raise InputError(requested, f"its JSON has {size_text(size)}, more than {size_text(MAX_JSON)}", do)
+    require_memory(requested, f"its {size_text(size)} of JSON", 3 * size, do)
 
 
 def gather(file: GltfFile, tree: Json) -> tuple[Json, bytes]:
@@ -298,8 +298,8 @@ def embed_images(file: GltfFile, tree: Json, binary: bytearray) -> None:
         if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
             kind = "image/webp"
         if kind is None:
-            told = f"glTF {str(file.path)!r}: {image['uri']!r} is no picture that glTF knows; it stays a link"
-            warnings.warn(told, TranslucentWarning, stacklevel=5)
+            text = f"glTF {str(file.path)!r}: {image['uri']!r} is no picture that glTF knows; it stays a link"
+            warnings.warn(text, TranslucentWarning, stacklevel=5)
             continue
         _make_view(tree, index, _append(binary, data), len(data), kind)
     if binary:
@@ -407,8 +407,8 @@ def _with_images(file: GltfFile, tree: Json, chunks: bytes) -> tuple[Json, bytes
     end = CHUNK.size + size if kind == BINARY_CHUNK else 0
     binary = bytearray(chunks[CHUNK.size : end])
     if not binary and tree.get("buffers"):
-        told = f"glTF {str(file.path)!r}: its first buffer is a link, so its images stay links, too"
-        warnings.warn(told, TranslucentWarning, stacklevel=5)
+        text = f"glTF {str(file.path)!r}: its first buffer is a link, so its images stay links, too"
+        warnings.warn(text, TranslucentWarning, stacklevel=5)
         return tree, chunks
     embed_images(file, tree, binary)
     return tree, _binary_chunk(bytes(binary)) + chunks[end:]

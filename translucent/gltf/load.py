@@ -202,13 +202,13 @@ def _scene_nodes(file: GltfFile, left_out: LeftOut) -> Iterator[int]:
     for i in range(len(scenes)):
         if i != chosen:
             left_out.add("other scenes", label(scenes, i))
-    pending, seen = roots[::-1], set()
+    pending, visited = roots[::-1], set()
     while pending:
         index = pending.pop()
         node = file.item("nodes", index)
-        if index in seen:
+        if index in visited:
             continue
-        seen.add(index)
+        visited.add(index)
         yield index
         pending += node.get("children", [])[::-1]
 

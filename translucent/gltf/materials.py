@@ -136,24 +136,24 @@ class DraftScattering:
 
     def medium(self, extinction: Array, ior: float) -> Medium:
         """Medium with this extinction (3,) in 1/m; its albedo scatters."""
-        share = self.albedo
-        return Medium((1.0 - share) * extinction, share * extinction, anisotropy=self.anisotropy, ior=ior)
+        fraction = self.albedo
+        return Medium((1.0 - fraction) * extinction, fraction * extinction, anisotropy=self.anisotropy, ior=ior)
 
 
-def read_draft(extensions: JsonFields, told: list[str]) -> DraftScattering | None:
+def read_draft(extensions: JsonFields, notes: list[str]) -> DraftScattering | None:
     """Scattering that a material's extensions state; the newer draft wins. None if there is none.
 
     Parameters
     ----------
     extensions : JsonFields
-    told : list of str
+    notes : list of str
         Gets what is not read.
     """
     name = next((one for one in (SCATTER, VOLUME_SCATTER) if one in extensions.values), None)
     if name is None:
         return None
     fields = extensions.section(name)
-    told += [f"{name} has {key}, which is not read" for key in fields.values if key.endswith("Texture")]
+    notes += [f"{name} has {key}, which is not read" for key in fields.values if key.endswith("Texture")]
     anisotropy = fields.number("scatterAnisotropy", 0.0, -1.0, 1.0)
     if abs(anisotropy) == 1.0:
         fields.refuse(f"scatterAnisotropy {anisotropy:g} is not between -1 and 1")
@@ -162,7 +162,7 @@ def read_draft(extensions: JsonFields, told: list[str]) -> DraftScattering | Non
     color = fields.numbers(_spelling(fields, _COLORS), default, 0.0, 1.0)
     strength = 1.0 if name == VOLUME_SCATTER else fields.number(_spelling(fields, _STRENGTHS), 0.0, 0.0, 1.0)
     if name == SCATTER and not any(key in fields.values for key in _STRENGTHS):
-        told.append(f"{name} has no scatterStrengthFactor, which is 0 by default: nothing scatters")
+        notes.append(f"{name} has no scatterStrengthFactor, which is 0 by default: nothing scatters")
     return DraftScattering(name, color, anisotropy, strength)
 
 
@@ -300,8 +300,8 @@ def volume_extensions_of(index: int, material: Json) -> Json:
     """Extensions of a material in a file's JSON; raises `InputError` if one of them excludes a volume."""
     found: Json = material.setdefault("extensions", {})
     if excluded := [name for name in EXCLUDED if name in found]:
-        asked = f"material {index} {material.get('name', '')!r}"
-        raise InputError(asked, f"{excluded[0]} excludes a volume", "give the object another material")
+        requested = f"material {index} {material.get('name', '')!r}"
+        raise InputError(requested, f"{excluded[0]} excludes a volume", "give the object another material")
     return found
 
 
@@ -385,21 +385,21 @@ def _warnings(found: GltfMaterial, entry: Json, extensions: Json, volume: Json) 
     """Warnings about valid but suspicious values; the first three are those of the glTF validator."""
     if not found.has_volume:
         return []
-    told = [f"{VOLUME} has an unknown property {key!r}" for key in volume if key not in _VOLUME_KEYS]
+    notes = [f"{VOLUME} has an unknown property {key!r}" for key in volume if key not in _VOLUME_KEYS]
     if TRANSMISSION not in extensions and not _lets_light_in(extensions):
-        told.append(f"{VOLUME} without {TRANSMISSION}: no light enters, so it is opaque")
+        notes.append(f"{VOLUME} without {TRANSMISSION}: no light enters, so it is opaque")
     if entry.get("doubleSided") is True and found.thickness > 0:
-        told.append("it is double-sided, which a volume should not be")
-    told += [f"{key} excludes {VOLUME}" for key in EXCLUDED if key in extensions]
+        notes.append("it is double-sided, which a volume should not be")
+    notes += [f"{key} excludes {VOLUME}" for key in EXCLUDED if key in extensions]
     black = [c for c, value in zip(("red", "green", "blue"), found.attenuation_color, strict=True) if value == 0]
     if black and math.isfinite(found.attenuation_distance):
-        told.append(f"attenuationColor {' and '.join(black)} is 0, read as {BLACKEST:g}: no extinction makes black")
+        notes.append(f"attenuationColor {' and '.join(black)} is 0, read as {BLACKEST:g}: no extinction makes black")
     if found.ior == 0:
-        told.append(f"ior is 0, read as {DEFAULT_IOR:g}")
+        notes.append(f"ior is 0, read as {DEFAULT_IOR:g}")
     if found.thickness == 0 and math.isfinite(found.attenuation_distance):
-        told.append("thicknessFactor is 0, so it is a thin wall and attenuation has no effect")
+        notes.append("thicknessFactor is 0, so it is a thin wall and attenuation has no effect")
     texture = volume.get("thicknessTexture")
     for key in texture.get("extensions", {}) if isinstance(texture, dict) else ():
         if key != TEXTURE_TRANSFORM:
-            told.append(f"thicknessTexture has {key}, which is not read")
-    return told
+            notes.append(f"thicknessTexture has {key}, which is not read")
+    return notes

@@ -97,12 +97,12 @@ def variant_index(file: GltfFile, name: str | None) -> int | None:
     names = variant_names(file)
     if name in names:
         return names.index(name)
-    asked = f"variant {name!r} of {str(file.path)!r}"
+    requested = f"variant {name!r} of {str(file.path)!r}"
     if not names:
-        raise InputError(asked, f"it has no variants ({VARIANTS})", "leave the variant out")
+        raise InputError(requested, f"it has no variants ({VARIANTS})", "leave the variant out")
     near = close_names(name, names)
     do = f"use one of {', '.join(names)}"
-    raise InputError(asked, "no such variant", f"{did_you_mean(near)} {do}" if near else do)
+    raise InputError(requested, "no such variant", f"{did_you_mean(near)} {do}" if near else do)
 
 
 def material_index(file: GltfFile, primitive: Json, variant: int | None) -> int | None:
@@ -183,16 +183,16 @@ def thickness_map(file: GltfFile, material: GltfMaterial) -> Array | None:
         return None
     texture = file.item("textures", material.thickness_texture)
     data = file.resource(file.item("images", texture.get("source")))
-    asked = f"glTF {str(file.path)!r}: its thickness texture"
+    requested = f"glTF {str(file.path)!r}: its thickness texture"
     try:
-        with open_picture(data, asked, ("PNG", "JPEG"), per_pixel=40, do="export the file again") as image:
+        with open_picture(data, requested, ("PNG", "JPEG"), per_pixel=40, do="export the file again") as image:
             # Pillow reads 16-bit gray as it is, and 16-bit RGB as 8-bit.
             deep = image.mode.startswith("I")
             levels = np.asarray(image if deep else image.convert("RGB"), dtype=np.float64)
     except InputError:
         raise
     except Exception as error:  # each of Pillow's decoders raises its own kinds
-        raise InputError(asked, f"it cannot be read ({shown(error)})", "export the file again") from error
+        raise InputError(requested, f"it cannot be read ({shown(error)})", "export the file again") from error
     return material.thickness * (levels / 65535.0 if deep else levels[..., 1] / 255.0)
 
 

@@ -205,9 +205,9 @@ class Textures:
 
     def _decoded(self, where: str, data: bytes) -> Image.Image | None:
         """Decoded picture; None if it is broken or of an unknown format."""
-        asked = f"glTF {str(self._file.path)!r}: {where}"
+        requested = f"glTF {str(self._file.path)!r}: {where}"
         try:
-            with open_picture(data, asked, ("PNG", "JPEG"), per_pixel=12) as opened:
+            with open_picture(data, requested, ("PNG", "JPEG"), per_pixel=12) as opened:
                 if opened.mode.startswith("I"):  # 16 bits of gray, which `convert` would clip
                     return Image.fromarray((np.asarray(opened) // 257).astype(np.uint8)).convert("RGBA")
                 return opened.convert("RGBA")

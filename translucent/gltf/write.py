@@ -248,8 +248,8 @@ def _fill(file: GltfFile, index: int, filling: Filling, sizes: list[float]) -> N
     before = extensions.get(VOLUME, {})
     factor = before.get("thicknessFactor", 0) or max(sizes) if filling.thickness is None else filling.thickness
     if not factor > 0:
-        asked = f"material {index} {material.get('name', '')!r}"
-        raise InputError(asked, "its objects are flat and have no thickness", "give one, or choose another object")
+        requested = f"material {index} {material.get('name', '')!r}"
+        raise InputError(requested, "its objects are flat and have no thickness", "give one, or choose another object")
     ior = extensions.get(IOR, {}).get("ior", DEFAULT_IOR) if filling.keep_ior else filling.medium.ior
     made = volume_extensions(filling.medium, filling.distance, factor, ior)
     kept = {key: value for key, value in before.items() if key not in ("attenuationColor", "attenuationDistance")}
@@ -272,9 +272,9 @@ def _state_scattering(file: GltfFile, index: int, medium: Medium, draft: Draft) 
     material = file.item("materials", index)
     extensions, made = material["extensions"], draft_extension(medium, draft)
     if SCATTER in made and DIFFUSE_TRANSMISSION in extensions:
-        asked = f"material {index} {material.get('name', '')!r}"
+        requested = f"material {index} {material.get('name', '')!r}"
         do = "give the object another material, or write the draft 'volume-scatter'"
-        raise InputError(asked, f"{DIFFUSE_TRANSMISSION} excludes {SCATTER}", do)
+        raise InputError(requested, f"{DIFFUSE_TRANSMISSION} excludes {SCATTER}", do)
     for name in DRAFTS.values():
         extensions.pop(name, None)
     extensions.update(made)

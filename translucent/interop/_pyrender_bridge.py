@@ -56,15 +56,15 @@ class Clipping:
 
     def metres(self, depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
         """Distance ahead in metres from window depth, 0 to 1; ``inf`` at 1. The twin of ``shade/backdrop.frag``."""
-        share = depth.astype(np.float64)
-        nothing = share >= 1.0
-        share[nothing] = 0.0
+        fraction = depth.astype(np.float64)
+        nothing = fraction >= 1.0
+        fraction[nothing] = 0.0
         if self.orthographic:
-            metres = self.near * (1.0 - share) + self.far * share
+            metres = self.near * (1.0 - fraction) + self.far * fraction
         elif math.isinf(self.far):
-            metres = self.near / (1.0 - share)
+            metres = self.near / (1.0 - fraction)
         else:
-            metres = self.near * self.far / (self.far * (1.0 - share) + self.near * share)
+            metres = self.near * self.far / (self.far * (1.0 - fraction) + self.near * fraction)
         metres[nothing] = math.inf
         return np.asarray(metres)
 

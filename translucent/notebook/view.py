@@ -82,9 +82,9 @@ def _takes_long(scene: Scene) -> str:
 
 def _contents(scene: Scene) -> list[str]:
     """Lines about the objects of a scene."""
-    told = [_object_text(item) for item in scene.objects[:MOST_NAMES]]
-    more = len(scene.objects) - len(told)
-    return [*told, f"and {more} more objects"] if more else told
+    values = [_object_text(item) for item in scene.objects[:MOST_NAMES]]
+    more = len(scene.objects) - len(values)
+    return [*values, f"and {more} more objects"] if more else values
 
 
 def _object_text(item: Object) -> str:
@@ -163,5 +163,5 @@ def view(
     planned = plan_page(scene, RenderRequest(method, interfaces=interfaces))
     mesh = (scene.bodies or scene.objects)[0].mesh
     data = payload(planned, mesh.name, check_size(size), VIEW_SAMPLES, exposure, tone)
-    told = header_of(data)["scene"]["media"]
-    return SceneView(scene, data, script.read_text(encoding="utf-8"), told, size[1])
+    values = header_of(data)["scene"]["media"]
+    return SceneView(scene, data, script.read_text(encoding="utf-8"), values, size[1])

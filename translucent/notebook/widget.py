@@ -78,8 +78,8 @@ class SceneView(Widget):  # type: ignore[misc]
         self._exact = np.ones(3)  # the color, which hexadecimal digits round
         super().__init__(_esm=script, _payload=payload, _height=height, camera=scene.camera)
         self._label = f"Interactive view of a {repr(scene)[:1].lower()}{repr(scene)[1:]}"
-        self._camera = _told_camera(scene, scene.camera)
-        self._media = [{key: told[key] for key in ("extinction", "ior", "roughness", "distance")} for told in media]
+        self._camera = _camera_values(scene, scene.camera)
+        self._media = [{key: values[key] for key in ("extinction", "ior", "roughness", "distance")} for values in media]
         self._show()
 
     # What Python sees
@@ -93,9 +93,9 @@ class SceneView(Widget):  # type: ignore[misc]
     def scene(self) -> Scene:
         """The scene with the media and the camera that are shown."""
         objects = list(self._scene.objects)
-        for bodies, told in zip(self._bodies, self._media, strict=True):
+        for bodies, values in zip(self._bodies, self._media, strict=True):
             for body in bodies:
-                objects[self._scene.objects.index(body)] = _changed(body, told)
+                objects[self._scene.objects.index(body)] = _changed(body, values)
         return dataclasses.replace(self._scene, objects=objects, camera=self.camera)
 
     def set_material(self, **values: Any) -> None:
@@ -117,11 +117,11 @@ class SceneView(Widget):  # type: ignore[misc]
         """Show what `_media` and `_camera` hold in the traits that Python sees."""
         self._quiet = True
         try:
-            told = self._media[self.medium]
-            self.distance, self.ior, self.roughness = told["distance"], told["ior"], told["roughness"]
-            self._exact = Medium(absorption=told["extinction"]).transmittance(told["distance"])
+            values = self._media[self.medium]
+            self.distance, self.ior, self.roughness = values["distance"], values["ior"], values["roughness"]
+            self._exact = Medium(absorption=values["extinction"]).transmittance(values["distance"])
             self.color = to_hex(self._exact)
-            if self.preset is not None and not _is_preset(told, self.preset):
+            if self.preset is not None and not _is_preset(values, self.preset):
                 self.preset = None
         finally:
             self._quiet = False
@@ -135,11 +135,11 @@ class SceneView(Widget):  # type: ignore[misc]
     def _material_changed(self, change: Any) -> None:
         if self._quiet:
             return
-        told = dict(self._media[self.medium])
-        told |= {"ior": self.ior, "roughness": self.roughness, "distance": self.distance}
+        values = dict(self._media[self.medium])
+        values |= {"ior": self.ior, "roughness": self.roughness, "distance": self.distance}
         if change["name"] in ("color", "distance"):
-            told["extinction"] = extinction_at(np.maximum(self._exact, BLACKEST), self.distance).tolist()
-        self._tell(told)
+            values["extinction"] = extinction_at(np.maximum(self._exact, BLACKEST), self.distance).tolist()
+        self._set_medium(values)
 
     @traitlets.observe("preset")  # type: ignore[untyped-decorator]
     def _preset_changed(self, change: Any) -> None:
@@ -147,30 +147,30 @@ class SceneView(Widget):  # type: ignore[misc]
             return
         found = named_preset(change["new"])
         known = {"extinction": found.medium.extinction.tolist(), "ior": found.medium.ior, "roughness": found.roughness}
-        self._tell({**self._media[self.medium], **known})
+        self._set_medium({**self._media[self.medium], **known})
 
     @traitlets.observe("camera")  # type: ignore[untyped-decorator]
     def _camera_set(self, change: Any) -> None:
         if not self._quiet:
             self._moved = True
-            self._camera = _told_camera(self._scene, change["new"])
+            self._camera = _camera_values(self._scene, change["new"])
 
     @traitlets.observe("_camera")  # type: ignore[untyped-decorator]
-    def _camera_told(self, change: Any) -> None:
-        told = change["new"]
-        if self._quiet or told == _told_camera(self._scene, self.camera):
+    def _camera_received(self, change: Any) -> None:
+        values = change["new"]
+        if self._quiet or values == _camera_values(self._scene, self.camera):
             return
         self._quiet = True
         try:
             self._moved = True
-            self.camera = _seen_camera(self._scene.camera, told)
+            self.camera = _camera_of(self._scene.camera, values)
         finally:
             self._quiet = False
 
-    def _tell(self, told: Json) -> None:
+    def _set_medium(self, values: Json) -> None:
         """Give the shown medium these values, in the browser and here."""
         media = list(self._media)
-        media[self.medium] = told
+        media[self.medium] = values
         self._media = media
 
     # What may be set
@@ -231,43 +231,43 @@ def _users(scene: Scene) -> list[list[Object]]:
     return list(users.values())
 
 
-def _changed(body: Object, told: Json) -> Object:
+def _changed(body: Object, values: Json) -> Object:
     """Body with the medium and the roughness that are shown."""
     assert body.medium is not None
-    if editable(body) or _same(body, told):
+    if editable(body) or _same(body, values):
         return body
-    medium = Medium(absorption=told["extinction"], ior=told["ior"])
+    medium = Medium(absorption=values["extinction"], ior=values["ior"])
     surface = body.surface or Surface()
-    plain = body.surface is None and told["roughness"] == 0
-    shown = None if plain else dataclasses.replace(surface, roughness=told["roughness"])
-    return dataclasses.replace(body, medium=medium, surface=shown)
+    plain = body.surface is None and values["roughness"] == 0
+    changed = None if plain else dataclasses.replace(surface, roughness=values["roughness"])
+    return dataclasses.replace(body, medium=medium, surface=changed)
 
 
-def _same(body: Object, told: Json) -> bool:
+def _same(body: Object, values: Json) -> bool:
     """True if a body has what is shown, so that it need not be made anew."""
     assert body.medium is not None
     roughness = 0.0 if body.surface is None else body.surface.roughness
-    alike = np.allclose(body.medium.extinction, told["extinction"], rtol=1e-12, atol=0)
-    return bool(alike) and (body.medium.ior, roughness) == (told["ior"], told["roughness"])
+    alike = np.allclose(body.medium.extinction, values["extinction"], rtol=1e-12, atol=0)
+    return bool(alike) and (body.medium.ior, roughness) == (values["ior"], values["roughness"])
 
 
-def _is_preset(told: Json, name: str) -> bool:
+def _is_preset(values: Json, name: str) -> bool:
     """True if a medium is that of a preset."""
     found = named_preset(name)
-    alike = np.allclose(told["extinction"], found.medium.extinction, rtol=1e-9, atol=0)
-    return bool(alike) and (told["ior"], told["roughness"]) == (found.medium.ior, found.roughness)
+    alike = np.allclose(values["extinction"], found.medium.extinction, rtol=1e-9, atol=0)
+    return bool(alike) and (values["ior"], values["roughness"]) == (found.medium.ior, found.roughness)
 
 
-def _told_camera(scene: Scene, camera: Camera) -> Json:
+def _camera_values(scene: Scene, camera: Camera) -> Json:
     """Eye, target and up of a camera, whose target is beside the middle of the scene."""
     ahead = float((scene.bounds.mean(axis=0) - camera.eye) @ camera.forward)
     target = camera.eye + (ahead if ahead > 0 else scene.diagonal) * camera.forward
     return {"eye": camera.eye.tolist(), "target": target.tolist(), "up": camera.up.tolist()}
 
 
-def _seen_camera(old: Camera, told: Json) -> Camera:
+def _camera_of(old: Camera, values: Json) -> Camera:
     """Camera of the browser, with the angle or height of view of an old one."""
-    eye, target, up = told["eye"], told["target"], told["up"]
+    eye, target, up = values["eye"], values["target"], values["up"]
     if old.fov_y is None:
         return Camera.orthographic(eye, target, up, height=old.height or 1.0)
     return Camera.look_at(eye, target, up, fov_y=old.fov_y)

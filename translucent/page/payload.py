@@ -72,7 +72,9 @@ def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, e
     frames, aliases = _recorded(recorder, planned)
     gl = recorder.gl
     # Pages build hierarchies themselves.
-    kept = frozenset(told["content"] for told in gl.textures if told["dtype"] == "u4" and told["content"] is not None)
+    kept = frozenset(
+        entry["content"] for entry in gl.textures if entry["dtype"] == "u4" and entry["content"] is not None
+    )
     spectral_maps = recorder.resources.shadows.spectral
     header = {
         "version": VERSION,
@@ -82,26 +84,27 @@ def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, e
         "exposure": exposure,
         "tone": tone,
         "notes": [{"kind": str(note.kind), "text": str(note)} for note in planned.notes],
-        "scene": _scene_told(planned, size, gl),
-        "presets": _presets_told(),
+        "scene": _scene_entry(planned, size, gl),
+        "presets": _presets_entry(),
         "inner_mirror": [diffuse_interface(ior).reflected for ior in np.linspace(1.0, 3.0, MIRROR_STEPS)],
         "layout": {
             "blocks": {block: _layout(item) for block, item in BLOCKS.items()},
             "tables": {table: _layout(item) for table, item in TABLES.items()},
         },
-        "present": _present_told(),
+        "present": _present_entry(),
         "false_colors": into.add(false_colors()),
-        "hierarchies": _hierarchies_told(recorder, scene, into),
+        "hierarchies": _hierarchies_entry(recorder, scene, into),
         "meshes": [_mesh_entry(mesh, into) for mesh in gl.meshes],
         "spectral_maps": spectral_maps,
         "aliases": aliases,
         "variants": {
-            key: _variant_told(frame, seen, gl, into, kept, spectral_maps) for key, (seen, frame) in frames.items()
+            key: _variant_entry(frame, rendered, gl, into, kept, spectral_maps)
+            for key, (rendered, frame) in frames.items()
         },
     }
     sections = _Sections(gl, into, kept)
     light = _light(frames)
-    header["textures"] = [sections.texture(told, i in light) for i, told in enumerate(gl.textures)]
+    header["textures"] = [sections.texture(entry, i in light) for i, entry in enumerate(gl.textures)]
     header["programs"], header["framebuffers"] = gl.programs, gl.framebuffers
     _number_blocks(header, sections)
     return into.packed(header)
@@ -122,9 +125,9 @@ def _recorded(
             if (bends, rough) == now:
                 aliases[key] = "base"
                 continue
-            seen = variant(planned.scene, bends=bends, rough=rough)
+            rendered = variant(planned.scene, bends=bends, rough=rough)
             try:
-                frames[key] = seen, recorder.record(planned.planned(seen))
+                frames[key] = rendered, recorder.record(planned.planned(rendered))
                 aliases[key] = key
             except InputError:
                 continue  # a way of drawing that was asked for cannot do it
@@ -144,12 +147,12 @@ class _Sections:
             self._numbers[content] = self._into.add(self._gl.contents[content], packing, bits)
         return self._numbers[content]
 
-    def texture(self, told: Mapping[str, Any], light: bool) -> dict[str, Any]:
+    def texture(self, entry: Mapping[str, Any], light: bool) -> dict[str, Any]:
         """Entry of a texture in the header; light is rounded."""
-        content = told["content"]
+        content = entry["content"]
         if content is None or content in self._kept:
-            return {**told, "content": None}
-        return {**told, "content": self.number(content, "picture" if light else "plain", LIGHT_BITS if light else 23)}
+            return {**entry, "content": None}
+        return {**entry, "content": self.number(content, "picture" if light else "plain", LIGHT_BITS if light else 23)}
 
 
 def _light(frames: Mapping[str, tuple[Scene, RecordedFrame]]) -> set[int]:
@@ -160,14 +163,14 @@ def _light(frames: Mapping[str, tuple[Scene, RecordedFrame]]) -> set[int]:
 
 def _number_blocks(header: dict[str, Any], sections: _Sections) -> None:
     """Replace the contents of uniform blocks in all steps by the numbers of their sections."""
-    for told in header["variants"].values():
+    for entry in header["variants"].values():
         for part in _PARTS:
-            for step in told[part]:
+            for step in entry[part]:
                 if "blocks" in step:
                     step["blocks"] = {name: sections.number(content) for name, content in step["blocks"].items()}
 
 
-def _scene_told(planned: PagePlan, size: tuple[int, int], gl: RecordingContext) -> dict[str, Any]:
+def _scene_entry(planned: PagePlan, size: tuple[int, int], gl: RecordingContext) -> dict[str, Any]:
     scene = planned.scene
     camera = scene.camera
     media = list(dict.fromkeys(body.medium for body in scene.objects if body.medium is not None and not body.covers))
@@ -188,7 +191,7 @@ def _scene_told(planned: PagePlan, size: tuple[int, int], gl: RecordingContext) 
         "center": media_center(scene).tolist(),
         "first_body": numbers[0],
         "first_throwing": throwing[0],
-        "media": [_medium_told(planned, medium) for medium in media],
+        "media": [_medium_entry(planned, medium) for medium in media],
         "objects": [
             {
                 "mesh": gl.number_of_mesh(body.mesh),
@@ -204,7 +207,7 @@ def _scene_told(planned: PagePlan, size: tuple[int, int], gl: RecordingContext) 
     }
 
 
-def _medium_told(planned: PagePlan, medium: Medium) -> dict[str, Any]:
+def _medium_entry(planned: PagePlan, medium: Medium) -> dict[str, Any]:
     bodies = [body for body in planned.scene.objects if body.medium is medium and not body.covers]
     first = bodies[0]
     why = next(filter(None, map(editable, bodies)), "")
@@ -220,7 +223,7 @@ def _medium_told(planned: PagePlan, medium: Medium) -> dict[str, Any]:
     }
 
 
-def _presets_told() -> list[dict[str, Any]]:
+def _presets_entry() -> list[dict[str, Any]]:
     return [
         {
             "name": name,
@@ -242,16 +245,16 @@ def _layout(item: UniformBlock | PackedTable) -> dict[str, Any]:
     return {"binding": binding, "size": item.dtype.itemsize, "fields": fields}
 
 
-def _present_told() -> dict[str, str]:
+def _present_entry() -> dict[str, str]:
     texts = {tone: lift("present/present.frag", {"TONE": i}, "webgl2").text for i, tone in enumerate(TONES)}
     return {"vertex": lift("geometry/fullscreen.vert", {}, "webgl2").text, **texts}
 
 
-def _hierarchies_told(recorder: FrameRecorder, scene: Scene, into: Container) -> dict[str, Any] | None:
+def _hierarchies_entry(recorder: FrameRecorder, scene: Scene, into: Container) -> dict[str, Any] | None:
     """Nodes of the hierarchy of objects, and the meshes whose hierarchies follow."""
     gl = recorder.gl
     meshes = list(dict.fromkeys(body.mesh for body in scene.objects))
-    traced = [told for told in gl.textures if told["dtype"] == "u4" and told["content"] is not None]
+    traced = [entry for entry in gl.textures if entry["dtype"] == "u4" and entry["content"] is not None]
     if not traced:
         return None
     nodes = gl.contents[traced[0]["content"]]
@@ -262,7 +265,7 @@ def _hierarchies_told(recorder: FrameRecorder, scene: Scene, into: Container) ->
     }
 
 
-def _variant_told(
+def _variant_entry(
     frame: RecordedFrame,
     scene: Scene,
     gl: RecordingContext,
@@ -320,7 +323,7 @@ def _mesh_entry(mesh: Mesh, into: Container) -> dict[str, Any]:
     """Entry of a mesh in a page's header; its arrays go into the container."""
     low, high = mesh.bounds
     faces = mesh.faces.astype(np.uint32)
-    told: dict[str, Any] = {
+    entry: dict[str, Any] = {
         "name": mesh.name,
         "center": mesh.center.tolist(),
         "low": low.tolist(),
@@ -334,8 +337,8 @@ def _mesh_entry(mesh: Mesh, into: Container) -> dict[str, Any]:
     }
     for name, values in (("uv", mesh.uv), ("colors", mesh.colors)):
         if values is not None:
-            told[name] = into.add(np.asarray(values, np.float32), "rows")
-    return told
+            entry[name] = into.add(np.asarray(values, np.float32), "rows")
+    return entry
 
 
 def _normals(mesh: Mesh, faces: np.ndarray, into: Container) -> dict[str, int | None]:

@@ -39,11 +39,11 @@ def simplified(scene: Scene, faces: int) -> Scene:
     """
     if faces < LEAST_FACES:
         raise InputError(f"--simplify {faces}", f"fewer than {LEAST_FACES} triangles", "give for example 200000")
-    share = faces / triangles(scene)
-    if share >= 1.0:
+    fraction = faces / triangles(scene)
+    if fraction >= 1.0:
         return scene
     coarse = {
-        mesh: _coarse(mesh, max(int(share * len(mesh.faces)), LEAST_FACES))
+        mesh: _coarse(mesh, max(int(fraction * len(mesh.faces)), LEAST_FACES))
         for mesh in dict.fromkeys(body.mesh for body in scene.objects)
         if mesh.uv is None and mesh.colors is None and len(mesh.faces) > LEAST_FACES
     }
@@ -94,9 +94,9 @@ def _changed(body: Object, bends: bool, rough: bool) -> Object:
     medium, surface = body.medium, body.surface or Surface()
     ior = (medium.ior if medium.ior != 1.0 else USUAL_IOR) if bends else 1.0
     roughness = (surface.roughness or USUAL_ROUGHNESS) if rough else 0.0
-    shown = replace(surface, roughness=roughness)
+    changed = replace(surface, roughness=roughness)
     plain = body.surface is None and roughness == 0.0
-    return replace(body, medium=replace(medium, ior=ior), surface=None if plain else shown)
+    return replace(body, medium=replace(medium, ior=ior), surface=None if plain else changed)
 
 
 def current(scene: Scene) -> tuple[bool, bool]:
@@ -222,7 +222,7 @@ def _planned(scene: Scene, request: RenderRequest, units: int) -> RenderPlan:
         chosen = replace(chosen, passes=passes)
     for step in chosen.passes:
         if (what := _NOT_SHOWN.get(step.name)) is not None:
-            asked = f"a page of this scene with {method or chosen.method}"
+            requested = f"a page of this scene with {method or chosen.method}"
             do = "leave it out" if isinstance(chosen.method, DepthPeeling) else "use another --method"
-            raise InputError(asked, f"WebGL2 has no {what}", do)
+            raise InputError(requested, f"WebGL2 has no {what}", do)
     return chosen

@@ -130,9 +130,9 @@ def check_page_size(size: tuple[int, int]) -> tuple[int, int]:
     """`size` as two ints; raises `InputError` if a page cannot frame so many pixels."""
     width, height = check_size(size)
     if max(width, height) > MOST_SIDE:
-        asked = f"a page that frames {width}x{height} pixels"
+        requested = f"a page that frames {width}x{height} pixels"
         raise InputError(
-            asked, f"more than {MOST_SIDE} along a side", "give for example 1280x800: pages fit any window"
+            requested, f"more than {MOST_SIDE} along a side", "give for example 1280x800: pages fit any window"
         )
     return width, height
 
@@ -199,9 +199,9 @@ def jpeg(pixels: Pixels) -> bytes:
     return stream.getvalue()
 
 
-def check_poster(picture: bytes, asked: str) -> bytes:
+def check_poster(picture: bytes, requested: str) -> bytes:
     """The picture; raises `InputError` if browsers show no such file."""
-    _kind(picture, asked)
+    _kind(picture, requested)
     return picture
 
 
@@ -209,22 +209,22 @@ def _data_url(picture: bytes) -> str:
     return f"data:image/{_kind(picture, 'poster')};base64,{base64.b64encode(picture).decode('ascii')}"
 
 
-def _kind(picture: bytes, asked: str) -> str:
+def _kind(picture: bytes, requested: str) -> str:
     for head, kind in {b"\x89PNG": "png", b"\xff\xd8\xff": "jpeg", b"RIFF": "webp"}.items():
         if picture.startswith(head):
             return kind
-    raise InputError(asked, "no PNG, JPEG or WebP picture", "give one of these")
+    raise InputError(requested, "no PNG, JPEG or WebP picture", "give one of these")
 
 
 def frame_html(frame: Frame, exposure: float, tone: str, name: str | None) -> str:
     """Text of a page; see `Frame.to_html`."""
-    asked = f"a page of {frame!r}"
+    requested = f"a page of {frame!r}"
     scene, request = frame.scene, frame.plan.request
     if scene is None:
         found = "it holds no scene: it was drawn before a backdrop, or put together by hand"
-        raise InputError(asked, found, "write one of the whole scene: tl.write_page(scene, 'viewer.html')")
+        raise InputError(requested, found, "write one of the whole scene: tl.write_page(scene, 'viewer.html')")
     if request.caustics is not None:
-        raise InputError(asked, "it has caustics, and WebGL2 has no photons", "render without caustics")
+        raise InputError(requested, "it has caustics, and WebGL2 has no photons", "render without caustics")
     planned = plan_page(scene, request)
     poster = jpeg(frame.to_srgb8(exposure, tone)) if frame.alpha is None else None
     return page_html(planned, name or title_of(scene), frame.size, exposure=exposure, tone=tone, poster=poster)

@@ -258,16 +258,16 @@ class History:
         """History one step back; the camera stays, unless the model is another."""
         if not self.past:
             return self
-        before = _seen_as(self.present, self.past[-1])
+        before = _with_view_of(self.present, self.past[-1])
         return History(before, self.past[:-1], (*self.future, self.present))
 
     def redone(self) -> History:
         """History one step forward."""
         if not self.future:
             return self
-        after = _seen_as(self.present, self.future[-1])
+        after = _with_view_of(self.present, self.future[-1])
         return History(after, (*self.past, self.present), self.future[:-1])
 
 
-def _seen_as(present: Document, other: Document) -> Document:
+def _with_view_of(present: Document, other: Document) -> Document:
     return dataclasses.replace(other, orbit=present.orbit) if other.model == present.model else other

@@ -101,9 +101,9 @@ def write_turntable(
     with Renderer() as renderer:
 
         def pictures() -> Iterator[npt.NDArray[np.uint8]]:
-            for i, seen in enumerate(turntable(scene, count)):
+            for i, view in enumerate(turntable(scene, count)):
                 report(i / count, f"picture {i + 1} of {count}")
-                yield renderer.render_requested(seen, size, request).to_srgb8(*look)
+                yield renderer.render_requested(view, size, request).to_srgb8(*look)
 
         write_animation(Path(path), pictures(), FPS)
 
@@ -121,7 +121,7 @@ class Bake:
 
     map: ThicknessMap
     scene: Scene
-    _seen: tuple[Orbit, Scene] | None = None
+    _view: tuple[Orbit, Scene] | None = None
 
     @property
     def covered(self) -> float:
@@ -136,9 +136,9 @@ class Bake:
 
     def seen_from(self, orbit: Orbit) -> Scene:
         """Scene of the painted model; the same object while the camera stays."""
-        if self._seen is None or self._seen[0] != orbit:
-            self._seen = orbit, dataclasses.replace(self.scene, camera=camera_of(orbit))
-        return self._seen[1]
+        if self._view is None or self._view[0] != orbit:
+            self._view = orbit, dataclasses.replace(self.scene, camera=camera_of(orbit))
+        return self._view[1]
 
 
 def bake_map(task: Task, pool: Pool, body: Object, medium: Medium, mode: str, size: int, rays: int) -> Bake:
@@ -246,14 +246,14 @@ def command_line(recipe: Recipe) -> tuple[str, list[str]]:
 
 def _medium_options(material: Material) -> tuple[list[str], list[str]]:
     """Options for a medium and its surface, and the parts of them that no option states."""
-    wanted = medium_of(material)
+    requested = medium_of(material)
     if material.source == "preset":
         found, words = preset(material.preset).medium, ["--preset", material.preset]
     else:
         found = Medium.from_color(material.color, material.distance)
         words = ["--color", f"linear({_numbers(material.color)})", "--distance", f"{material.distance:.12g}m"]
     fields = {"ior": "the index of refraction", "scattering": "scattering", "emission": "emission"}
-    left_out = [part for name, part in fields.items() if np.any(getattr(found, name) != getattr(wanted, name))]
+    left_out = [part for name, part in fields.items() if np.any(getattr(found, name) != getattr(requested, name))]
     return [*words, "--roughness", f"{material.roughness:g}"], left_out + material.unsaid
 
 

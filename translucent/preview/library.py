@@ -283,7 +283,7 @@ class ThumbnailCache:
         self._make = make
         self._known: dict[str, Picture | None] = {}
         #: Requests of the frame before, and of this one.
-        self._wanted: dict[str, tuple[Any, ...]] = {}
+        self._queue: dict[str, tuple[Any, ...]] = {}
         self._requested: dict[str, tuple[Any, ...]] = {}
         self._room = READ_AT_ONCE
 
@@ -291,7 +291,7 @@ class ThumbnailCache:
         """Picture of a key; None until it is there. If the disk has none, it is made by `work` and its arguments."""
         if key in self._known:
             return self._known[key]
-        if key not in self._wanted:
+        if key not in self._queue:
             if self._room <= 0:
                 return None
             self._room -= 1
@@ -304,17 +304,17 @@ class ThumbnailCache:
     @property
     def busy(self) -> bool:
         """True if pictures are still to be made."""
-        return bool(self._wanted) or self.lane.task is not None
+        return bool(self._queue) or self.lane.task is not None
 
     def begin_frame(self, idle: bool) -> None:
         """Begin a frame: a few pictures may be read in it; if the window is idle, the next one is made.
 
         Pictures that were not requested in the frame before are out of sight.
         """
-        self._room, self._wanted, self._requested = READ_AT_ONCE, self._requested, {}
-        if self.lane.task is not None or not idle or not self._wanted:
+        self._room, self._queue, self._requested = READ_AT_ONCE, self._requested, {}
+        if self.lane.task is not None or not idle or not self._queue:
             return
-        key, work = next(iter(self._wanted.items()))
+        key, work = next(iter(self._queue.items()))
 
         def make(task: Task) -> Picture | None:
             try:
@@ -325,7 +325,7 @@ class ThumbnailCache:
             return made
 
         def take(made: Picture | None) -> None:
-            self._wanted.pop(key, None)
+            self._queue.pop(key, None)
             self._keep(key, made)
 
         self.lane.start("", make, take)

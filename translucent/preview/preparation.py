@@ -263,9 +263,9 @@ def _boxes(mesh: Mesh) -> Mesh:
     box = Box().tessellate()
     size = np.maximum(mesh.bounds[1] - mesh.bounds[0], 0.1 * mesh.diagonal)  # a leaf may be flat
     # Nothing of a convex body is between a light and its interface.
-    shares = np.linspace(1.0, 0.5, 1 if mesh.diagnosis.convex else BOXES)
-    vertices = (mesh.center + shares[:, None, None] * size * box.vertices).reshape(-1, 3)
-    faces = (box.faces + len(box.vertices) * np.arange(len(shares))[:, None, None]).reshape(-1, 3)
+    fractions = np.linspace(1.0, 0.5, 1 if mesh.diagnosis.convex else BOXES)
+    vertices = (mesh.center + fractions[:, None, None] * size * box.vertices).reshape(-1, 3)
+    faces = (box.faces + len(box.vertices) * np.arange(len(fractions))[:, None, None]).reshape(-1, 3)
     uv = None if mesh.uv is None else np.zeros((len(vertices), 2))
     colors = None if mesh.colors is None else np.ones((len(vertices), 4))
     return Mesh(vertices, faces, uv, mesh.name, colors=colors)

@@ -529,8 +529,8 @@ class PhotonRefinement:
     def _count(self) -> None:
         assert self.light is not None
         noise = f", standard error {self._noise:.2%}" if self._noise < 1e3 else ""
-        seen = f"{self._in_picture:,} photons in the picture{noise}" if self._in_picture else "not in the picture yet"
-        self.note = f"caustics: {seen}" if self.done else f"caustics: {seen}; {self.light.photons:,} so far"
+        count = f"{self._in_picture:,} photons in the picture{noise}" if self._in_picture else "not in the picture yet"
+        self.note = f"caustics: {count}" if self.done else f"caustics: {count}; {self.light.photons:,} so far"
 
     def stop(self, viewport: Viewport) -> bool:
         """End it; returns whether its picture was on show."""

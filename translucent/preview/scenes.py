@@ -180,14 +180,14 @@ class Lighting:
     def lit(self, document: Document, loaded: Loaded) -> Document:
         """Document with the last environments and the last stage in place of its own, if these are not ready."""
         look = document.look
-        wanted = look.environment, look.background, stage_name(look, loaded)
-        files = any(Path(name).suffix.lower() in READERS for name in wanted[:2])
-        if not files and wanted[2] in self._made:
-            self._ready, self._requested = wanted, None
-        elif wanted != self._requested and (self.begun or wanted[2] == NO_STAGE):
-            self._requested = wanted
-            name = "reading the environment" if wanted[2] == NO_STAGE else "setting the stage"
-            self.lane.start(name, lambda _: _prepare(wanted), lambda _: self._take(wanted))
+        requested = look.environment, look.background, stage_name(look, loaded)
+        files = any(Path(name).suffix.lower() in READERS for name in requested[:2])
+        if not files and requested[2] in self._made:
+            self._ready, self._requested = requested, None
+        elif requested != self._requested and (self.begun or requested[2] == NO_STAGE):
+            self._requested = requested
+            name = "reading the environment" if requested[2] == NO_STAGE else "setting the stage"
+            self.lane.start(name, lambda _: _prepare(requested), lambda _: self._take(requested))
         environment, background, stage = self._ready
         return dataclasses.replace(
             document, look=dataclasses.replace(look, environment=environment, background=background, stage=stage)
@@ -274,8 +274,8 @@ def _shown_from(loaded: Loaded, name: str) -> Camera:
 @lru_cache(maxsize=2)
 def _standing(loaded: Loaded, name: str, environment: str, background: str, rotation: float) -> Scene:
     """Loaded scene on a stage; cached, as the ground, the lights and the environment stay while the camera moves."""
-    seen = dataclasses.replace(loaded.scene, camera=_shown_from(loaded, name))
-    return staged(seen, name, _own_environment(environment, background, rotation), rotation)
+    posed = dataclasses.replace(loaded.scene, camera=_shown_from(loaded, name))
+    return staged(posed, name, _own_environment(environment, background, rotation), rotation)
 
 
 def turn_from(document: Document, loaded: Loaded, camera: Camera) -> float:
@@ -287,12 +287,12 @@ def turn_from(document: Document, loaded: Loaded, camera: Camera) -> float:
 
 def first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
     """First orbit of a model: of the file's own camera, or from the view of ``translucent render``, framed as by F."""
-    scene, seen = loaded.scene, None
+    scene, posed = loaded.scene, None
     if loaded.has_camera:
         return orbit_of(scene.camera, scene.bounds.mean(axis=0))
     if stage != NO_STAGE:
-        seen = orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
-    return framed(seen, scene.objects, size)
+        posed = orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
+    return framed(posed, scene.objects, size)
 
 
 def material_of(scene: Scene, number: int | None = None) -> Material:

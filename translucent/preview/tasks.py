@@ -60,8 +60,8 @@ class Task:
     @property
     def progress(self) -> str:
         """Progress of the task, in words."""
-        share = "" if self.share is None else f"{self.share:.0%}"
-        parts = " ".join(filter(None, (self.detail, share, f"{self.seconds:.0f} s")))
+        fraction = "" if self.share is None else f"{self.share:.0%}"
+        parts = " ".join(filter(None, (self.detail, fraction, f"{self.seconds:.0f} s")))
         return f"{self.name}: {parts}"
 
     def cancel(self) -> None:
@@ -70,11 +70,11 @@ class Task:
         # A task may wait long behind another one, and what it would have drawn is large.
         self.work = self.then = _nothing
 
-    def report(self, share: float | None, detail: str = "") -> None:
+    def report(self, fraction: float | None, detail: str = "") -> None:
         """Report the progress of the work; raises `CancelledError` if it is canceled."""
         if self.cancelled:
             raise CancelledError
-        self.share, self.detail = share, detail
+        self.share, self.detail = fraction, detail
 
     def run(self) -> None:
         """Do the work, in a thread of a `Lane`."""

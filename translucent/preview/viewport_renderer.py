@@ -104,7 +104,7 @@ class ViewportRenderer:
         self.drawing, self.idle, self._begun = 0.0, False, False
         self._moving: RenderPlan | None = None
         self._held: Scene | None = None
-        self._shown: tuple[object, ...] = ()
+        self._rendered: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
         self._requested: Task | None = None
         self.presenter, self._times = Presenter(), StepTimes()
@@ -145,7 +145,7 @@ class ViewportRenderer:
                 self.problem = ""
             except PostponedError as error:
                 if error.program is not None:
-                    self._postpone(workspace, self._shown, error.program)
+                    self._postpone(workspace, self._rendered, error.program)
                 more = True
             except TranslucentError as error:
                 self.problem, more = str(error), False
@@ -183,7 +183,7 @@ class ViewportRenderer:
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
             self.idle = True
             return True
-        fresh = wanted != self._shown
+        fresh = wanted != self._rendered
         stopped = (fresh or not display.converges) and self.paths.stop()
         stopped |= (fresh or not display.follows_photons) and self.photons.stop(self.viewport)
         if not fresh and not stopped:
@@ -192,7 +192,7 @@ class ViewportRenderer:
         else:  # or the interactive picture is drawn again
             plan = partial(self.renderer.plan_requested, scene)
             self.plans = [plan(request), plan(replace(request, method=second)) if both else None]
-            self._shown = wanted
+            self._rendered = wanted
             self.viewport.restart()
             self.presenter.truth = None
             self._strides.begin(self.plans, self._left)
@@ -207,7 +207,7 @@ class ViewportRenderer:
         still = (display.converges or display.follows_photons) and self.quality.traceable(workspace, scene)
         lit = still and display.follows_photons and self.viewport.steps(0) >= self._strides.of[0] ** 2
         # A large picture takes as long to be shown as a step: it has a frame for that alone.
-        alone = self.presenter.begin(workspace, scene, self.viewport, self._shown)
+        alone = self.presenter.begin(workspace, scene, self.viewport, self._rendered)
         antialias = display.antialias and not workspace.relights
         drawn = not lit and not alone and any(self._step(side, scene, antialias) for side in sides)
         more = drawn or alone or workspace.relights
@@ -239,7 +239,7 @@ class ViewportRenderer:
                 plan = self.renderer.draw_requested(scene, framebuffer, request, look.exposure, tone_of(look, scene))
         except PostponedError as error:
             if error.program is None:
-                self._shown = ()  # the same again: what has been made is for pictures of this size
+                self._rendered = ()  # the same again: what has been made is for pictures of this size
             raise
         self._finish(0, plan, factor, begun)
         self.state = "moving" if factor == 1.0 else f"moving, {1 / factor:.0%} of the resolution"
@@ -323,12 +323,12 @@ class ViewportRenderer:
         plans = *self.plans, self._moving, self.paths.plan, self.photons.plan
         return [plan for plan in plans if plan is not None]
 
-    def _postpone(self, workspace: Workspace, wanted: tuple[object, ...], program: ProgramName | None = None) -> None:
+    def _postpone(self, workspace: Workspace, target: tuple[object, ...], program: ProgramName | None = None) -> None:
         """Request missing programs; until they are there, the same picture is not tried again."""
-        compiler, scene = self._compiler, wanted[0]
+        compiler, scene = self._compiler, target[0]
         assert compiler is not None
         assert isinstance(scene, Scene)
-        self._postponed, self._shown = wanted, ()
+        self._postponed, self._rendered = target, ()
         self.state = "the last picture, until the new one is prepared"
         if self._requested is not None and self._requested.cancelled:
             # The user does not wait, so that the window does the work.
@@ -390,7 +390,7 @@ class ViewportRenderer:
                 return
             self._release()
             self.renderer, self.viewport, self.shader_problem = fresh, viewport, ""
-            self._shown = self.presenter.shown = ()
+            self._rendered = self.presenter.shown = ()
         workspace.tell("info", "shaders reloaded")
 
     def _release(self) -> None:
@@ -421,7 +421,7 @@ class Presenter:
     def __init__(self) -> None:
         self.truth: ReferencePicture | None = None
         self.shown: tuple[object, ...] = ()
-        self._wanted: tuple[Shown, tuple[object, ...]] = Shown(), ()
+        self._requested: tuple[Shown, tuple[object, ...]] = Shown(), ()
         self._pending = self._alone = False
         self._seconds = self._when = 0.0
 
@@ -443,9 +443,9 @@ class Presenter:
                 self.truth, self._pending = truth, True
             right = right if self.truth is not None else "same"
         lengths = thickest(workspace), worst(workspace)
-        self._wanted = Shown(display.mode, right, display.split, *lengths, look.exposure, tone_of(look, scene)), key
-        pending = self._wanted != self.shown or (self._pending and time.perf_counter() - self._when > APART)
-        first = not viewport.presents_at_once(self._wanted[0])
+        self._requested = Shown(display.mode, right, display.split, *lengths, look.exposure, tone_of(look, scene)), key
+        pending = self._requested != self.shown or (self._pending and time.perf_counter() - self._when > APART)
+        first = not viewport.presents_at_once(self._requested[0])
         self._alone = (first or (pending and self._seconds > QUICK)) and viewport.steps(0) > 0
         return self._alone
 
@@ -462,14 +462,14 @@ class Presenter:
         """
         self._pending = self._pending or changed
         now = self._alone or last or self._seconds <= QUICK
-        if self._wanted == self.shown and not (self._pending and now):
+        if self._requested == self.shown and not (self._pending and now):
             return False
-        if not self._alone and not viewport.presents_at_once(self._wanted[0]):
+        if not self._alone and not viewport.presents_at_once(self._requested[0]):
             return True
         begun = time.perf_counter()
-        viewport.present(self._wanted[0])
+        viewport.present(self._requested[0])
         viewport.engine.context.gl.finish()
-        self.shown, self._pending, self._when = self._wanted, False, time.perf_counter()
+        self.shown, self._pending, self._when = self._requested, False, time.perf_counter()
         self._seconds = self._when - begun
         return False
 

@@ -43,7 +43,7 @@ PICKED_AT_ONCE = 200_000
 
 def pixel_at(position: tuple[float, float], size: tuple[int, int]) -> tuple[int, int]:
     """Pixel at a position in fractions of a picture."""
-    x, y = (min(max(int(share * side), 0), side - 1) for share, side in zip(position, size, strict=True))
+    x, y = (min(max(int(fraction * side), 0), side - 1) for fraction, side in zip(position, size, strict=True))
     return x, y
 
 

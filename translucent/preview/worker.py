@@ -396,13 +396,13 @@ class _Worker:
             found[number], self._known[number] = message, value
             return number
 
-        asked = WorkerMessage.of((work, arguments), token)
+        requested = WorkerMessage.of((work, arguments), token)
         self.forget()
         for number in found.keys() - self._sent:
             self._channel.send("keep", number, found[number])
             self._sent.add(number)
         self._number += 1
-        self._channel.send("work", self._number, asked)
+        self._channel.send("work", self._number, requested)
         self.modules.add(work.__module__)
 
     def forget(self) -> None:
@@ -454,7 +454,7 @@ class _Worker:
 _listener: Callable[[float | None, str], None] | None = None
 
 
-def report(share: float | None, detail: str = "") -> None:
+def report(fraction: float | None, detail: str = "") -> None:
     """Report the progress of work in a worker process: the finished fraction, if that is known, and the current step.
 
     Raises
@@ -463,7 +463,7 @@ def report(share: float | None, detail: str = "") -> None:
         If nobody waits for the work any more.
     """
     if _listener is not None:
-        _listener(share, detail)
+        _listener(fraction, detail)
 
 
 def worker_renderer() -> Renderer:
@@ -519,11 +519,11 @@ def _follow_parent() -> None:
 def _work(channel: Channel, kept: dict[int, object], number: int, message: WorkerMessage) -> None:
     global _listener
 
-    def listen(share: float | None, detail: str) -> None:
+    def listen(fraction: float | None, detail: str) -> None:
         while channel.pipe.poll():
             if channel.receive()[:2] == ("stop", number):
                 raise CancelledError
-        channel.send("report", number, WorkerMessage.of((share, detail)))
+        channel.send("report", number, WorkerMessage.of((fraction, detail)))
 
     numbers = {id(value): one for one, value in kept.items()}
     made = list[object]()

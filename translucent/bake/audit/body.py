@@ -143,9 +143,9 @@ def measure_body(
         return None
     stated, problem = _stated(file, material, key, mesh, weights, faces - first)
     beneath, around, chords, views = _rays(surface, points)
-    seen = _enter_first(surface, points, views)
+    visible = _entering(surface, points, views)
     cosines = np.einsum("rki,ki->rk", views, -points.normal)
-    outer = chords[seen.T]
+    outer = chords[visible.T]
     return Body(
         key,
         primitive_name(file, key),
@@ -158,9 +158,9 @@ def measure_body(
         stated,
         beneath,
         around,
-        views.transpose(1, 0, 2)[seen.T],
-        np.clip(cosines.T[seen.T], 0.0, 1.0),
-        np.repeat(stated[:, None], views.shape[0], axis=1)[seen.T],
+        views.transpose(1, 0, 2)[visible.T],
+        np.clip(cosines.T[visible.T], 0.0, 1.0),
+        np.repeat(stated[:, None], views.shape[0], axis=1)[visible.T],
         outer,
         float(np.isinf(chords).mean()),
         problem,
@@ -237,7 +237,7 @@ def _rays(surface: PreparedMesh, points: Points) -> tuple[Array, Array, Array, A
     return radius * beneath, radius * around, radius * total, views
 
 
-def _enter_first(surface: PreparedMesh, points: Points, views: Array) -> Any:
+def _entering(surface: PreparedMesh, points: Points, views: Array) -> Any:
     """(r, n): whether nothing of the body is before the point, on the view ray along each direction (r, n, 3)."""
     start = points.exact + OFFSET * surface.planes[points.face, :3] * 4.0
     origins = np.broadcast_to(start, views.shape).reshape(-1, 3)

@@ -104,7 +104,7 @@ def check_file(file: GltfFile) -> MaterialCheck:
     found += overlap_findings(measured)
     found = _gathered(found)
     found.sort(key=lambda one: SEVERITIES.index(one.severity))
-    return MaterialCheck(file.path, tuple(found), tuple(_told(body) for body in measured))
+    return MaterialCheck(file.path, tuple(found), tuple(_summary(body) for body in measured))
 
 
 def _gathered(found: list[MaterialFinding]) -> list[MaterialFinding]:
@@ -142,7 +142,7 @@ def _placements(file: GltfFile) -> dict[int, list[Placement]]:
     return placed
 
 
-def _told(body: Body) -> dict[str, Any]:
+def _summary(body: Body) -> dict[str, Any]:
     """Measurements of a body for people and programs."""
     normals, views = body.beneath * body.world_normals(), body.chords * body.world_views()
     return {

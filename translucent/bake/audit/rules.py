@@ -173,8 +173,8 @@ def _transport(material: GltfMaterial, entry: Json, extensions: Json) -> Iterato
     surface = entry.get("pbrMetallicRoughness", {})
     metallic = surface.get("metallicFactor", 1.0)
     if material.transmission > 0 and metallic == 1 and "metallicRoughnessTexture" not in surface:
-        told = "is 1" if "metallicFactor" in surface else "is not stated, and 1 by default"
-        text = f"metallicFactor {told}: metal transmits nothing, and viewers draw it black or as metal"
+        reported = "is 1" if "metallicFactor" in surface else "is not stated, and 1 by default"
+        text = f"metallicFactor {reported}: metal transmits nothing, and viewers draw it black or as metal"
         yield "metal", "error", text, "write metallicFactor 0 (--fix does)"
     if material.has_volume and not material.transmits:
         text = f"{VOLUME} without {TRANSMISSION}, or with a factor of 0: no light enters, and it is drawn opaque"
@@ -359,16 +359,16 @@ def attenuation_findings(body: Body) -> Iterator[MaterialFinding]:
     extinction = extinction_of(body)
     passed = Medium(absorption=extinction).transmittance(thick)
     at = f"at its true thickness of {length_text(thick)} (median along views)"
-    told = False
+    reported = False
     if extinction.any() and passed.max() < BLACK:
         do = "raise attenuationDistance, or brighten attenuationColor"
         yield _found(body, "warning", "attenuation-black", f"{at} nothing passes: it is black", do)
-        told = yield from _units(body, thick, extinction, UNITS)
+        reported = yield from _units(body, thick, extinction, UNITS)
     elif extinction.any() and passed.min() > WHITE:
         text = f"{at} {to_hex(passed)} passes: attenuation has no effect that can be seen"
         yield _found(body, "warning", "attenuation-none", text, "lower attenuationDistance")
-        told = yield from _units(body, thick, extinction, [(name, 1.0 / size) for name, size in UNITS[:2]])
-    if not told and not USUAL[0] <= thick <= USUAL[1]:
+        reported = yield from _units(body, thick, extinction, [(name, 1.0 / size) for name, size in UNITS[:2]])
+    if not reported and not USUAL[0] <= thick <= USUAL[1]:
         scale = 0.01 if thick > USUAL[1] else 100.0
         text = f"it is {length_text(thick)} thick along views, and what light passes is rarely so"
         do = (
@@ -449,10 +449,10 @@ def mean_colors(body: Body) -> tuple[Array, Array]:
     if not finite.any():
         return np.ones(3), np.ones(3)
     with np.errstate(under="ignore"):
-        shown, true = (
+        stated, true = (
             medium.transmittance(part[finite] * world[finite]).mean(axis=0) for part in (body.seen_stated, body.chords)
         )
-    return shown, true
+    return stated, true
 
 
 def _map_findings(body: Body) -> Iterator[MaterialFinding]:

@@ -250,7 +250,7 @@ def library_panel(state: WindowState) -> None:
     def card(one: Preset) -> ui.Card:
         key, title = ball_key(one), one.name.replace("_", " ")
         picture, lines = state.work.thumbnails.picture(key, draw_ball, one), ((title, True), (one.kind, False))
-        swatch = "" if picture is not None else seen_color(one)
+        swatch = "" if picture is not None else preset_color(one)
         return ui.Card(f"##{one.name}", key, picture, lines, preset_text(one), one.name == chosen, swatch, one.name)
 
     if imgui.begin_child("##presets", ImVec2(0.0, -ui.em(3.6))):
@@ -269,7 +269,7 @@ def library_panel(state: WindowState) -> None:
         state.texts["name"] = ""
 
 
-def seen_color(one: Preset) -> str:
+def preset_color(one: Preset) -> str:
     """Hex color in which a preset is seen: multiply scattered light, or what is left of white light after 1 cm."""
     return one.diffuse_color() if one.regime == "scattering dominated" else one.colors()["1 cm"]
 
@@ -401,7 +401,7 @@ def _material(state: WindowState, number: int, own: bool) -> None:
         return imgui.text_colored(ui.FAINT, "opaque")
     material = state.material_of(number)
     preset = state.work.library.find(material.preset)
-    color = to_display(material.color) if preset is None else ui.of_hex(seen_color(preset))
+    color = to_display(material.color) if preset is None else ui.of_hex(preset_color(preset))
     flags = imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop | imgui.ColorEditFlags_.no_inputs
     imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + (imgui.get_frame_height() - ui.em(1.0)) / 2)
     imgui.color_button("##color", imgui.ImVec4(*color, 1.0), flags, ImVec2(ui.em(1.0), ui.em(1.0)))

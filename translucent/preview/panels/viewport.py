@@ -170,9 +170,9 @@ def _error_scale(state: WindowState, over: imgui.ImDrawList, end: ImVec2) -> Non
     over.add_rect_filled(ImVec2(left - em(0.6), top - 1.3 * line), ImVec2(end.x - em(0.6), end.y - em(0.7)), SHADE)
     over.add_text(ImVec2(left, top - 1.2 * line), WHITE, f"error of thickness, {unit}; orange: not valid")
     _color_bar(over, left, top, width, [error_color(2.0 * (i + 0.5) / 48 - 1.0) for i in range(48)])
-    for share, text in ((0.0, f"-{most:.2g}"), (0.5, "0"), (1.0, f"+{most:.2g}")):
+    for fraction, text in ((0.0, f"-{most:.2g}"), (0.5, "0"), (1.0, f"+{most:.2g}")):
         wide = imgui.calc_text_size(text).x
-        over.add_text(ImVec2(left + share * (width - wide), top + height), WHITE, text)
+        over.add_text(ImVec2(left + fraction * (width - wide), top + height), WHITE, text)
 
 
 def _color_bar(
@@ -183,10 +183,10 @@ def _color_bar(
         over.add_rect_filled(ImVec2(begin, top), ImVec2(end + 1.0, top + em(0.8)), packed(color))
 
 
-def error_color(share: float) -> tuple[float, float, float]:
+def error_color(fraction: float) -> tuple[float, float, float]:
     """sRGB color of a difference of thickness, -1 to 1 of the largest, as ``present/compare.frag`` shows it."""
-    end = THINNER if share < 0.0 else THICKER
-    mixed = math.sqrt(min(abs(share), 1.0))
+    end = THINNER if fraction < 0.0 else THICKER
+    mixed = math.sqrt(min(abs(fraction), 1.0))
     red, green, blue = (0.95 + mixed * (channel - 0.95) for channel in end)
     return red, green, blue
 
