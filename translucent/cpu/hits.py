@@ -343,7 +343,7 @@ class TracedMesh:
 
 
 class PixelTracer:
-    """Tracer of all surfaces of one object in one picture. Any number of threads may ask at once.
+    """Tracer of all surfaces of one object in one picture, for any number of threads at once.
 
     Parameters
     ----------

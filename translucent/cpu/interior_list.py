@@ -140,7 +140,7 @@ class Branches:
     reflected : (n,) bool
         Whether an interface has reflected it.
     blur : (n,) float64
-        Square of the width of what it sees, as of the microfacets of a mirror: the sum over rough interfaces.
+        Squared width of its lobe, as of the microfacets of a mirror: the sum over rough interfaces.
     footprint : (n, 2, 2, 3) float64
         Differentials of origins and of directions; (n, 0, 2, 3) where nothing is averaged over footprints.
     diffused : (n, 3) float64

@@ -102,7 +102,7 @@ class _EmbreeObject(TracedObject):
         )
 
 
-#: Photons that the disc of one holds: the noise of light at a point is 1.15 over the root of them.
+#: Photons in the disc of each one: the noise of light at a point is 1.15 over the root of this number.
 GATHERED = 64
 
 #: Largest height of a photon over the plane of the point, in radii of its disc.

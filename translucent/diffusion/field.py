@@ -279,9 +279,9 @@ class DiffusingBody:
         return _field(self._lit, self._medium, self._roughness, found)
 
     def _from_sky(self, parts: Array, others: list[Object]) -> tuple[Array, list[EnteringRays]]:
-        """Flux (s, 3) that enters of radiance over solid angles (k, 3), less what other bodies on its path absorb.
+        """Flux (s, 3) that enters from radiance over solid angles (k, 3), less what other bodies on its path absorb.
 
-        And, as rays, the parts of the sky that are brighter than the rest. Light that others scatter continues
+        Parts of the sky that are brighter than the rest are returned as rays. Light that others scatter continues
         elsewhere, and as much comes from there: in uniform light it is not missing.
         """
         if not parts.any():

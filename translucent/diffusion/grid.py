@@ -348,7 +348,7 @@ class BodyGrid:
         return np.maximum(number, 0), np.where(number >= 0, self.cells.inside[x, y, z], 0.0)
 
     def _depth(self, probe: Probe) -> Array:
-        """(s,): depth of what is read below the samples, in cells."""
+        """(s,): depth below the samples at which the fluence is read, in cells."""
         places = (self.points - self.cells.low) / self.cells.step
         return np.asarray(((places - probe.center) * self.face_normals).sum(axis=1))
 

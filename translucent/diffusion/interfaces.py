@@ -85,7 +85,7 @@ class InterfaceTable:
     def interfaces(
         self, item: Integers, before: Integers, after: Integers, changes: Mask, sheets: Mask
     ) -> tuple[Integers, Mask]:
-        """Column (k,) of the object whose interface decides, of several in one place, and whether (k,) it is a sheet.
+        """Column (k,) of the object whose interface counts where several coincide, and whether (k,) it is a sheet.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class InterfaceTable:
         """
         is_sheet = sheets[item]
         sheet = ~changes & is_sheet.any(axis=1)
-        # The interface is that of the body that is entered; where the ray only leaves one, of that.
+        # The interface is that of the body that the ray enters; if it enters none, of the one that it leaves.
         entered = (item == after[:, None]) & (item != AIR)
         column = np.where(entered.any(axis=1), entered.argmax(axis=1), (item == before[:, None]).argmax(axis=1))
         return np.where(sheet, is_sheet.argmax(axis=1), column), sheet

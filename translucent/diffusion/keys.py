@@ -16,7 +16,7 @@ from translucent.scene.scene import Object, Scene
 
 
 def diffusion_key(plan: RenderPlan) -> Hashable:
-    """Key of all values that the multiply scattered light of a plan depends on; the camera is none of them."""
+    """Key of all values that the multiply scattered light of a plan depends on; it does not depend on the camera."""
     scene, caustics = plan.scene, plan.caustics
     followed = caustics is not None and media_lit_by_photons(scene)
     bending = (caustics.in_media, caustics.seed, _bending(scene)) if caustics is not None and followed else ()
@@ -32,7 +32,7 @@ def diffusion_key(plan: RenderPlan) -> Hashable:
         for i, medium in diffusing_media(scene).items()
     )
     opaque = tuple(place_of(item) for item in scene.opaque)
-    around = scene.environment  # what is seen behind everything lights nothing
+    around = scene.environment  # a background lights nothing
     lighting = (
         around.kind,
         around.first.tobytes(),

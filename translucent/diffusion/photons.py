@@ -110,7 +110,7 @@ class _Photons:
 
 
 def photon_segments(scene: Scene, photons: int, seed: int) -> Iterator[PhotonSegments]:
-    """Segments of the paths of about so many photons from the lights of a scene.
+    """Segments of the paths of about `photons` photons from the lights of a scene.
 
     At a rough interface a photon interacts with one microfacet, and no other one blocks it.
 
@@ -242,9 +242,9 @@ class _PhotonTracer:
         windings: npt.NDArray[np.int16],
         since: Integers,
     ) -> tuple[_Photons, Mask, Mask]:
-        """Interact photons with surfaces, one branch by chance; also masks of those that go straight on, and that land.
+        """Interact photons with surfaces, one random branch each; also masks of photons that go straight on or land.
 
-        `power` is left of them there, and `windings` and `since` are those on the other side.
+        `power` is what each has left at the surface; `windings` and `since` hold on its other side.
         """
         table, item = self._table, self._item[face]
         before, after = self._effective(going.windings, going.since), self._effective(windings, since)
@@ -329,7 +329,7 @@ class _PhotonTracer:
         return [(i, j) for j in solid for i in solid if i < j and same_medium(objects[i], objects[j])]
 
     def _surviving(self, photons: _Photons) -> _Photons:
-        """Photons that continue by Russian roulette: the less of their power is left, the fewer."""
+        """Photons that survive Russian roulette, with a probability by the power that they have left."""
         left = np.max(photons.power / np.maximum(photons.started.max(axis=1, keepdims=True), 1e-300), axis=1)
         chance = np.minimum(left / ROULETTE, 1.0)
         lives = self.rng.random(len(chance)) < chance
@@ -372,7 +372,7 @@ class FineCells:
         Side of a fine cell in metres.
     shape : (3,) ints
     finer : int
-        How many of them lie along the side of a coarse one.
+        Number of fine cells along the side of a coarse one.
     """
 
     low: Array

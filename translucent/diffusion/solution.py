@@ -356,14 +356,14 @@ class _ChannelSystem:
     def by_uniform_light(self) -> Array:
         """(s,): factors of the fluence with which a lossless body in uniform light is as invisible as it has to be.
 
-        Such a body is invisible, whatever its shape: of what leaves, all has been scattered but for what comes straight
-        through. Diffusion sends too much of it out of parts no thicker than a free path, and too little out
+        Such a body is invisible, whatever its shape: all light that leaves has been scattered, except what passes
+        straight through. Diffusion sends too much of it out of parts no thicker than a free path, and too little out
         of folds.
         """
         even = np.ones(len(self._grid.points))
         found = (self._read @ self._cells.rough(self._into_cells @ even)) * self._attenuated + self._near * even
         found, target = found[self._grid.nearest].mean(axis=1), self.scattered
-        # What leaves in all is right.
+        # The sum over all samples is right.
         least = np.finfo(np.float64).tiny
         correction = target / max(target.sum(), least) * found.sum() / np.maximum(found, least)
         return np.asarray(np.clip(correction, LEAST_CORRECTION, MOST_CORRECTION))

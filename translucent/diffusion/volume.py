@@ -73,7 +73,7 @@ def swept(
 
 
 def condensed(extinction: Array, directions: Array, step: float) -> Array:
-    """Extinction (...) in 1/m at which sweeps spread light as far as it spreads with the given one.
+    """Extinction (...) in 1/m that makes sweeps spread light as far as the given extinction does in truth.
 
     In a sweep light is scattered on from anywhere in the cell where it was scattered, and gets into several cells of
     each slice: from event to event it goes too far. Along a direction of largest component m, with tangents t aside, it
@@ -439,7 +439,7 @@ def _from_lights(
             power = np.broadcast_to(np.asarray(light.irradiance), points.shape)
         if stops is not None:
             power = np.where((stops.nearest(points, place - points)[1] < 1.0)[:, None], 0.0, power)
-        # From the edge of the cell on, the mean over it: of what lets nothing through, all that gets in.
+        # Attenuation starts at the edge of the cell, and is the mean over it: an opaque cell gets all entering light.
         own = density[inside] * cells.step
         if body.density is None:
             column = _metres_inside(body, points, place)

@@ -156,8 +156,8 @@ def emergent_fluxes(ior: float, mean_cosine: float) -> tuple[float, float, float
 def emergent_cosine(albedo: float, ior: float) -> float:
     """Cosine m for `translucent.formulas.diffusion.emergent_radiance`: how deep entering light is scattered first.
 
-    That of uniform light, where a half-space absorbs a third of what enters, or more. Where it absorbs nothing,
-    1 / sqrt(3), with which the radiance is the same at all angles, as it must be (Eddington 1926).
+    The cosine of uniform light, where a half-space absorbs a third of the light that enters, or more. Where it absorbs
+    nothing, 1 / sqrt(3), with which the radiance is the same at all angles, as it must be (Eddington 1926).
     """
     absorbed = 1.0 - half_space_reflectance(round(albedo, 6), ior)
     lossless = 1.0 / np.sqrt(3.0)

@@ -92,7 +92,7 @@ def ggx_distribution(cos_half: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
 def ggx_visibility(cos_light: npt.ArrayLike, cos_view: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
     """Height-correlated masking and shadowing G2 / (4 cos_light cos_view) of GGX (Heitz 2014, eq. 99).
 
-    The light that a rough boundary reflects is F D V of what arrives, with `optics.fresnel_dielectric` at the
+    A rough boundary reflects F D V times the light that arrives, with `optics.fresnel_dielectric` at the
     microfacet. Exactly edge-on from both sides, where nothing is visible, V is 0.
 
     Parameters

@@ -89,7 +89,7 @@ def highlight_from(
     alpha: npt.ArrayLike,
     cos_view: npt.ArrayLike,
 ) -> Array:
-    """(..., 4): direction from which microfacets mirror a light, and by what their value is multiplied.
+    """(..., 4): direction from which microfacets mirror a light, and the factor of their value.
 
     Polished ones show a disc; for rough ones it is where the light is, one of several in the disc.
 

@@ -213,7 +213,7 @@ class Draine(PhaseFunction):
 
     @checked
     def moments(self, count: int) -> Array:
-        """Those of Henyey and Greenstein's g^n, with cos^2 P_n as a sum of P_(n-2), P_n and P_(n+2)."""
+        """Moments of Henyey and Greenstein's g^n, with cos^2 P_n as a sum of P_(n-2), P_n and P_(n+2)."""
         # cos P_n = (1 - d_n) P_(n+1) + d_n P_(n-1)
         n = np.arange(-1, _moments(count) + 1)
         down = n / (2 * n + 1)
@@ -257,7 +257,7 @@ class WaterDroplets(PhaseFunction):
 
     @checked
     def moments(self, count: int) -> Array:
-        """Those of both parts, by their weights."""
+        """Moments of both parts, by their weights."""
         g, draine_g, alpha, weight = self.parameters
         parts = HenyeyGreenstein(g).moments(count), Draine(draine_g, alpha).moments(count)
         return (1.0 - weight) * parts[0] + weight * parts[1]

@@ -64,7 +64,7 @@ def _fill(found: npt.NDArray[np.floating], vertices: Array, faces: npt.NDArray[n
 
 
 def _blocks(count: int) -> Iterator[slice]:
-    """Slices of so many faces, some of them each."""
+    """Slices of `count` faces in blocks of `BLOCK`."""
     return (slice(begin, begin + BLOCK) for begin in range(0, count, BLOCK))
 
 

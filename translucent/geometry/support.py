@@ -106,7 +106,7 @@ class Support:
         return self.many and _CLUSTERS[self._mesh].whole
 
     def farthest(self, directions: Array) -> Array:
-        """(n, 3): vertices in the world: those that are farthest along these directions (k, 3); of few vertices all."""
+        """(n, 3): world vertices that are farthest along these directions (k, 3); all vertices if there are few."""
         if not self.many:
             return self.points
         vertices, clusters, found = self._mesh.vertices, _CLUSTERS[self._mesh], []
