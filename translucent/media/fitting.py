@@ -130,7 +130,7 @@ class _ChannelSamples(NamedTuple):
         return _Line(best / scale, np.sqrt(np.diag(inverse)) / scale, chi2, len(d) - len(best))
 
     def repeated(self) -> tuple[float, int]:
-        """chi2 of photographs about what they have in common for each step, and its degrees of freedom."""
+        """chi2 of photographs about their common mean at each step, and its degrees of freedom."""
         steps, index = np.unique(self.thickness, return_inverse=True)
         root = np.linalg.cholesky(self.covariance)
         a, b = np.linalg.solve(root, np.eye(len(steps))[index]), np.linalg.solve(root, self.depth)

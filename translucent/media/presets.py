@@ -61,7 +61,7 @@ def read_own_presets(folder: Path | None = None) -> tuple[dict[str, Preset], lis
 
 
 def preset_name(words: str) -> str:
-    """Name in lower_snake_case of what somebody calls a preset.
+    """Name of a preset in lower_snake_case, from free text.
 
     Raises
     ------

@@ -151,7 +151,7 @@ def open_around_eye(scene: Scene) -> tuple[int, ...]:
 
 
 def emitting_bodies(scene: Scene) -> tuple[int, ...]:
-    """Indices of bodies whose surfaces emit light; layers, which do so in their own color, apart."""
+    """Indices of bodies whose surfaces emit light, except layers, which emit in their own color."""
     return indices(
         scene,
         lambda item: item.medium is not None and not item.covers and item.surface is not None and item.surface.glows,

@@ -1,4 +1,4 @@
-"""Caustics by photons: what is requested, the passes that carry them, and at what each light aims."""
+"""Caustics by photons: the request, their passes, and the bodies at which each light aims."""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ class PhotonAim:
 
 
 def photon_aims(scene: Scene, center: Array, photons: int) -> list[PhotonAim]:
-    """Aims of all lights at the bodies whose interfaces may turn light, with about so many photons in all.
+    """Aims of all lights at the bodies whose interfaces may redirect light, with about so many photons in all.
 
     Parameters
     ----------
@@ -354,7 +354,7 @@ def _bounds(places: Array) -> Array:
 
 
 def _apart(boxes: list[Array]) -> list[Array]:
-    """Boxes (2, 2), joined until no two overlap: no light goes through two of them."""
+    """Boxes (2, 2), joined until no two overlap, so that no light passes two of them."""
     found: list[Array] = []
     waiting = list(boxes)
     while waiting:

@@ -298,7 +298,7 @@ SHOWN = 0.2
 
 
 def black_bodies(scene: Scene) -> tuple[Note, ...]:
-    """Note on the bodies that are black, with what would show the one that is nearest to it; empty if none is.
+    """Note on the bodies that are black, with a remedy for the clearest of them; empty if none is black.
 
     The thickness that counts is the mean chord 4 V / S of a body (Cauchy 1850), so that rays near its edge pass more.
     """

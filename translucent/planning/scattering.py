@@ -131,7 +131,7 @@ class ScatteringLayer(Scattering):
 @checked
 @dataclass(frozen=True)
 class SingleScattering(Scattering):
-    """Light of lights that is scattered once into each ray; what is scattered again is lost.
+    """Single scattering of lights into each ray; light that is scattered again is lost.
 
     Exact for thin smoke and clear drinks. In wax or milk nearly all light is scattered more often: they come out dark.
 
@@ -270,7 +270,7 @@ def rendered_scene(scene: Scene, treatments: Treatments) -> Scene:
 
 
 def _volumes(scene: Scene, solved: list[int], chosen: Diffusion) -> tuple[int, ...]:
-    """The bodies into whose rays light is scattered, as far as each can have winding numbers of its own."""
+    """Bodies with in-scattered light, as far as each can have winding numbers of its own."""
     varying = tuple(i for i in solved if _is_cloud(scene.objects[i]))
     even = tuple(i for i in solved if scene.objects[i].density is None and _is_volume(scene.objects[i], chosen))
     fogs = varying + even

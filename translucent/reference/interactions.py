@@ -67,7 +67,7 @@ class LiveRays:
             self.reflected[index],
         )
 
-    def turned(
+    def redirected(
         self, directions: Array, weight: Array, inside: Inside, *, bent: bool, reflected: Mask | bool
     ) -> LiveRays:
         """Ray segments from the same origins in other directions (k, 3), with a weight (k, 3)."""
@@ -208,10 +208,10 @@ class Interactions:
             _towards(reflected_directions, self.faces[chosen]),
             _towards(refracted_directions, -self.faces[chosen]),
         )
-        reflected = live.where(back).turned(
+        reflected = live.where(back).redirected(
             reflected_directions[back], reflectance[back], here.where(chosen[back]), bent=True, reflected=True
         )
-        refracted = live.where(on).turned(
+        refracted = live.where(on).redirected(
             refracted_directions[on], passing, there.where(chosen[on]), bent=True, reflected=False
         )
         return [reflected, refracted], transmittance
@@ -268,8 +268,8 @@ class Interactions:
             self.radiance[chosen] += leaving * optics.emitted_radiance(emission, extinction, path)
         mirrored = _towards(reflected_direction(live.rays.directions, self.normals[chosen]), self.faces[chosen])
         branches = [
-            live.turned(mirrored, back, inside, bent=True, reflected=True),
-            live.turned(live.rays.directions, on * self._passing(chosen), inside, bent=False, reflected=False),
+            live.redirected(mirrored, back, inside, bent=True, reflected=True),
+            live.redirected(live.rays.directions, on * self._passing(chosen), inside, bent=False, reflected=False),
         ]
         return branches, on
 
@@ -301,7 +301,7 @@ class Interactions:
         scattered = _towards(scattered, np.where(passed[:, None], -1.0, 1.0) * self.faces[chosen])
         with np.errstate(under="ignore"):
             throughput = weight * np.where(passed[:, None], self._passing(chosen), 1.0)
-        return [live.turned(scattered, throughput, inside, bent=True, reflected=~passed)], weight * passed[:, None]
+        return [live.redirected(scattered, throughput, inside, bent=True, reflected=~passed)], weight * passed[:, None]
 
     def _under_coat(self, chosen: Integers, reflectance: Array) -> Array:
         """(k, 3): reflectance of interfaces with their clear coats, from the reflectance (k, 3) below these."""

@@ -133,7 +133,7 @@ class _Scheme:
 
 @dataclass(frozen=True, eq=False)
 class _Spans:
-    """One span of each of some rays, to be marched through: flat arrays.
+    """Spans of rays to march through, one per ray, as flat arrays.
 
     `segments` is (k,), the segment that each span is, or None where a span may hold any segments, or none.
     """

@@ -253,7 +253,7 @@ class InterfacePaths:
         return self._roulette(live)
 
     def _one_branch(self, live: LiveRays) -> LiveRays:
-        """One branch of each path, chosen by what it carries: a polished sheet has two."""
+        """One branch of each path, chosen by its throughput: a polished sheet has two."""
         live = live.where(np.argsort(live.owner, kind="stable"))
         carried = live.throughput.max(axis=1)
         first = np.flatnonzero(np.diff(live.owner, prepend=-1) != 0)

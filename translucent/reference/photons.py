@@ -104,11 +104,11 @@ def _joined(parts: list[LandedPhotons]) -> LandedPhotons:
 
 
 class PhotonPaths(InterfacePaths):
-    """Tracer of photons, for channels whose light takes the same paths."""
+    """Photon tracer for channels that share their paths."""
 
     def land(self, rays: Rays, power: Array) -> LandedPhotons:
-        """Photons along rays that have landed, of those with this power (n, 3)."""
-        self.turned = np.zeros(len(rays), dtype=bool)
+        """Landed photons along rays, from photons with this power (n, 3)."""
+        self.redirected = np.zeros(len(rays), dtype=bool)
         self.power = power
         self.parts: list[LandedPhotons] = []
         self.radiance(rays)
@@ -117,15 +117,15 @@ class PhotonPaths(InterfacePaths):
     def _interact(self, live: LiveRays, flight: _Flight, hit: Integers) -> LiveRays:
         interfaces = flight.interfaces.where(hit)
         solid = interfaces.before != interfaces.after
-        stepped = np.zeros(len(self.turned), dtype=bool)
+        stepped = np.zeros(len(self.redirected), dtype=bool)
         stepped[live.owner[hit]] = solid & (self.own.iors[interfaces.before] != self.own.iors[interfaces.after])
         found = super()._interact(live, flight, hit)
-        self.turned[found.owner] |= stepped[found.owner] | found.reflected
+        self.redirected[found.owner] |= stepped[found.owner] | found.reflected
         return found
 
     def _add_ends(self, live: LiveRays, flight: _Flight, chosen: Integers) -> None:
         live, wall = live.where(chosen), flight.wall.where(chosen)
-        kept = np.flatnonzero(np.isfinite(wall.distance) & self.turned[live.owner])
+        kept = np.flatnonzero(np.isfinite(wall.distance) & self.redirected[live.owner])
         live, wall = live.where(kept), wall.where(kept)
         normals = np.zeros((len(live), 3))
         for item in np.unique(wall.item):

@@ -121,7 +121,7 @@ def _strided(count: int) -> Integers:
 
 
 def _centered(directions: Array, texels: Array, fractions: Array) -> Array:
-    """The centers of the cells of directions; those of empty cells go where others are farthest from what they have."""
+    """Centers of the cells of directions; empty cells move to the texels farthest from theirs."""
     cell, apart = _nearest(directions, texels)
     middle = _sums(cell, texels * fractions[:, None], len(directions))
     length = np.linalg.norm(middle, axis=1)

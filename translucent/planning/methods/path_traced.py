@@ -81,7 +81,7 @@ class PathTraced(Method):
         return [Note(NoteKind.NOISE, text)]
 
     def unmodelled(self, scene: Scene) -> tuple[Note, ...]:
-        """Notes on what no path finds or shows."""
+        """Notes on effects that paths do not find or do not render."""
         notes = []
         bending = [body for body in scene.bodies if _bends(body)]
         if scene.lights and bending:
