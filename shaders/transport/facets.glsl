@@ -3,7 +3,7 @@
 
 #if MICROFACETS
 uniform int sample_number;           // of a pixel
-uniform float blurred_share;         // of the variance of microfacets, that blurs what they reflect; the rest is sampled
+uniform float blurred_fraction;         // of the variance of microfacets, that blurs what they reflect; the rest is sampled
 
 // Random numbers for the microfacet at an interface of a path: an additive recurrence in four dimensions over the samples of
 // a pixel (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), two for every other interface, from a
@@ -27,11 +27,11 @@ struct Facet {
 // Turns an interaction to a random microfacet, where some of its roughness is sampled. alpha: squared roughness of what is left.
 Facet take_facet(inout Interaction at, inout float alpha, int depth, int branch_code) {
 #if ROUGH
-    if (at.roughness > 0.0 && blurred_share < 1.0) {
+    if (at.roughness > 0.0 && blurred_fraction < 1.0) {
         Facet facet = Facet(at.normal, alpha);
-        at.normal = microfacet_normal(at.normal, at.direction, sqrt(1.0 - blurred_share) * alpha, microfacet_numbers(depth, branch_code));
+        at.normal = microfacet_normal(at.normal, at.direction, sqrt(1.0 - blurred_fraction) * alpha, microfacet_numbers(depth, branch_code));
         at.roughness = 0.0;
-        alpha *= sqrt(blurred_share);
+        alpha *= sqrt(blurred_fraction);
         return facet;
     }
 #endif

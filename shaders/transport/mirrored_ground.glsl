@@ -15,11 +15,11 @@ bool begin_in_mirror(vec2 pixel, ivec2 texel, vec3 direction, out Ray ray, out P
     point += (dot(normal, point) - mirror_plane.w) / cosine * direction;  // where the rasterizer does not quite see it
     float alpha = mirror_surface.x * mirror_surface.x;
     vec3 facet = normal;
-    if (blurred_share < 1.0) { facet = microfacet_normal(normal, direction, sqrt(1.0 - blurred_share) * alpha, microfacet_numbers(0, 1)); }
+    if (blurred_fraction < 1.0) { facet = microfacet_normal(normal, direction, sqrt(1.0 - blurred_fraction) * alpha, microfacet_numbers(0, 1)); }
     vec3 reflected = reflected_direction(direction, facet);
     if (dot(reflected, normal) <= 0.0) { return false; }
     ray = Ray(point + MIRROR_MARGIN * surface_reach * normal, 0.0, reflected, vec3(1.0), uvec4(0u), 1, 0, true,
-        blurred_share * alpha * alpha, 1, -normal, no_footprint());
+        blurred_fraction * alpha * alpha, 1, -normal, no_footprint());
     primary.object = AIR;
     primary.point = ray.origin;
     primary.normal = normal;

@@ -38,7 +38,7 @@ uniform sampler2D surface_parameters;  // of what is entered: object, roughness,
 uniform sampler2D surface_color;
 uniform int most_interfaces;
 uniform int all_closed;                // 1: no solid has holes: what seems to leave through one passes an edge by rounding
-uniform float faintest_share;          // throughput, its three channels together, below which rays are not followed
+uniform float faintest_throughput;          // throughput, its three channels together, below which rays are not followed
 layout(location = 0) out vec4 out_radiance;
 layout(location = 1) out vec4 out_transmittance;
 
@@ -201,13 +201,13 @@ bool branch(inout Ray ray, Ray back, Ray on, vec3 again, bool total, bool last) 
     bool stacks = false;
 #if FORKS > 0
     weaker.forks -= weaker.depth == 1 ? 0 : 1;
-    stacks = weaker.forks >= 0 && !last && stacked < MOST_STACKED && strength(weaker.throughput) > faintest_share;
+    stacks = weaker.forks >= 0 && !last && stacked < MOST_STACKED && strength(weaker.throughput) > faintest_throughput;
     if (stacks) { stack[stacked++] = weaker; }
 #endif
     if (!stacks && strength(weaker.throughput) > 0.0) {
         terminate(weaker, weaker.direction, (on_stronger ? again : vec3(1.0)) * weaker.throughput, weaker.reflected);
     }
-    if (!last && strength(ray.throughput) >= faintest_share) { return false; }
+    if (!last && strength(ray.throughput) >= faintest_throughput) { return false; }
     // What is reflected totally is looked up as if it left straight on: reflected on, it would most often leave there, too.
     vec3 throughput = (on_stronger ? vec3(1.0) : again) * ray.throughput;
     terminate(ray, total ? arrival : ray.direction, throughput, total ? arrived_reflected : ray.reflected);

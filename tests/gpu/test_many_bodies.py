@@ -103,7 +103,7 @@ def test_tiles_beyond_those_that_are_compared_throw_shadows(monkeypatch: pytest.
     monkeypatch.setattr(light_cameras, "MOST_GROUNDS", 4)
     found = _floor(FEW)[1]
     assert len(found.grounds) == 4
-    assert set(found.in_the_way) == set(range(FEW)) - set(found.grounds)
+    assert set(found.blocking) == set(range(FEW)) - set(found.grounds)
 
 
 def test_more_bodies_over_one_another_than_traced_rays_know_of_are_named(renderer: tl.Renderer) -> None:

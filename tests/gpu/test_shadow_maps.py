@@ -444,8 +444,8 @@ def test_grounds_are_not_in_the_way() -> None:
     shown = scene("ball", "sun")
     found = ShadowOccluders(SUN, shown, supports)
     assert found.grounds == (1,)
-    assert not found.in_the_way
+    assert not found.blocking
     below = ShadowOccluders(tl.DirectionalLight((0, 1, 0.2), (1, 1, 1)), shown, supports)
-    assert below.in_the_way == (1,)
+    assert below.blocking == (1,)
     stone = replace(shown, objects=[*shown.objects, STONE])
-    assert ShadowOccluders(SUN, stone, [support_of(item) for item in stone.objects]).in_the_way == (2,)
+    assert ShadowOccluders(SUN, stone, [support_of(item) for item in stone.objects]).blocking == (2,)

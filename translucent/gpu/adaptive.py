@@ -20,7 +20,7 @@ from translucent.planning.passes import PassName
 Floats = npt.NDArray[np.float32]
 
 #: Of 16 samples: the largest range of light near a pixel that one sample is enough for, and the largest standard error
-#: that is as good as none, both as shares of the light. With more samples they are smaller.
+#: that is as good as none, both as fractions of the light. With more samples they are smaller.
 CONTRAST, ERROR = 0.1, 0.01
 
 #: Passes of a sample whose results are there, or are not read, when rays are traced from its interfaces.
@@ -35,7 +35,7 @@ class AdaptiveSampling:
 
     The first round finds for every sample which pixels show an interface, and sums up the light of all others:
     edges are as smooth as ever. The second traces rays; in each pixel, their mean replaces all of its
-    samples that meet an interface. Opaque objects are seen through interfaces as the mean of all samples shows them.
+    samples that hit an interface. Opaque objects are visible through interfaces as the mean of all samples shows them.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def is_adaptive(job: FrameJob, samples: int) -> bool:
 
 
 def read_averages(job: FrameJob, samples: int) -> tuple[Floats, Floats, Floats]:
-    """Mean radiance (h, w, 3) and transmittance (h, w, 3) over samples, and the share (h, w) that can be trusted."""
+    """Mean radiance (h, w, 3) and transmittance (h, w, 3) over samples, and the fraction (h, w) that can be trusted."""
     averages = job.targets["average"]
     light, spread = (read_floats(averages, i, 4) for i in range(2))
     with np.errstate(under="ignore"):

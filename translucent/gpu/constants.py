@@ -75,7 +75,7 @@ CONSTANTS: dict[str, str] = {
     "SERIES_LIMIT": "0.5",
     "NOTHING": "1e30",  # beyond every distance: coordinates end at 1e18
     "UNEXPECTED": "1e6",  # a count that no pixel expects
-    "AXIAL_BITS": "29",  # bits that axial depth and slot share, of the 30 of a crossing; one is the side's
+    "AXIAL_BITS": "29",  # bits for axial depth and slot together, of the 30 of a crossing; one is the side's
     "LARGEST_WORD": "0x3fffffffu",
     "SORTABLE_OFFSET": "0x00800000u",  # bits of the smallest normal float
     "PEEL_UNIT": "4096.0",  # alpha of a peeling pass holds two numbers: this times one, plus the other
@@ -92,7 +92,7 @@ CONSTANTS: dict[str, str] = {
     "DENSITY_EXPONENTIAL": "3.0",
     "TURNS_BITS": "6",  # of a word, for how often a medium fills a point
     "TURNS_PER_WORD": "5",
-    "NEAR_LIGHT": "0.25",  # lights nearer to a segment than this share of it are near
+    "NEAR_LIGHT": "0.25",  # lights nearer to a segment than this fraction of it are near
     "FLAG_COVERED": "1.0",
     "FLAG_VALID": "2.0",
     "ENVIRONMENT_CONSTANT": "0",
@@ -127,10 +127,10 @@ CONSTANTS: dict[str, str] = {
     "HIERARCHY_WIDTH_BITS": str(HIERARCHY_WIDTH_BITS),
     "HIERARCHY_STEPS": "32767.5",  # of the grid of bounds, from the middle of a hierarchy to its end
     "INTERIOR_SIZE": str(INTERIOR_SIZE),
-    "MIRROR_TOLERANCE": "1e-3",  # from a ground to where a rasterizer may see it, as a share of the scene
-    "MIRROR_MARGIN": "1e-4",  # from a ground to where its mirrored rays start, as a share of the scene
+    "MIRROR_TOLERANCE": "1e-3",  # from a ground to where a rasterizer may see it, as a fraction of the scene
+    "MIRROR_MARGIN": "1e-4",  # from a ground to where its mirrored rays start, as a fraction of the scene
     "PHOTON_WIDTH": f"{PHOTON_WIDTH}u",
-    "SURFACE_OFFSET": "1e-6",  # from a surface to where the next segment of a ray starts, as a share of the scene
+    "SURFACE_OFFSET": "1e-6",  # from a surface to where the next segment of a ray starts, as a fraction of the scene
     "TOUCHING": "1e-6",  # axial depth between surfaces that count as one interface
     "LEAST_ACROSS": repr(LEAST_ACROSS),
     "LEAST_BREADTH": repr(LEAST_BREADTH),
@@ -139,5 +139,5 @@ CONSTANTS: dict[str, str] = {
     "REFLECTANCE_TABLE_SIZE": f"{TABLE_SIZE:.1f}",
     **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},
     "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored
-    "FAINTEST_HIGHLIGHT": "1e-6",  # of a light's irradiance, in 1/sr, for which nobody looks what is in its way
+    "FAINTEST_HIGHLIGHT": "1e-6",  # of a light's irradiance, in 1/sr, for which occluders are not looked for
 }

@@ -143,7 +143,7 @@ class DiffusionCache:
         """Solver, with the parts of SciPy that it needs: half a second of loading for the first scene that needs it."""
         from translucent.diffusion.cache import FieldCache
 
-        with self._lock:  # threads share it
+        with self._lock:  # several threads use it
             if diffusion not in self._solvers:
                 self._solvers[diffusion] = FieldCache(warm_starts=self.warm_starts)
                 if len(self._solvers) > KEPT_GRIDS:

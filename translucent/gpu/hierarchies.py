@@ -302,7 +302,7 @@ class HierarchyCache:
 
 
 def _fading(body: Object, scale: float) -> tuple[float, float, float]:
-    """Radii in coordinates of the hierarchy between which the base color loses a share, and this share."""
+    """Radii in coordinates of the hierarchy between which the base color loses a fraction, and this fraction."""
     falloff, mesh = body.surface and body.surface.color_texture, body.mesh
     if not isinstance(falloff, Falloff) or mesh.uv is None:
         return 0.0, 0.0, 0.0

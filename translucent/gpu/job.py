@@ -1,4 +1,4 @@
-"""State of a frame that is being rendered: its scene and plan, and the data that passes share."""
+"""State of a frame that is being rendered: its scene and plan, and the common data of its passes."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ from translucent.scene.backdrop import Backdrop
 
 @dataclass(frozen=True, eq=False)
 class TextureBackdrop:
-    """Backdrop in textures of the same context, so that nothing is read back; it is seen everywhere.
+    """Backdrop in textures of the same context, so that nothing is read back; it is visible everywhere.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ class FrameJob(CameraView):
     with_depth : bool
         Projections give depth.
     compact : bool
-        All that is asked of the targets is what `gpu.reading` reads: they need not hold what follows from the rest.
+        The targets hold what `gpu.reading` reads: they need not hold what follows from the rest.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ class FrameJob(CameraView):
         Light of photons on opaque objects: a texture of the pixels of a larger picture, the number of them to each
         pixel of the frame along a side, and which of those these are, right and down.
     report : callable
-        Takes the share of the frame's samples, or random paths, that is done, now and then.
+        Takes the fraction of the frame's samples, or random paths, that is done, now and then.
     corner : (int, int)
         Left and bottom of the picture in its targets.
     for_map : bool
@@ -249,7 +249,7 @@ class FrameJob(CameraView):
     projected_depth : bool
         The accumulator has a depth buffer of opaque surfaces, against which passes can test.
     covered : Part
-        Pixels that media may cover at the current sample points: beyond it no ray meets a medium. Rows count up from
+        Pixels that media may cover at the current sample points: beyond it no ray crosses a medium. Rows count up from
         the bottom, as geometry is drawn.
     """
 
@@ -276,7 +276,7 @@ class FrameJob(CameraView):
         self.sample, self.samples = 0, 1
         self.paths_traced = 0
         self.averaged = False
-        self.report: Callable[[float], None] = lambda share: None
+        self.report: Callable[[float], None] = lambda fraction: None
         self.features = FrameFeatures(plan)
         self.compact = compact and self.features.can_be_compact
         self.media_apart = self.features.media_apart if self.compact else None
@@ -366,7 +366,7 @@ class FrameJob(CameraView):
         return self.averaging and name == self.features.last_pass
 
     def accumulator(self, name: str = "accumulated") -> moderngl.Framebuffer:
-        """Target in which thickness passes add up, cleared when a frame first asks for it."""
+        """Target in which thickness passes add up, cleared when a frame first needs it."""
         return self._cleared_once(name, self.targets.path_and_count(self.plan.spectral, name))
 
     @property
@@ -387,7 +387,7 @@ class FrameJob(CameraView):
         self._add_to(self.accumulator(target))
 
     def adding(self, spec: PassSpec) -> Iterator[tuple[int, ...]]:
-        """Objects of a pass in turns, by the accumulator to which their faces then add."""
+        """Objects of a pass in groups, by the accumulator to which their faces then add."""
         if self.media_apart is None:
             self.begin_adding(spec.target)
             yield spec.objects

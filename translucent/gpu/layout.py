@@ -195,7 +195,7 @@ BODY = UniformBlock(
             "snapping_share",
             "f4",
             (),
-        ),  # the same, divided by the metres of a share of 1
+        ),  # the same, divided by the metres of a fraction of 1
         # Axial depth: 0 where the scene's media begin along the forward axis, or at the eye; 1 where they end.
         ("axial_depth_scale", "f4", ()),  # axial depth per metre
         ("axial_depth_start", "f4", ()),  # axial depth of the anchor
@@ -219,7 +219,7 @@ SHADE = UniformBlock(
         ("emission", "f4", (4,)),
         ("expected_count", "f4", (2,)),  # least and greatest signed count of a trustworthy pixel
         ("rounding", "f4", ()),  # metres that a path may be below 0, besides what silhouettes explain
-        ("count_share", "f4", ()),  # metres along the forward axis of a share of 1 in a count
+        ("count_share", "f4", ()),  # metres along the forward axis of a fraction of 1 in a count
         ("coverage_floor", "f4", ()),  # a path not longer than this is rounding
     ),
 )
@@ -246,7 +246,7 @@ ENVIRONMENT = UniformBlock(
         ("seen_first", "f4", (4,)),
         ("seen_second", "f4", (4,)),
         ("seen_tiles", "f4", ()),
-        ("seen_turn", "f4", ()),  # of its map about +Y, as a share of a full turn
+        ("seen_turn", "f4", ()),  # of its map about +Y, as a fraction of a full turn
         ("seen_scale", "f4", ()),  # exposure, as a factor
         ("seen_kind", "i4", ()),
         ("light_first", "f4", (4,)),
@@ -392,7 +392,7 @@ OBJECT_ROW = PackedTable(
         # where it ends to, and how much of it is lost there; 0 for none.
         ("fading", "f4", (3,)),
         ("clearcoat_roughness", "f4", ()),
-        ("film", "f4", (3,)),  # share of the surface that has it, its ior, and metres
+        ("film", "f4", (3,)),  # fraction of the surface that has it, its ior, and metres
         ("scatters_much", "f4", ()),  # 1 where what is scattered more than once leaves as from a layer
         ("stream_absorption", "f4", (3,)),
         ("longest", "f4", ()),  # metres across the body
@@ -408,8 +408,8 @@ OBJECT_ROW = PackedTable(
         ("conductance", "f4", ()),
         ("exit_share", "f4", ()),
         ("mean_cosine", "f4", ()),
-        ("ahead", "f4", (3,)),  # share of its extinction by light that is scattered ahead
-        ("in_scattered_far", "f4", (3,)),  # share of that light which leaves where a ray does,
+        ("ahead", "f4", (3,)),  # fraction of its extinction by light that is scattered ahead
+        ("in_scattered_far", "f4", (3,)),  # fraction of that light which leaves where a ray does,
         ("in_scattered_near", "f4", (3,)),  # and on the other side
     ),
 )

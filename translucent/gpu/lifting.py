@@ -1,7 +1,7 @@
 """A shader as one text for another engine: switches decided, constants and includes written out, nothing unused.
 
 The parts of a text are its top-level declarations, found by braces and semicolons. What is reached from ``main``,
-or in a library from the functions of the file itself, stays, and with it whatever shares a name with it: a name that is
+or in a library from the functions of the file itself, stays, and with it whatever has the same name: a name that is
 used for two things keeps both, so nothing that is needed can get lost.
 
 For Vulkan, and the translators that read its GLSL, loose uniforms are in a block, textures apart from samplers, and
@@ -156,13 +156,13 @@ class _Places:
 
     def varying(self, match: re.Match[str]) -> str:
         """An input of a vertex shader in order of appearance, or what stages hand on by its name."""
-        flat, way, kind, name = match.groups()
-        if self.stage == "vert" and way == "in":
+        flat, qualifier, kind, name = match.groups()
+        if self.stage == "vert" and qualifier == "in":
             place = self.attributes
             self.attributes += 1
         else:
             place = VARYINGS[name]
-        return f"layout(location = {place}) {flat or ''}{way} {kind} {name};"
+        return f"layout(location = {place}) {flat or ''}{qualifier} {kind} {name};"
 
     def texture(self, match: re.Match[str]) -> str:
         """A texture, and a sampler where more than single texels are read."""

@@ -75,10 +75,10 @@ def cameras_towards(supports: Sequence[Support], light: Light, center: Array, ra
         pose = Camera.look_at(position, center, up=_any_up(towards)).pose
 
         def tangents(points: Array) -> Array:
-            seen = (points - position) @ pose[:3, :3]  # right, up, backward
-            aside, ahead = np.abs(seen[:, :2]).max(axis=1), -seen[:, 2]
+            local = (points - position) @ pose[:3, :3]  # right, up, backward
+            aside, ahead = np.abs(local[:, :2]).max(axis=1), -local[:, 2]
             with np.errstate(over="ignore"):
-                return np.asarray(np.divide(aside, ahead, out=np.full(len(seen), np.inf), where=ahead > 0.0)[:, None])
+                return np.asarray(np.divide(aside, ahead, out=np.full(len(local), np.inf), where=ahead > 0.0)[:, None])
 
         tangent = float(largest_of(supports, tangents)[0]) * _MARGIN
         if (angle := 2.0 * float(np.degrees(np.arctan(tangent)))) < widest:
@@ -116,7 +116,7 @@ def light_key(light: Light) -> tuple[object, ...]:
 
 
 def objects_key(scene: Scene) -> tuple[object, ...]:
-    """Key of where the objects of a scene are, equal for scenes in which lights meet the same; keeps nothing alive.
+    """Key of where the objects of a scene are, equal for scenes in which lights hit the same; keeps nothing alive.
 
     Media do not count.
     """
@@ -139,12 +139,12 @@ def objects_key(scene: Scene) -> tuple[object, ...]:
 #: Faces times vertices up to which an object is looked at, whether it shadows itself.
 _MOST_PAIRS = 1 << 22
 
-#: Distance behind a face, as a share of the scene, that is rounding.
+#: Distance behind a face, as a fraction of the scene, that is rounding.
 _BEHIND = 1e-6
 
 
 def holds_eye(item: Object, scene: Scene) -> bool:
-    """True if the eye is in the bounds of an object, so that its inner side may be seen."""
+    """True if the eye is in the bounds of an object, so that its inner side may be visible."""
     low, high = item.bounds
     return bool((low <= scene.camera.eye).all() and (scene.camera.eye <= high).all())
 
@@ -253,7 +253,7 @@ class ShadowOccluders:
         Opaque objects that shadow neither themselves nor one another, large as they may be.
     middle : (3,) float64
         Of all but the grounds.
-    in_the_way : tuple of int
+    blocking : tuple of int
         Opaque objects that may be between the light and another object, or themselves: all but grounds before which
         everything is.
     """
@@ -268,7 +268,7 @@ class ShadowOccluders:
             everything.add(support)
         shadowed = {i for i in self.grounds if not self._lights(i, everything, range(len(supports)))}
         opaque = set(np.flatnonzero(~scene.filled).tolist())
-        self.in_the_way = tuple(sorted(opaque - set(self.grounds) | shadowed))
+        self.blocking = tuple(sorted(opaque - set(self.grounds) | shadowed))
         grounds = set(self.grounds)
         self._throwing = [support for i, support in enumerate(supports) if i not in grounds]
         bounds = np.array([support.bounds for support in self._throwing or supports])
@@ -325,7 +325,7 @@ class ShadowOccluders:
         lit = supports.ahead(sides.planes, self._slack).all(axis=1)
         if lit.all():
             return True
-        if not self._turns_once(item):
+        if not self._is_convex_from_outside(item):
             return False
         lit |= supports.ahead(sides.lit, self._slack).any(axis=1)
         return all(others[k] == ground for k in np.flatnonzero(~lit).tolist())
@@ -338,13 +338,13 @@ class ShadowOccluders:
         sides, support = self._sides_of(ground), self._supports[other]
         if _ahead(support, sides.planes, self._slack).all():
             return True
-        if not self._turns_once(item):
+        if not self._is_convex_from_outside(item):
             return False
         # Of a convex body what faces the light is lit.
         return other == ground or bool(_ahead(support, sides.lit, self._slack).any())
 
-    def _turns_once(self, item: Object) -> bool:
-        """True if an object is convex, and seen from outside alone."""
+    def _is_convex_from_outside(self, item: Object) -> bool:
+        """True if an object is convex, and the eye is outside of its bounds."""
         return item.mesh.diagnosis.convex and not holds_eye(item, self._scene)
 
     def _sides_of(self, number: int) -> _Sides:
@@ -359,8 +359,8 @@ class ShadowOccluders:
         return self._sides[number]
 
     def _faces(self, item: Object) -> tuple[Array, Array, Array]:
-        """First corners (m, 3) of the faces of an object, unit normals (m, 3), and what these are times the way to the
-        light, (m,).
+        """First corners (m, 3) of the faces of an object, unit normals (m, 3), and their dot products (m,)
+        with the directions to the light.
         """
         vertices = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
         first, second, third = (vertices[item.mesh.faces[:, corner]] for corner in range(3))

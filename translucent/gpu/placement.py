@@ -14,7 +14,7 @@ from translucent.planning.methods import Method
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 
-#: Distance to a surface, as a share of the diagonal, within which the eye is on it; anything nearer ahead is clipped.
+#: Distance to a surface, as a fraction of the diagonal, within which the eye is on it; all nearer ahead is clipped.
 NEAR_SURFACE = 1e-6
 
 
@@ -173,7 +173,7 @@ def _expected_count(body: Object, camera: Camera) -> tuple[float, float]:
     return float(round(number)), float(round(number))
 
 
-#: Rounding of float32 that vertices may suffer, as a share of their distance from the eye, with room to spare.
+#: Rounding of float32 that vertices may suffer, as a fraction of their distance from the eye, with room to spare.
 _ROUNDING = 1e-5
 
 #: Pixels around the bounds: the rasterizer snaps vertices to a grid finer than that.
@@ -233,10 +233,10 @@ def extents(boxes: Array, radii: Array, camera: Camera, size: tuple[int, int]) -
     choice = np.array([[i >> axis & 1 for axis in range(3)] for i in range(8)])
     corners = bounds[:, choice, np.arange(3)]
     frame = np.stack([camera.right, camera.up, camera.forward])
-    seen = np.einsum("ncj,ij->nci", corners, frame)
+    in_view = np.einsum("ncj,ij->nci", corners, frame)
     slack = _ROUNDING * np.abs(corners).max(axis=(1, 2))[:, None]
     half = np.array(camera.half_extent(size))
-    across, ahead = seen[..., :2], seen[..., 2]
+    across, ahead = in_view[..., :2], in_view[..., 2]
     flat = camera.fov_y is None
     # Sample points are shifted by less than a pixel: what is four beyond the edge is out of view for all of them.
     wide = half * (1.0 + 8.0 / np.array(size))
@@ -254,7 +254,7 @@ def extents(boxes: Array, radii: Array, camera: Camera, size: tuple[int, int]) -
     # An edge is farthest out at the near end of the slack where it is on that side, and at the far end elsewhere.
     low, high = across - slack[..., None], across + slack[..., None]
     low, high = np.where(low < 0.0, low / near, low / far), np.where(high > 0.0, high / near, high / far)
-    least_of_ball, most_of_ball = _sides_of_balls(seen.mean(axis=1), radii + slack[:, 0], flat=flat)
+    least_of_ball, most_of_ball = _sides_of_balls(in_view.mean(axis=1), radii + slack[:, 0], flat=flat)
     low, high = np.maximum(low.min(axis=1), least_of_ball), np.minimum(high.max(axis=1), most_of_ball)
     limits = np.stack([low, high], axis=1) / half
     pixels = np.clip((limits - center + 1.0) * 0.5 * size, -2.0, np.array(size) + 2.0)
@@ -274,8 +274,8 @@ def _sides_of_balls(centers: Array, radii: Array, *, flat: bool) -> tuple[Array,
     # Seen along an axis of the picture, a ball is a disc between two tangents through the eye.
     distance = np.hypot(across, ahead)
     front = ahead > reach
-    way, aside = np.arctan2(across, ahead), np.arcsin(np.where(front, reach / np.where(front, distance, 1.0), 0.0))
-    return np.where(front, np.tan(way - aside), -np.inf), np.where(front, np.tan(way + aside), np.inf)
+    angle, aside = np.arctan2(across, ahead), np.arcsin(np.where(front, reach / np.where(front, distance, 1.0), 0.0))
+    return np.where(front, np.tan(angle - aside), -np.inf), np.where(front, np.tan(angle + aside), np.inf)
 
 
 def part_of(edges: Array, shift: tuple[float, float], size: tuple[int, int]) -> Part:
@@ -296,7 +296,7 @@ UNEXPECTED = float(CONSTANTS["UNEXPECTED"])
 COVERAGE_FLOOR = 2e-7
 
 #: Counts of open bodies must not cancel: the first gets 16 times the weight of closed ones, the next 16 times that, and
-#: so on, as far as float32 counts exactly. Beyond, they share the last weight.
+#: so on, as far as float32 counts exactly. Beyond, all have the last weight.
 OPEN_WEIGHTS = tuple(16.0**k for k in range(1, 6))
 
 #: Share of the diagonal that a path may be below 0 by rounding; it then counts as 0. Steep faces have the largest

@@ -46,7 +46,7 @@ class PhotonPicture:
         self._pass, gl = engine.photons, engine.context.gl
         self._gl = gl
         self.rounds, self.error = 0, np.inf
-        self._at_once, self._shown = 1, (0, np.zeros(0, np.float32))
+        self._at_once, self._before = 1, (0, np.zeros(0, np.float32))
         objects = next(step.objects for step in plan.passes if step.name is PassName.CAUSTICS)
         with ExitStack() as stack:
             self.texture = gl.texture(size, 4, dtype="f4")
@@ -92,14 +92,14 @@ class PhotonPicture:
         self._job.uniforms.bind()
         self._into.clear()
         self._pass.shade(self._job, self._into, self.rounds)
-        before = self._shown[1]
+        before = self._before[1]
         light = np.frombuffer(self._into.read(components=3, dtype="f4"), np.float32).copy()
         if before.size:
             # Half of the rounds were in both: their difference varies as the mean of all does.
             with np.errstate(under="ignore"):
-                share = self._shown[0] / (self.rounds - self._shown[0])
-                self.error = float(np.sqrt(share * np.square(light - before, dtype=np.float64).mean()))
-        self._shown = self.rounds, light
+                ratio = self._before[0] / (self.rounds - self._before[0])
+                self.error = float(np.sqrt(ratio * np.square(light - before, dtype=np.float64).mean()))
+        self._before = self.rounds, light
 
     def release(self) -> None:
         """Free what belongs to it."""
@@ -109,7 +109,7 @@ class PhotonPicture:
 #: Paths of each pixel after which a picture is done, and most of them between two pictures.
 MOST_PATHS, MOST_PATHS_AT_ONCE = 4096, 16
 
-#: Noise of the picture, as a share of its mean radiance, at which it is done, too.
+#: Noise of the picture, as a fraction of its mean radiance, at which it is done, too.
 QUIET = 1e-3
 
 #: Side of tiles where pixels take long, so that a pass over one does not.
@@ -152,7 +152,7 @@ class Convergence:
 
     @property
     def done(self) -> bool:
-        """True if more paths would change nothing to be seen."""
+        """True if more paths would change nothing visible."""
         return self.paths >= MOST_PATHS or self.error < QUIET
 
     def step(self, seconds: float) -> bool:

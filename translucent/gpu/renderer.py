@@ -65,7 +65,7 @@ class PresentPass:
         self._curves.draw_fullscreen(program)
 
 
-#: Largest share of a pixel's light that may come along rays that went astray.
+#: Largest fraction of a pixel's light that may come along rays that went astray.
 MOST_LOST = 0.005
 
 Floats = npt.NDArray[np.float32]
@@ -75,7 +75,7 @@ def read_arrays(job: FrameJob, samples: int) -> dict[str, Any]:
     """Arrays of a job's frame by their names in `Frame`, with radiance and transmittance averaged if sampled.
 
     What is compact is read at once, too, since the next frame is drawn into the same targets; arrays are made from it
-    when they are asked for.
+    when they are requested.
     """
     found = _compact_arrays(job) if job.compact else _whole_arrays(job)
     trusted = None
@@ -86,8 +86,8 @@ def read_arrays(job: FrameJob, samples: int) -> dict[str, Any]:
         found["valid"] &= lost <= MOST_LOST
     elif job.features.traced:
         # Rays that end inside a body, or in more of them than they can remember, have no right color.
-        share = read_floats(job.targets["surfaced"], 1, 4)[..., 3] if trusted is None else trusted
-        found["valid"] &= share >= np.float32(1.0 - MOST_LOST)
+        trusted = read_floats(job.targets["surfaced"], 1, 4)[..., 3] if trusted is None else trusted
+        found["valid"] &= trusted >= np.float32(1.0 - MOST_LOST)
     if job.plan.ordered:
         counts = read_floats(job.targets["ordered"], 2, 4)[::-1]
         found["layers"] = np.rint(counts[..., 0]).astype(np.int32)
@@ -147,7 +147,7 @@ def _read_normals(job: FrameJob) -> Floats:
 
 
 def read_paths(job: FrameJob) -> tuple[Floats, Floats, Floats]:
-    """Radiance (h, w, 3) of random paths, its standard error, and the share (h, w) of them that were lost."""
+    """Radiance (h, w, 3) of random paths, its standard error, and the fraction (h, w) of them that were lost."""
     count = job.paths_traced
     known = job.targets["paths"]
     mean, squares = read_floats(known, 0, 4), read_floats(known, 1, 3)
@@ -231,7 +231,7 @@ class GpuRenderer:
     ) -> Frame:
         """Run a plan; radiance and transmittance are the mean of the sub-pixel samples that its request has.
 
-        A plan over a backdrop needs it, in the size of the frame. `report` takes the share of the work that is done,
+        A plan over a backdrop needs it, in the size of the frame. `report` takes the fraction of the work that is done,
         now and then.
         """
         samples = plan.request.samples
@@ -393,7 +393,7 @@ class GpuRenderer:
             raise RenderError("rendering", how, "make a new one")
 
     def step(self, kind: type[Pass]) -> Pass:
-        """The pass of a kind, made when it is first asked for, with the context current."""
+        """The pass of a kind, made when it is first requested, with the context current."""
         if kind not in self._passes:
             before_making(self.context.gl)
             self._passes[kind] = kind(self.context.gl)

@@ -42,7 +42,7 @@ class MeshBuffers:
     def vertex_array(self, program: moderngl.Program, mesh: Mesh) -> moderngl.VertexArray:
         """The mesh bound to the inputs of `program`.
 
-        Shared vertices; or where it asks for ``normal``, flat faces; or for ``corner_normal``, faces that look smooth.
+        Shared vertices; or where it reads ``normal``, flat faces; or for ``corner_normal``, faces that look smooth.
         """
         if (array := self._arrays.get(program.glo)) is None:
             if "corner_normal" in program or ("uv" in program and "normal" not in program):
@@ -63,7 +63,7 @@ class MeshBuffers:
         return array
 
     def _corner_looks(self, program: moderngl.Program, mesh: Mesh) -> list[tuple[moderngl.Buffer, str, str]]:
-        """Colors of the vertices, for a program that asks for them."""
+        """Colors of the vertices, for a program that reads them."""
         if "corner_color" not in program:
             return []
         return [(self._of_corners("colors", mesh.colors, mesh), "4f", "corner_color")]
@@ -188,10 +188,10 @@ class Resources:
             "reflectance_table": self.textures.reflectance,
         }
 
-    def seen_textures(self, environment: Environment) -> dict[str, AnyTexture]:
+    def background_textures(self, environment: Environment) -> dict[str, AnyTexture]:
         """Map of an environment as a background, by the name of its sampler; none where it is no picture."""
-        seen = environment.seen
-        return {"seen_map": self.environments.sharp(seen)} if seen.kind == "image" else {}
+        background = environment.seen
+        return {"seen_map": self.environments.sharp(background)} if background.kind == "image" else {}
 
     def release(self) -> None:
         """Free all caches."""

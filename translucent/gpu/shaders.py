@@ -144,7 +144,7 @@ def preprocess(name: str, defines: Mapping[str, int] | None = None, version: int
     name : str
         File under ``shaders/``.
     defines : dict of str to int, optional
-        Switches for ``#if``; each must be one that the source asks for, and none that it asks for may be missing.
+        Switches for ``#if``; exactly the ones that the source reads.
 
     Raises
     ------

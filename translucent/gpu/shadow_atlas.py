@@ -55,7 +55,7 @@ class ShadowView:
 
     @property
     def ends(self) -> bool:
-        """True if opaque objects are in the way of some rays."""
+        """True if opaque objects block some rays."""
         return bool(self.opaque)
 
     def rows(self, center: Array) -> npt.NDArray[np.float64]:
@@ -75,7 +75,7 @@ class ShadowView:
         )
 
 
-#: Cameras of a light, the opaque objects in its way, and the middle (3,) of what throws shadows.
+#: Cameras of a light, the opaque objects that block it, and the middle (3,) of what throws shadows.
 SeenFrom: TypeAlias = tuple[Sequence[Camera], tuple[int, ...], Array]
 
 
@@ -104,7 +104,7 @@ class ShadowViews:
         Parameters
         ----------
         lights, sky : sequence of (sequence of Camera, tuple of int, (3,) float64)
-            Of each light, with the opaque objects in its way, and the middle of what throws shadows.
+            Of each light, with the opaque objects that block it, and the middle of what throws shadows.
         size : int
         limit : int
             Largest width of a texture.
@@ -202,8 +202,8 @@ def _placed(
 
 
 @dataclass(frozen=True)
-class Seen:
-    """Key of the maps: equal for frames in which lights see the same.
+class ShadowMapKey:
+    """Key of the maps: equal for frames in which the maps are equal.
 
     Attributes
     ----------
@@ -222,17 +222,17 @@ class Seen:
     slots: tuple[int, ...]
     step: int = 1
 
-    def fits(self, other: Seen, *, path_only: bool) -> bool:
-        """True if maps of this are those of another; of one medium or two they are paths, whatever these absorb."""
+    def fits(self, other: ShadowMapKey, *, path_only: bool) -> bool:
+        """True if the maps can be reused for another frame; path lengths do not depend on extinction."""
         return self.places == other.places and (self.media == other.media or (path_only and self.slots == other.slots))
 
 
 class ShadowAtlas:
-    """Textures with all maps: what rays of lights go through, and where each meets the first opaque surface.
+    """Textures with all maps: what rays of lights go through, and where each hits the first opaque surface.
 
     Attributes
     ----------
-    held : Seen, optional
+    held : ShadowMapKey, optional
         Key of what the textures hold.
     drawn : set of ShadowView
         Maps that are there already.
@@ -249,7 +249,7 @@ class ShadowAtlas:
         self._gl = gl
         self._framebuffers: tuple[moderngl.Framebuffer, ...] = ()
         self._made_of: tuple[tuple[int, int], int] | None = None
-        self.held: Seen | None = None
+        self.held: ShadowMapKey | None = None
         self.drawn: set[ShadowView] = set()
         self.views: ShadowViews | None = None
         self.spectral = self.two_media = False

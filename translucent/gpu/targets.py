@@ -44,11 +44,11 @@ FORMATS = {
     "nearest_and_farthest": Format((4,)),
     # R32F depth and RGBA32F radiance of the nearest opaque surface, with a depth buffer.
     "opaque": Format((1, 4), with_depth=True),
-    # RGBA32F share of light that the nearest opaque surface reflects diffusely, and its normal; depth buffer.
+    # RGBA32F fraction of light that the nearest opaque surface reflects diffusely, and its normal; depth buffer.
     "base": Format((4, 4), with_depth=True),
     # RGBA32F irradiance of photons on the nearest opaque surface, and how many there are.
     "photons": Format((4,)),
-    # RG32F: how far the photons of a pixel are spread, and the share that each pixel gets.
+    # RG32F: how far the photons of a pixel are spread, and the fraction that each pixel gets.
     "photon_spread": Format((2,)),
     # RGBA32F interface where a ray first enters a body: normal, axial depth, parameters, color; with a depth buffer.
     "entered": Format((4, 4, 4), with_depth=True),
@@ -73,13 +73,13 @@ FORMATS = {
     "bent": Format((4, 4), with_depth=True),
     # R8: pixels that need more samples.
     "unsettled": Format((-1,)),
-    # RGBA32F radiance of opaque surfaces, the mean of all samples, and the share of the pixel that they fill.
+    # RGBA32F radiance of opaque surfaces, the mean of all samples, and the fraction of the pixel that they fill.
     "opaque_mean": Format((4,)),
     # RGBA32F means of random paths and how many were lost, and sums of squared differences from the means.
     "paths": Format((4, 4)),
     # RGBA32F layers in front of all bodies, and those behind the first one on a ray.
     "layers": Format((4, 4)),
-    # R32F depth at which a ray first meets a body, with a depth buffer.
+    # R32F depth at which a ray first hits a body, with a depth buffer.
     "fronts": Format((1,), with_depth=True),
 }
 
@@ -190,7 +190,7 @@ class Targets:
         return self._views["opaque", 0]
 
     def peeled(self, number: int) -> moderngl.Framebuffer:
-        """RGBA32F: what one pass of depth peeling finds, with a depth buffer that all of them share."""
+        """RGBA32F: what one pass of depth peeling finds, with one depth buffer for all of them."""
         return self._get(f"peeled-{number}", FORMATS["peeled"], depth_of="peeled-0" if number else None)
 
     def peel_state(self, number: int) -> moderngl.Framebuffer:

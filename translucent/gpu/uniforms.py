@@ -86,8 +86,8 @@ def body_records(placed: PlacedScene, roles: BodyRoles, center: Array) -> npt.ND
     scene, media, counts = placed.scene, placed.media, roles.counts
     camera, diagonal, objects = scene.camera, scene.diagonal, scene.objects
     records = np.zeros(len(objects), BODY.dtype)
-    seen = placed.camera_from_offset(camera)
-    axes = seen[:, 2].copy()
+    rows = placed.camera_from_offset(camera)
+    axes = rows[:, 2].copy()
     if roles.anchored:
         axes[~placed.cut, 3] = 0.0
     records["world_from_normal"] = _normal_matrices(placed)
@@ -109,7 +109,7 @@ def body_records(placed: PlacedScene, roles: BodyRoles, center: Array) -> npt.ND
     records["count_weight"], records["count_offset"] = counts.weights, counts.offsets
     records["subpixel"], records["snapping_share"] = counts.subpixel, counts.snapping_share
     records["axial_depth_scale"] = 1.0 / media.length
-    records["axial_depth_start"] = (seen[:, 2, 3] - axes[:, 3] - media.near) / media.length
+    records["axial_depth_start"] = (rows[:, 2, 3] - axes[:, 3] - media.near) / media.length
     records["slot"] = roles.slots
     records["starts_unknown"] = placed.on_surface
     records["object"] = np.arange(len(objects))
@@ -121,20 +121,20 @@ def clip_rows(placed: PlacedScene, view: SampleView) -> Array:
     """(objects, 4, 4): from offsets to clip space."""
     camera = view.camera
     half_width, half_height = camera.half_extent(view.size)
-    seen = placed.camera_from_offset(camera)
-    clip = np.zeros((len(seen), 4, 4))
-    clip[:, 0], clip[:, 1] = seen[:, 0] / half_width, seen[:, 1] / half_height
+    rows = placed.camera_from_offset(camera)
+    clip = np.zeros((len(rows), 4, 4))
+    clip[:, 0], clip[:, 1] = rows[:, 0] / half_width, rows[:, 1] / half_height
     if camera.fov_y is None:
         clip[:, 3, 3] = 1.0
     else:
-        clip[:, 3] = seen[:, 2]
+        clip[:, 3] = rows[:, 2]
     aside, above = camera.center(view.size)
     clip[:, 0] -= (2.0 * view.shift[0] / view.size[0] + aside) * clip[:, 3]
     clip[:, 1] += (2.0 * view.shift[1] / view.size[1] - above) * clip[:, 3]
     if view.depth_range is not None:
         near, far = view.depth_range
         if camera.fov_y is None:
-            clip[:, 2] = (2.0 * seen[:, 2] - (near + far) * clip[:, 3]) / (far - near)
+            clip[:, 2] = (2.0 * rows[:, 2] - (near + far) * clip[:, 3]) / (far - near)
         else:
             clip[:, 2] = clip[:, 3] * (far + near) / (far - near) - np.eye(4)[3] * 2.0 * far * near / (far - near)
     else:
@@ -329,8 +329,8 @@ def media_uniforms(placed: PlacedScene, slots: tuple[Slot, ...]) -> bytes:
         densest = 1.0 if density is None else max(density.maximum, 1.0)
         extinction[i, :3] = bounded_extinction(slot.medium, densest * scene.diagonal)
         emission[i, :3] = slot.medium.emission
-        share = extinction[i, :3] / np.where(slot.medium.extinction > 0, slot.medium.extinction, 1.0)
-        scattering[i, :3] = share * np.asarray(slot.medium.scattering)
+        scale = extinction[i, :3] / np.where(slot.medium.extinction > 0, slot.medium.extinction, 1.0)
+        scattering[i, :3] = scale * np.asarray(slot.medium.scattering)
         phase[i] = slot.medium.phase_function.parameters
         extinction[i, 3], emission[i, 3] = placed.expected_counts[list(slot.objects)].sum(axis=0)
         open_from = (placed.open_from[list(slot.objects)].min() - placed.media.near) / placed.media.length
@@ -457,14 +457,14 @@ def shade_uniforms(scene: Scene, balance: Balance) -> bytes:
 
 def environment_uniforms(environment: Environment) -> bytes:
     """Contents of the Environment block."""
-    seen = environment.seen
+    background = environment.seen
     return ENVIRONMENT.pack(
-        seen_first=[*seen.first, 0.0],
-        seen_second=[*seen.second, 0.0],
-        seen_tiles=seen.tiles,
-        seen_turn=seen.turn,
-        seen_scale=seen.scale,
-        seen_kind=int(CONSTANTS[f"ENVIRONMENT_{seen.kind.upper()}"]),
+        seen_first=[*background.first, 0.0],
+        seen_second=[*background.second, 0.0],
+        seen_tiles=background.tiles,
+        seen_turn=background.turn,
+        seen_scale=background.scale,
+        seen_kind=int(CONSTANTS[f"ENVIRONMENT_{background.kind.upper()}"]),
         light_first=[*environment.first, 0.0],
         light_second=[*environment.second, 0.0],
         light_turn=environment.turn,

@@ -188,9 +188,9 @@ class Viewport:
 
     @contextmanager
     def at_once(self, factor: float) -> Iterator[moderngl.Framebuffer]:
-        """Draw a whole picture, smaller by a factor, that is shown instead until `present`.
+        """Draw a whole picture, smaller by a factor, that replaces it until `present`.
 
-        What was shown before stays if that fails.
+        The picture before stays if that fails.
         """
         size = max(round(self.size[0] / factor), 1), max(round(self.size[1] / factor), 1)
         known = self._coarse
@@ -378,9 +378,9 @@ class Viewport:
 
     def pixels(self) -> npt.NDArray[np.uint8]:
         """(h, w, 3): the texture, read back."""
-        shown = self.framebuffer
-        data = shown.read(components=3, alignment=1)
-        return np.frombuffer(data, np.uint8).reshape(shown.height, shown.width, 3)[::-1].copy()
+        framebuffer = self.framebuffer
+        data = framebuffer.read(components=3, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(framebuffer.height, framebuffer.width, 3)[::-1].copy()
 
     def release(self) -> None:
         """Free all OpenGL objects except the engine, which belongs to the caller."""

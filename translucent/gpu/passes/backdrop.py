@@ -16,7 +16,7 @@ from translucent.media.colors import ColorLike
 from translucent.planning.passes import PassSpec
 from translucent.scene.backdrop import Backdrop
 
-#: Depth of infinitely far pixels: behind everything, and yet seen.
+#: Depth of infinitely far pixels: behind everything, and yet visible.
 _BEHIND_ALL = 0.1 * float(CONSTANTS["NOTHING"])
 
 #: Samplers of ``shaders/shade/backdrop_shadows.frag``.
@@ -58,7 +58,7 @@ class BackdropPass:
         self._variants.draw_fullscreen(program)
 
     def _shadow(self, job: FrameJob, ambient: ColorLike | None) -> None:
-        """Multiply the radiance by the share of its light that reaches it."""
+        """Multiply the radiance by the fraction of its light that reaches it."""
         axial_depth = job.targets["opaque"].color_attachments[0]
         job.targets.view("opaque", 1).use()  # what is read may not be attached
         job.gl.enable_only(moderngl.BLEND)

@@ -9,7 +9,7 @@ from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
-from translucent.gpu.passes.variants import Variants, coat_switches, look_switches, seen_switches
+from translucent.gpu.passes.variants import Variants, background_switches, coat_switches, look_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.planning.interfaces import picture_cuts
 from translucent.planning.passes import PassSpec
@@ -27,7 +27,7 @@ class InterfacesPass:
         )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Draw the bodies for each interface, with the depth test on; sheets have one, seen from either side."""
+        """Draw the bodies for each interface, with the depth test on; sheets have one, visible from both sides."""
         if not job.covered:
             return
         nothing = float(CONSTANTS["NOTHING"])
@@ -64,7 +64,7 @@ class InterfacesPass:
             surface = body.surface or SMOOTH
             holes = not switches["BACK"] and body.has_holes
             program = self._variants.program(**switches, **look_switches(body), HOLES=holes)
-            # Many bodies share a surface, or have none.
+            # Many bodies have one surface in common, or none.
             if held is None or held[0] is not program or held[1] is not surface:
                 job.resources.textures.bind(surface, program, len(_DRAWN_SAMPLERS))
                 set_uniform(program, "surface_color", (*np.asarray(surface.color), surface.transmission))
@@ -98,16 +98,16 @@ class NoInterface:
         Leaves a depth test that lets a program for interfaces, drawn next, pass where there is one. Where it returned
         at once instead, a software rasterizer would go through all of it nevertheless.
         """
-        seen = job.resources.seen_textures(job.scene.environment)
+        maps = job.resources.background_textures(job.scene.environment)
         emitted, through, *_ = job.targets["result"].color_attachments
-        textures = {"emitted_radiance_sum": emitted, "straight_transmittance": through, **seen}
+        textures = {"emitted_radiance_sum": emitted, "straight_transmittance": through, **maps}
         textures["entered"] = job.targets["entered"].color_attachments[0]
         if not job.features.one_interface:
             textures["left"] = job.targets["left"].color_attachments[0]
         if job.features.has_opaque:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets["opaque"].color_attachments
         self._variants.bind(**textures)
-        background = {"OPAQUE": job.features.has_opaque, "SEEN_MAP": bool(seen)}
+        background = {"OPAQUE": job.features.has_opaque, "SEEN_MAP": bool(maps)}
         job.gl.enable_only(blending)
         rest = self._variants.program(REST=True, ONE_INTERFACE=False, APART=False, **background)
         self._variants.draw_rest(job, rest, framebuffer, top_first=True)
@@ -169,7 +169,7 @@ class SurfacesPass:
             ONE_INTERFACE=job.features.one_interface,
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
-            **seen_switches(job.scene.environment),
+            **background_switches(job.scene.environment),
             SINGLE_SCATTERING=job.features.scatters,
             **coat_switches(job.scene.bodies),
             DIFFUSED=job.diffused_light is not None,
@@ -188,7 +188,7 @@ class SurfacesPass:
             **dict(zip(_SAMPLERS, found, strict=False)),
             "object_table": table,
             **resources.light_textures(environment),
-            **resources.seen_textures(environment),
+            **resources.background_textures(environment),
         }
         if job.features.has_opaque:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = blurred_opaque(job)

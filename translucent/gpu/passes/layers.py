@@ -37,7 +37,7 @@ class LayersPass:
         self._put_over(job, job.sums_after(spec.name))
 
     def _find_fronts(self, job: FrameJob, bodies: tuple[int, ...]) -> None:
-        """Draw the depth at which each ray first meets a body: at once, if it starts inside one."""
+        """Draw the depth at which each ray first hits a body: at once, if it starts inside one."""
         framebuffer = job.targets["fronts"]
         framebuffer.use()
         nothing = float(CONSTANTS["NOTHING"])
@@ -92,9 +92,9 @@ class LayersPass:
         transmittance = targets["result"].color_attachments[1]
         read = in_front, behind, transmittance, *job.picture.color_attachments[:2]
         self._over.bind(**dict(zip(_SAMPLERS, read, strict=True)))
-        shown = "surfaced" if job.features.has_surfaces else "result"
+        radiance = "surfaced" if job.features.has_surfaces else "result"
         steps = (
-            ("RADIANCE", targets.view(shown, 0), (moderngl.ONE, moderngl.SRC_ALPHA, moderngl.ZERO, moderngl.ONE)),
+            ("RADIANCE", targets.view(radiance, 0), (moderngl.ONE, moderngl.SRC_ALPHA, moderngl.ZERO, moderngl.ONE)),
             ("SHARE", targets.view("result", 1), (moderngl.ZERO, moderngl.SRC_ALPHA, moderngl.ZERO, moderngl.ONE)),
             ("DEPTH", targets.view("result", 2), (moderngl.ONE, moderngl.ONE)),
             ("SUM", targets["average"] if sums else None, (moderngl.ONE, moderngl.ONE)),

@@ -55,12 +55,12 @@ class LightView(CameraView):
         """(4, 4): from points, relative to the center of the media, to x, y and w of the picture, and depth."""
         camera, media = self.scene.camera, self.placed.media
         axes = np.stack([camera.right, camera.up, camera.forward])
-        seen = np.column_stack([axes, axes @ (center - camera.eye)])
+        frame = np.column_stack([axes, axes @ (center - camera.eye)])
         half_width, half_height = camera.half_extent(self.targets.size)
         one = np.array([0.0, 0.0, 0.0, 1.0])
-        axial_depth = (seen[2] - media.near * one) / media.length
+        axial_depth = (frame[2] - media.near * one) / media.length
         return np.stack(
-            [seen[0] / half_width, seen[1] / half_height, one if camera.fov_y is None else seen[2], axial_depth]
+            [frame[0] / half_width, frame[1] / half_height, one if camera.fov_y is None else frame[2], axial_depth]
         )
 
 
@@ -118,10 +118,10 @@ class LightViewsPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Build the lists of all views, and write the uniforms of the lights."""
         # Lights see the same from frame to frame, wherever the camera is.
-        seen = _seen(job)
-        if self._held is None or self._held[0] != seen:
+        key = _views_key(job)
+        if self._held is None or self._held[0] != key:
             self._held = None
-            self._held = seen, self._look(job, spec)
+            self._held = key, self._look(job, spec)
         job.light(self._held[1])
         job.uniforms.bind()
         for name in _READ:
@@ -231,7 +231,7 @@ class LightViewsPass:
         self._gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
 
 
-def _seen(job: FrameJob) -> object:
+def _views_key(job: FrameJob) -> object:
     """Key of the views, equal for frames in which lights see the same; keeps nothing alive."""
     scene = job.scene
     media = tuple(item.medium for item in scene.objects)

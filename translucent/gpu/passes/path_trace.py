@@ -16,7 +16,7 @@ from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import interface_shadow_switches
 from translucent.gpu.passes.traced_interfaces import RAY_SAMPLERS, ray_switches, traced_scene
-from translucent.gpu.passes.variants import Variants, coat_switches, seen_switches
+from translucent.gpu.passes.variants import Variants, background_switches, coat_switches
 from translucent.gpu.shaders import set_uniform, set_used
 from translucent.gpu.targets import add_up
 from translucent.planning.passes import PassSpec
@@ -41,7 +41,7 @@ _SAMPLERS = (
 #: Pixels along a side of a tile: 220 bytes each are kept of it.
 TILE = 512
 
-#: Largest number of events of a path in one pass: some drivers cut loops short that turn too often.
+#: Largest number of events of a path in one pass: some drivers cut loops short after too many iterations.
 MOST_EVENTS = 64
 
 #: Seconds that a pass over a tile may take, by which the number of events is chosen; no driver stops that.
@@ -54,12 +54,12 @@ class Progress:
 
     Attributes
     ----------
-    share : float
-        That has been done, 0 to 1; of the paths of a tile only now and then.
+    fraction : float
+        Of the work that is done, 0 to 1; within a tile it is updated now and then.
     done : bool
     """
 
-    share: float
+    fraction: float
     done: bool
 
 
@@ -140,10 +140,10 @@ class PathTracer:
         last: int,
         seconds: float,
     ) -> Iterator[float]:
-        """Follow the paths of a tile to their ends; the share that has been done, after each pass."""
+        """Follow the paths of a tile to their ends; yields the fraction that is done, after each pass."""
         begun = job.paths_traced
         self._start(job, states[1], corner, size)
-        looked, share, number = time.perf_counter(), 0.0, 0
+        looked, fraction, number = time.perf_counter(), 0.0, 0
         program = self._program(job)
         while True:
             number += 1
@@ -163,8 +163,8 @@ class PathTracer:
                 break
             if time.perf_counter() - looked > 0.5:
                 looked = time.perf_counter()
-                share = self._share(into, size, begun, last)
-            yield share
+                fraction = self._ended(into, size, begun, last)
+            yield fraction
         self._end_tile(job, source, corner, size)
 
     def _start(
@@ -197,8 +197,8 @@ class PathTracer:
         framebuffer.use()
         self._gl.enable_only(moderngl.NOTHING)
 
-    def _share(self, state: moderngl.Framebuffer, size: tuple[int, int], begun: int, last: int) -> float:
-        """Share of the paths of a tile that have ended."""
+    def _ended(self, state: moderngl.Framebuffer, size: tuple[int, int], begun: int, last: int) -> float:
+        """Fraction of the paths of a tile that have ended."""
         data = state.read((0, 0, *size), components=1, attachment=_COUNTS, alignment=1, dtype="u4")
         ended = float(np.frombuffer(data, np.uint32).mean(dtype=np.float64))
         return (ended - begun) / max(last - begun, 1)
@@ -233,7 +233,7 @@ class PathTracer:
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
             DIMMED=job.features.dims_interfaces,
-            **seen_switches(environment),
+            **background_switches(environment),
             **coat_switches(scene.objects),
         )
 
@@ -243,7 +243,7 @@ class PathTracer:
             **dict(zip(_STATE, source.color_attachments, strict=True)),
             **traced,
             **resources.light_textures(environment),
-            **resources.seen_textures(environment),
+            **resources.background_textures(environment),
         }
         if job.features.has_opaque:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets["opaque"].color_attachments
@@ -265,7 +265,7 @@ class PathTracePass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Follow the paths of this sample, or where nothing else depends on it those of all samples at once.
 
-        Opaque objects are drawn for each sample; paths that meet them first see that picture.
+        Opaque objects are drawn for each sample; paths that hit them first see that picture.
         """
         assert job.plan.paths is not None
         paths = job.plan.paths.paths
@@ -275,5 +275,5 @@ class PathTracePass:
             begun, last = 0, 0 if job.sample < job.samples - 1 else paths
         if last > job.paths_traced:
             for progress in self.tracer.steps(job, last, spread=job.samples > 1 and not job.features.has_opaque):
-                job.report((begun + progress.share * (last - begun)) / paths)
+                job.report((begun + progress.fraction * (last - begun)) / paths)
         self.tracer.show(job)

@@ -25,7 +25,7 @@ from translucent.gpu.passes.transmittance import TransmittancePass
 from translucent.gpu.placement import AxialRange, FaceCounts, PlacedScene, depth_range
 from translucent.gpu.resources import Resources
 from translucent.gpu.shaders import before_making
-from translucent.gpu.shadow_atlas import Seen, SeenFrom, ShadowView, ShadowViews
+from translucent.gpu.shadow_atlas import SeenFrom, ShadowMapKey, ShadowView, ShadowViews
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import BodyRoles, bounded_extinction, media_center
 from translucent.media.medium import Medium
@@ -37,8 +37,8 @@ from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light, Scene
 from translucent.scene.shadow_directions import shadow_directions
 
-#: Most shares of the directions of the environment where one sample of a pixel may have to do.
-_FEW_SHARES = 16
+#: Most parts of the directions of the environment where one sample of a pixel may have to do.
+_FEW_PARTS = 16
 
 #: Largest ratio of distances from a light that a projected depth buffer resolves: its step at the far end is
 #: 2^-24 far^2 / near, so at most 1e-6 of the distance.
@@ -49,7 +49,7 @@ _GRAZING = 1e-4
 
 
 class MapJob(FrameJob):
-    """Map of shadows: a frame seen from a light, drawn into the atlas; depths count from the center of the scene.
+    """Map of shadows: a frame from a light, drawn into the atlas; depths count from the center of the scene.
 
     Parameters
     ----------
@@ -124,38 +124,38 @@ class ShadowMapsPass:
         """
         job.resources.photons_carry = bool(job.plan.opaque_to_shadows)
         atlas, scene, count = job.resources.shadows, job.scene, job.scene.environment_shadows
-        # Of several samples of a pixel, each looks into its share of the directions.
+        # Of several samples of a pixel, each looks into its part of the directions.
         first, step = job.sample % job.samples, job.samples
         if job.bending:  # few of them may represent all
-            step = min(step, _FEW_SHARES)
+            step = min(step, _FEW_PARTS)
             first %= step
         most = job.plan.shadows.directions
         if few := most is not None and most * step < count:
             step = -(-count // most)
             first %= step
-        seen = _seen(job)
-        if atlas.held is None or not atlas.held.fits(seen, path_only=not atlas.spectral):
+        map_key = _map_key(job)
+        if atlas.held is None or not atlas.held.fits(map_key, path_only=not atlas.spectral):
             atlas.held = None
         if few and (atlas.held is None or atlas.held.step == step):
-            seen, first, step, few = replace(seen, step=step), 0, 1, False  # no more than these
+            map_key, first, step, few = replace(map_key, step=step), 0, 1, False  # no more than these
         elif atlas.held is not None and atlas.held.step > 1:
             atlas.held = None
         if atlas.held is None or not atlas.drawn.issuperset(_read(job, atlas.views, first, step)):
-            self._render(job, seen, first, step)
+            self._render(job, map_key, first, step)
         assert atlas.views is not None
         center = media_center(scene)
         media = _slots(scene)[1] if atlas.two_media else [occluding_bodies(scene)[0].medium]
         extinctions = np.array([bounded_extinction(medium, scene.diagonal) for medium in media])
-        turns = first, -step if few or job.bending else step
+        rotation = first, -step if few or job.bending else step
         if job.averaged:
-            turns = 0, max(len(atlas.views.sky), 1)  # no picture is read of what is drawn now
-        job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, turns, extinctions))
+            rotation = 0, max(len(atlas.views.sky), 1)  # no picture is read of what is drawn now
+        job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, rotation, extinctions))
         assert atlas.held is not None
         irradiance = shadow_directions(scene.environment, count)[1][:: atlas.held.step] if count else np.zeros((0, 3))
         job.uniforms.add(SKY_SHADOWS, atlas.views.sky_uniforms(center, irradiance))
         job.uniforms.bind()
 
-    def _render(self, job: FrameJob, seen: Seen, first: int, step: int) -> None:
+    def _render(self, job: FrameJob, map_key: ShadowMapKey, first: int, step: int) -> None:
         """Render the maps of lights, and of every so-many-th direction of the environment."""
         scene, atlas = job.scene, job.resources.shadows
         dark, lit = darkened(scene, job.plan.opaque_to_shadows), job.plan.maps[0]
@@ -164,11 +164,11 @@ class ShadowMapsPass:
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
         in_place = all(one.name in _IN_PLACE for one in everything.passes)
         if atlas.held is None:
-            views = self._views(job, seen, opaque, in_place=in_place)
+            views = self._views(job, map_key, opaque, in_place=in_place)
             spectral = everything.spectral or not in_place or dark is not scene
             two = spectral and dark is scene and not job.resources.media_change and _has_two_media(everything)
             atlas.make(views, spectral=spectral and not two, two_media=two)
-            atlas.held = seen
+            atlas.held = map_key
         assert atlas.views is not None
         center = media_center(scene)
         used = {key}
@@ -179,7 +179,7 @@ class ShadowMapsPass:
                 before_making(self._gl)
             if view.size not in self._targets:
                 self._targets[view.size] = Targets(self._gl, (view.size, view.size))
-            # Where no opaque object is in the way, none has to be drawn; photons are those of lights alone.
+            # Where no opaque object blocks light, none has to be drawn; photons are those of lights alone.
             clear = dark is scene or view in atlas.views.sky
             key, plan = self._planned(*((job.plan.maps[-1], scene) if clear else (lit, dark)), view.opaque)
             used.add(key)
@@ -200,19 +200,19 @@ class ShadowMapsPass:
             self._targets.pop(size).release()
         job.uniforms.bind()
 
-    def _views(self, job: FrameJob, seen: Seen, opaque: tuple[int, ...], *, in_place: bool) -> ShadowViews:
+    def _views(self, job: FrameJob, map_key: ShadowMapKey, opaque: tuple[int, ...], *, in_place: bool) -> ShadowViews:
         """Places of all maps; where they are stays the same when only media change."""
-        key = seen.places, seen.step, in_place
+        key = map_key.places, map_key.step, in_place
         if self._placed is None or self._placed[0] != key:
             if self._looked_at[0] != key:
                 self._looked_at = key, []
             scene, found = job.scene, self._looked_at[1]
             supports = [support_of(item) for item in scene.objects]
-            for light in [*scene.lights, *_sky_lights(scene)[:: seen.step]][len(found) :]:
+            for light in [*scene.lights, *_sky_lights(scene)[:: map_key.step]][len(found) :]:
                 if job.plan.shadows.directions is None:
                     before_making(self._gl)
                 occluders = ShadowOccluders(light, scene, supports)
-                found.append((occluders.cameras(), occluders.in_the_way if in_place else opaque, occluders.middle))
+                found.append((occluders.cameras(), occluders.blocking if in_place else opaque, occluders.middle))
             limit, count = int(self._gl.info["GL_MAX_TEXTURE_SIZE"]), len(scene.lights)
             self._placed = key, ShadowViews.of(found[:count], found[count:], job.plan.shadows.size, limit)
             self._looked_at = None, []
@@ -259,7 +259,7 @@ class ShadowMapsPass:
 
 
 def _read(job: FrameJob, views: ShadowViews | None, first: int, step: int) -> list[ShadowView]:
-    """Maps that a frame reads: those of lights, and of directions whose light may fall on what is seen."""
+    """Maps that a frame reads: those of lights, and of directions whose light may fall on visible surfaces."""
     if views is None:
         return []
     side = None if job.any_eye or job.features.shadows_backdrop else lit_side(job.scene)
@@ -322,7 +322,7 @@ def _sky_lights(scene: Scene) -> list[Light]:
     return [DirectionalLight(-direction, 1.0) for direction in towards]
 
 
-def _seen(job: FrameJob) -> Seen:
+def _map_key(job: FrameJob) -> ShadowMapKey:
     """Maps of what lights see in a frame; keeps nothing alive."""
     scene = job.scene
     inside = tuple(item.medium is None and holds_eye(item, scene) for item in scene.objects)
@@ -333,4 +333,4 @@ def _seen(job: FrameJob) -> Seen:
     sky = scene.environment_shadows and shadow_directions(scene.environment, scene.environment_shadows)[0].tobytes()
     sheets = job.plan.method if job.plan.method.makes_sheets else None
     places = objects_key(scene), inside, lights, sky, sheets, job.plan.shadows.size, job.plan.opaque_to_shadows
-    return Seen(places, media, _slots(scene)[0])
+    return ShadowMapKey(places, media, _slots(scene)[0])

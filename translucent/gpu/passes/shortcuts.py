@@ -33,7 +33,7 @@ class DepthOnlyPass:
 
 
 class Shortcut(Protocol):
-    """Base class of shortcuts: fills the accumulator in a way that no plan uses."""
+    """Base class of shortcuts: fills the accumulator by a shortcut that no plan uses."""
 
     with_depth: bool  # how the job has to be placed
 

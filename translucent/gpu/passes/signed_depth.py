@@ -33,7 +33,7 @@ class SignedDepthPass:
             kinds = [{"OPAQUE": kind, "SPECTRAL": spectral} for kind in (False, True)]
             chosen = kinds[opaque]
         if job.for_map:
-            # Nothing has to be compiled when an opaque object gets into the way of a light, or out of it.
+            # Nothing has to be compiled when an opaque object begins or ends to block a light.
             for kind in kinds:
                 variants.program(**plain, **kind)
         program = variants.program(**plain, **chosen)

@@ -14,7 +14,7 @@ from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
-from translucent.gpu.passes.variants import Variants, coat_switches, seen_switches
+from translucent.gpu.passes.variants import Variants, background_switches, coat_switches
 from translucent.gpu.placement import extents, part_of
 from translucent.gpu.shaders import set_used
 from translucent.gpu.uniforms import media_center
@@ -48,8 +48,8 @@ _ENTERED = ("entered", "surface_parameters", "surface_color")
 #: Samplers of ``shaders/transport/hierarchy.glsl``, and of the table of objects.
 RAY_SAMPLERS = ("object_table", "hierarchy_nodes", "hierarchy_triangles")
 
-#: Share of a ray's light below which it is not followed, with two forks or fewer.
-FAINTEST_SHARE = 1.2e-2
+#: Throughput of a ray below which it is not followed, with two forks or fewer.
+FAINTEST_THROUGHPUT = 1.2e-2
 
 #: Room around the mirror images of bodies that rough coats blur, in heights of the picture.
 MIRROR_ROOM = 0.06
@@ -97,10 +97,10 @@ class TracedInterfacesPass:
         values = {
             "mirrored": 0,
             "adaptive": int(job.bending),
-            "faintest_share": faintest_share(forks),
+            "faintest_throughput": faintest_throughput(forks),
             "most_interfaces": depth,
             "sample_number": job.sample,
-            "blurred_share": blurred_share(job.samples),
+            "blurred_fraction": blurred_fraction(job.samples),
             **scene_values,
             **_ground(job.scene),
             **_footprint(job),
@@ -117,7 +117,7 @@ class TracedInterfacesPass:
         stack.close()
 
     def _mark_unsettled(self, job: FrameJob, framebuffer: moderngl.Framebuffer) -> None:
-        """Leave a depth test that passes where an interface is seen in a pixel that needs more samples."""
+        """Leave a depth test that passes where an interface is visible in a pixel that needs more samples."""
         entered, unsettled = (t.color_attachments[0] for t in (job.targets["entered"], job.targets["unsettled"]))
         self._where_unsettled.bind(entered=entered, unsettled=unsettled)
         job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
@@ -138,8 +138,8 @@ class TracedInterfacesPass:
         width, rows = job.targets.size
         boxes, radii = np.array([twin.bounds for twin in twins]), np.array([twin.radius for twin in twins])
         edges = extents(boxes, radii, job.scene.camera, (width, rows))
-        seen = edges[:, 2] > edges[:, 0]
-        edges[seen] += MIRROR_ROOM * rows * np.array([-1.0, -1.0, 1.0, 1.0])
+        visible = edges[:, 2] > edges[:, 0]
+        edges[visible] += MIRROR_ROOM * rows * np.array([-1.0, -1.0, 1.0, 1.0])
         part = part_of(edges, (0.0, 0.0), (width, rows)).flipped(rows)
         if not part:
             return
@@ -169,7 +169,7 @@ class TracedInterfacesPass:
             **interface_shadow_switches(job),
             DIMMED=job.features.dims_interfaces,
             DIFFUSE_BASE=any(s.transmission < 1 or s.transmission_texture is not None for s in surfaces),
-            **seen_switches(environment),
+            **background_switches(environment),
             SINGLE_SCATTERING=job.features.scatters,
             FOOTPRINTS=environment.kind == "image",
             **coat_switches(scene.objects),
@@ -183,7 +183,7 @@ class TracedInterfacesPass:
             **entered,
             **traced,
             **resources.light_textures(environment),
-            **resources.seen_textures(environment),
+            **resources.background_textures(environment),
         }
         if job.features.has_opaque:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = blurred_opaque(job)
@@ -206,16 +206,16 @@ def _ground(scene: Scene) -> dict[str, Any]:
     return {"ground_object": scene.objects.index(ground.ground), "ground_plane": (*ground.normal, height)}
 
 
-def faintest_share(forks: int) -> float:
-    """Share of a ray's light, its three channels together, below which it is not followed.
+def faintest_throughput(forks: int) -> float:
+    """Throughput of a ray, its three channels together, below which it is not followed.
 
     With two forks the rays left out weigh as much as those of a third fork; more forks ask for more.
     """
-    return FAINTEST_SHARE / 4.0 ** max(forks - 2, 0)
+    return FAINTEST_THROUGHPUT / 4.0 ** max(forks - 2, 0)
 
 
-def blurred_share(samples: int) -> float:
-    """Share of the variance of microfacets that blurs what is seen in them; 1 with few samples.
+def blurred_fraction(samples: int) -> float:
+    """Fraction of the variance of microfacets that blurs what they reflect; 1 with few samples.
 
     The blur is smooth and somewhat wrong, the samples are right and noisy: their errors balance about so.
     """

@@ -49,8 +49,8 @@ class TransmittancePass:
         transmittance instead.
         """
         features = job.features
-        seen = {} if features.has_surfaces else job.resources.seen_textures(job.scene.environment)
-        self._variants.bind(**seen)
+        maps = {} if features.has_surfaces else job.resources.background_textures(job.scene.environment)
+        self._variants.bind(**maps)
         sums = job.sums_after(spec.name)
         into = job.targets["average"] if sums else job.compact_result if job.compact else job.targets["result"]
         into.use()
@@ -64,7 +64,7 @@ class TransmittancePass:
             "AVERAGE": sums,
             "COMPACT": job.compact and not sums,
             "SURFACES": features.has_surfaces,
-            "SEEN_MAP": bool(seen),
+            "SEEN_MAP": bool(maps),
             # Where others look at the targets, they may change the environment, too.
             "SEEN_KIND": 1 + int(CONSTANTS[f"ENVIRONMENT_{job.scene.environment.seen.kind.upper()}"])
             if job.compact

@@ -74,7 +74,7 @@ class Variants:
         top_first: bool = False,
         rows: tuple[int, int] | None = None,
     ) -> None:
-        """Run one of the programs for the pixels of `job.covered` alone: those where a ray may meet a medium.
+        """Run one of the programs for the pixels of `job.covered` alone: those where a ray may cross a medium.
 
         The contract of a pass over pixels: it runs its program here, and gives the other pixels by `draw_rest`, or by
         clearing them, what that program would have written without a medium. What is read beyond `job.covered` was
@@ -128,7 +128,7 @@ class Variants:
 def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:
     """Switches of ``shaders/intervals/walk.glsl`` for a frame: the kinds of media, and the number of slots."""
     return {
-        # Powers of two, so that scenes which differ by a medium share programs.
+        # Powers of two, so that scenes which differ by a medium use the same programs.
         "SLOTS": 1 << max(len(features.slots) - 1, 0).bit_length(),
         "UNION": features.scene.overlap == "union",
         "PRIORITY": features.scene.overlap == "priority",
@@ -149,10 +149,10 @@ def look_switches(body: Object) -> dict[str, bool]:
     return {"VERTEX_COLORS": body.mesh.colors is not None, "OCCLUSION": occluded}
 
 
-def seen_switches(environment: Environment) -> dict[str, int]:
+def background_switches(environment: Environment) -> dict[str, int]:
     """Switches of shaders in which rays end at the environment: whether it is a picture, and the one that lights."""
-    seen_map, lights = environment.seen.kind == "image", environment.seen is environment
-    return {"SEEN_MAP": seen_map + (seen_map and lights), "SEEN_LIGHTS": seen_map and lights}
+    picture, lights = environment.seen.kind == "image", environment.seen is environment
+    return {"SEEN_MAP": picture + (picture and lights), "SEEN_LIGHTS": picture and lights}
 
 
 def coat_switches(objects: Iterable[Object]) -> dict[str, bool]:

@@ -440,7 +440,7 @@ class RecordedArray(_Recorded):
     Attributes
     ----------
     looks : {"shared", "flat", "smooth", "fullscreen"}
-        Whether corners of faces share vertices, and else which normals they have.
+        Whether faces have common vertices, and else which normals they have.
     """
 
     gl: RecordingContext

@@ -68,7 +68,7 @@ class RecordedFrame:
 
 
 class FrameRecorder:
-    """Recorder of frames that share programs, textures and targets.
+    """Recorder of frames with common programs, textures and targets.
 
     Parameters
     ----------
