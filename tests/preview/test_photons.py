@@ -54,7 +54,7 @@ def test_rounds_add_up_to_the_photons_of_one_frame(view: ViewportRenderer) -> No
                 light.step(0.0)
             light.show()
             errors.append(light.error)
-            lights.append(light._shown[1])
+            lights.append(light._before[1])
         assert light.photons == 16 * ROUND
         for _ in range(4):
             viewport.step(0, plan, 2, photons=light.texture)
