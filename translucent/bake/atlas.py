@@ -12,7 +12,7 @@ from translucent.errors import InputError
 from translucent.extras import require_package
 from translucent.geometry.mesh import Mesh
 
-#: Texels between the charts that xatlas makes, and the share of a small map's side that this is at most.
+#: Texels between the charts that xatlas makes, and the fraction of a small map's side that this is at most.
 CHART_GAP, GAP_SHARE = 4, 1 / 128
 
 #: Distance of texture coordinates to an integer within which they are equal to it: float32 near 1 rounds by half of it.
@@ -25,7 +25,7 @@ ANEW = "make new ones with --unwrap (in Python, leave out the uv), or unwrap it 
 MOST_TILES = 4.0
 
 
-#: Distance, as a share of a texel, within which a texel's center is on a triangle's edge.
+#: Distance, as a fraction of a texel, within which a texel's center is on a triangle's edge.
 ON_EDGE = 1e-7
 
 #: Number of rows whose distances are computed at a time.
@@ -65,7 +65,7 @@ def unwrap(mesh: Mesh, size: int, tile: int | None) -> Unwrapped:
     ------
     InputError
         If there are none and xatlas is not installed; if they are not finite, repeat a texture or have no area; or if
-        no face lies in the UDIM tile that is asked for.
+        no face lies in the UDIM tile that is requested.
     """
     vertex = np.arange(len(mesh.vertices))
     made_by = "mesh"
@@ -269,7 +269,7 @@ class Atlas:
     def _overlapping(self, texel: Integers, face: Integers, center: Array, pairs: Integers, count: int) -> Mask:
         """(count,): whether several faces have the center of a texel, of the `pairs` in which the face has it."""
         several = np.bincount(texel[pairs], minlength=count) > 1
-        # Most of these are on an edge that two faces share.
+        # Most of these are on an edge of two faces.
         pairs = pairs[several[texel[pairs]]]
         pairs = pairs[self._depth(face[pairs], center[pairs]) > ON_EDGE]
         return np.bincount(texel[pairs], minlength=count) > 1

@@ -27,11 +27,11 @@ from translucent.geometry.grouping import position_ids
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_angles
 
-#: Share of the surface that may have no texel of its own before a warning says so, and how many texels per face a map
+#: Fraction of the surface that may have no texel of its own before a warning, and how many texels per face a map
 #: has that could show all.
 MOST_HIDDEN, ENOUGH_TEXELS = 0.1, 4
 
-#: Distance from a vertex to the point where the corner of a face is measured, as a fraction of the way to the others.
+#: Distance from a vertex to the point where the corner of a face is measured, as a fraction of that to the others.
 CORNER = 1e-3
 
 #: Settings without meaning for vertices.

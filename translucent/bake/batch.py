@@ -33,7 +33,7 @@ Status = Literal["baked", "suspect", "skipped", "failed"]
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-#: Largest share of rays without an exit in a map that is not suspect.
+#: Largest fraction of rays without an exit in a map that is not suspect.
 MAX_ESCAPED = 0.05
 
 #: Seconds that a worker process has for cleaning up when the work is canceled.
@@ -136,7 +136,7 @@ def bake_many(
     given = [{**job, **{key: str(Path(job[key]).absolute()) for key in places if job.get(key)}} for job in jobs]
     outputs: dict[str, Job] = {}
     for job in given:
-        # Some file systems do not tell case.
+        # Some file systems ignore case.
         other = outputs.setdefault(str(job.get("output")).casefold(), job)
         if other is not job:
             both = f"{other.get('model')!r} and {job.get('model')!r}"
@@ -181,7 +181,7 @@ def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
 def run_job(job: Job, version: str | None = None) -> Record:
     """Run one job of a batch; errors are in the entry that it returns.
 
-    A `version` is that of who asks: on another machine there may be another one, whose maps are not the same.
+    `version` is the caller's: another machine may have another one, whose maps differ.
     """
     started = time.perf_counter()
     reuse_freed_memory_if_fixed()
@@ -340,7 +340,7 @@ def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end)
     _end_with_parent()
-    warnings.simplefilter("ignore")  # results tell their warnings
+    warnings.simplefilter("ignore")  # results hold their warnings
     reuse_freed_memory()
 
 

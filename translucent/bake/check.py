@@ -58,17 +58,17 @@ if TYPE_CHECKING:
     from translucent.bake.record import Record
 
 
-#: Distance within which surfaces coincide, as a share of the diagonal.
+#: Distance within which surfaces coincide, as a fraction of the diagonal.
 SAME_POINT = 1e-4
 
 
 #: Corners: positions (n, 3) in metres and texture coordinates (n, 2), v upwards, or none.
 Corners = tuple[Array, Array | None]
 
-#: Tolerances of positions, as shares of the diagonal, and of texture coordinates.
+#: Tolerances of positions, as fractions of the diagonal, and of texture coordinates.
 SAME = 1e-4
 
-#: Share of the vertices that may differ: those on seams that a repair has closed.
+#: Fraction of the vertices that may differ: those on seams that a repair has closed.
 MOST_OTHERS = 0.01
 
 #: Colors of the error: too thin, right, too thick (sRGB 0..255).
@@ -101,7 +101,7 @@ class MapCheck:
     background : (h, w, 3)
         Radiance without the body.
     empty : float
-        Share of these pixels at which the map has no value.
+        Fraction of these pixels at which the map has no value.
     """
 
     baked: Frame
@@ -333,7 +333,7 @@ def placed_around(file: GltfFile, part: Record, metres: float) -> Mesh | None:
 
 def _matrix(file: GltfFile, part: Record) -> Array:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TranslucentWarning)  # the bake has told them
+        warnings.simplefilter("ignore", TranslucentWarning)  # the bake has reported them
         return first_transforms(file).get(part["place"][0], np.eye(4))
 
 
@@ -372,7 +372,7 @@ def check_output(job: Job, record: Record, results: Results) -> Checks:
     Raises
     ------
     InputError
-        If no map can be seen.
+        If no map is visible.
     RenderError
         If a map does not belong to the texture coordinates in the file that it is for.
     """

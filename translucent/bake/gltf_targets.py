@@ -136,7 +136,7 @@ class Bodies:
     def _outline(self, key: PrimitiveKey) -> Mesh:
         if key not in self._outlines:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", TranslucentWarning)  # of faces that are turned: what is baked tells
+                warnings.simplefilter("ignore", TranslucentWarning)  # of faces that are turned: the bake reports them
                 self._outlines[key] = read_primitive(self._file, key, self._metres)
         return self._outlines[key]
 
@@ -256,7 +256,7 @@ def find_targets(
     metres : float
         Per unit of the file.
     needs_uv : bool
-        Whether UVs are wanted at all.
+        Whether UVs are requested at all.
     new_uv : bool
         Make new UVs for all of them.
     plain_uv : bool

@@ -38,7 +38,7 @@ FAR = 10.0
 #: Largest number of pairs of a point and a box that are looked at at a time.
 MOST_PAIRS = 1 << 16
 
-#: Number of faces of a large mesh, and the share by which its spheres may be too large: round bodies have spheres that
+#: Number of faces of a large mesh, and the fraction by which spheres may be too large: round bodies have spheres that
 #: nearly touch all faces.
 LARGE, LARGE_SLACK = 50_000, 0.002
 
@@ -84,7 +84,7 @@ class InscribedSpheres:
                 part = slice(begin, begin + most)
                 self._descend(points, pair[part], parent[part], level, radius)
             return
-        pair, node = boxes.met(pair, parent, points, (1.0 - self._slack) * radius)
+        pair, node = boxes.touched(pair, parent, points, (1.0 - self._slack) * radius)
         if level + 1 == len(self._tree.levels):
             self._touch(points, pair, self._tree.order[node], radius)
             return
@@ -176,7 +176,7 @@ class _Boxes:
         """Number of boxes in each one of the level above."""
         return int(self.offset.shape[1])
 
-    def met(self, pair: Integers, parent: Integers, points: Points, radius: Array) -> tuple[Integers, Integers]:
+    def touched(self, pair: Integers, parent: Integers, points: Points, radius: Array) -> tuple[Integers, Integers]:
         """Pairs of a point and a box that the sphere of `radius` there may touch."""
         start, normal, reach = points.start.take(pair, axis=0), points.normal.take(pair, axis=0), radius.take(pair)
         reach = reach[:, None]

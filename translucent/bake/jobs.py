@@ -7,16 +7,16 @@ A job holds what JSON can hold, so it can be kept, sent and hashed:
 ``output``       path of the file to write; its record goes beside it
 ``unit``         of the model's coordinates (default m)
 ``settings``     arguments of `bake_thickness` by name: mode, size, rays, ...; ``max_distance``, ``tolerance`` and
-                 ``high_distance`` in metres, or as shares of the mesh's diagonal, such as ``"10%"``
+                 ``high_distance`` in metres, or as fractions of the mesh's diagonal, such as ``"10%"``
 ``medium``       extinction (r, g, b) in 1/m, for mode ``transmittance``
 ``high``         path of the mesh that the details come from, and ``cage`` that of a cage around it, in the unit
 ``vertices``     True: thickness per vertex instead of a map
 ``unwrap``       True: new UVs, whatever the model has
-``normalize``    True: store shares of the largest value; ``invert``: 1 minus them
+``normalize``    True: store fractions of the largest value; ``invert``: 1 minus them
 ``outside``      True: read files that a glTF model links to wherever they are, not only below its folder
 ``resume``       True: keep finished parts in ``OUTPUT.resume.npz``, and go on from there
 ``threads``      how many (default: all processors); results do not depend on it
-``max_escaped``  of `bake_many`: share of rays without an exit above which a map is suspect (default 0.05)
+``max_escaped``  of `bake_many`: fraction of rays without an exit above which a map is suspect (default 0.05)
 ===============  ==========================================================================================
 
 Only ``model`` and ``output`` are needed.
@@ -74,7 +74,7 @@ from translucent.version import VERSION
 Job = dict[str, Any]
 #: Results by mesh and primitive of a glTF file; else one, for (0, 0).
 Results = dict[PrimitiveKey, Any]
-#: Callback with the share that is done, 0..1, and the rays traced so far.
+#: Callback with the fraction that is done, 0..1, and the rays traced so far.
 Progress = Callable[[float, int], None]
 
 KEYS = {
@@ -83,7 +83,7 @@ KEYS = {
 }  # fmt: skip
 #: Version of the set of files that a bake writes; another number makes them anew.
 FILES = 2
-#: Largest distance of a part of a body from its surface, as a share of the diagonal: that of rounding.
+#: Largest distance of a part of a body from its surface, as a fraction of the diagonal: that of rounding.
 ON_SURFACE = 1e-4
 #: Keys that do not change the contents of the file.
 _HOW = {"output", "model", "high", "cage", "resume", "threads", "max_escaped", "outside"}
@@ -208,7 +208,7 @@ def bake_one(
     part: str = "",
     around: Mesh | None = None,
 ) -> ThicknessMap | VertexThickness:
-    """Bake one mesh as a job asks for.
+    """Bake one mesh with the settings of a job.
 
     Parameters
     ----------

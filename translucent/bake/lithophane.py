@@ -2,7 +2,7 @@
 
 The tone mapping is affine in linear light, as black-point compensation is: with T the luminance of white light after a
 thickness, a pixel of luminance L in 0..1 gets that at which T = T(thickest) + L (T(thinnest) - T(thickest)). Light goes
-straight through; faces keep the same share everywhere, and are left out.
+straight through; interfaces reflect the same fraction everywhere, and are left out.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MOST_POINTS = 4_000_000
 #: Least contrast that is worth printing.
 LEAST_CONTRAST = 1.2
 
-#: Least share of light that is worth a thickness: it is black beside all else.
+#: Least fraction of light that is worth a thickness: it is black beside all else.
 LEAST_PASSED = 1e-5
 
 #: Thicknesses at which luminance is tabled.
@@ -58,7 +58,7 @@ class Lithophane:
     contrast : float
         Of the thinnest to the thickest place.
     rms : float
-        Of luminance shown less luminance asked for: what facets between the points make of it.
+        Of luminance shown less luminance requested: what facets between the points make of it.
     """
 
     mesh: Mesh
@@ -93,7 +93,7 @@ class Lithophane:
 
     @checked
     def save_check(self, path: str | Path) -> None:
-        """Write a .png of what is asked for, and beside it of what the relief shows; as bright as its colors allow."""
+        """Write a .png of what is requested, and beside it of what the relief shows; as bright as its colors allow."""
         requested = np.repeat(self.target[..., None], 3, axis=-1)
         most = max(1.0, float(requested.max()), float(self.shown.max()))
         both = labeled(("asked for", look(requested / most)), ("as the relief shows it", look(self.shown / most)))

@@ -11,7 +11,7 @@ mode           value
 normal         d(-n)
 cone           E[d] = integral p(w) d(w) dw
 transmittance  the d for which Y(exp(-sigma_t d)) = E[Y(exp(-sigma_t d(w)))], with Y the luminance
-local          P(d(w) >= D), the share of rays that go as far as D = max_distance inside: one minus the ambient
+local          P(d(w) >= D), the fraction of rays that go as far as D = max_distance inside: one minus the ambient
                occlusion within D of the surface with inverted normals (Barre-Brisebois and Bouchard 2011)
 inscribed      the diameter of the largest sphere inside that touches the surface at the point: see
                `translucent.bake.inscribed`

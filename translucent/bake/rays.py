@@ -2,7 +2,7 @@
 
 Directions are scrambled Sobol points.
 
-Embree finds the faces, float64 the distances. Embree is asked for the first face only, from a start a little below the
+Embree finds the faces, float64 the distances. Each query finds the first face, from a start a little below the
 surface. A ray that so finds the face through which it leaves the body has its exit, at the crossing of its line with
 that face's plane, in float64. All others, few on most meshes, are followed face by face.
 """
@@ -27,11 +27,11 @@ from translucent.geometry.normals import CREASE, smooth_normals
 from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.winding import one_volume
 
-#: Smallest distance of a ray's start from the edges of its triangle, as a share of its height: a ray that runs down an
+#: Smallest distance of a ray's start from the edges of its triangle, as a fraction of its height: a ray down an
 #: adjacent wall would otherwise run in it.
 INSET = 1e-3
 
-#: Smallest area of a triangle, as a share of the squared diagonal, that float64 can tell from rounding.
+#: Smallest area of a triangle, as a fraction of the squared diagonal, that float64 separates from rounding.
 NO_AREA = 1e-24
 
 
@@ -215,7 +215,7 @@ SPHERE_CONE = 0.5 * (math.pi - CREASE)
 #: Rays that a first sphere comes from: more take longer than the faces that they spare.
 SPHERE_RAYS = 3
 
-#: Distance, as a share of the radius, within which points have the same set: the same point of two charts, rounded
+#: Distance, as a fraction of the radius, within which points have the same set: the same point of two charts, rounded
 #: twice.
 SAME_POINT = 2.0**-24
 
@@ -308,7 +308,7 @@ class InwardRays:
         return (points.start - OFFSET * self.surface.planes[points.face, :3]).astype(np.float32)
 
     def _follow(self, walk: _RayWalk) -> int:
-        """Follow rays to their ends, and tell how many rays Embree traced for that."""
+        """Follow rays to their ends, and count the rays that Embree traced."""
         traced = 0
         while walk.live.size:
             live = walk.live
@@ -332,7 +332,7 @@ class InwardRays:
         walk.last[live] = face
         walk.position[live] = np.maximum(walk.position[live] + reached, distance) + walk.gap[live]
         leaves = (cosine > GRAZING) & (distance >= -BEHIND) & ~again
-        # On the way in, the face of the start and its neighbors are behind; farther off, another part begins.
+        # Going inwards, the face of the start and its neighbors are behind; farther off, another part begins.
         enters = (cosine < -GRAZING) & (distance > NEAR) & ~again
         self._cross_surface(walk, np.maximum(distance, 0.0), leaves, enters)
 
@@ -459,7 +459,7 @@ class Directions:
         return world
 
 
-@lru_cache(maxsize=1)  # a batch asks for the same ones again and again
+@lru_cache(maxsize=1)  # a batch needs the same ones again and again
 def _sobol(count: int, sets: int, seed: int) -> Array:
     """(sets, count, 2): the first points of the Sobol sequence in 0..1, scrambled independently (Owen 1995).
 
@@ -471,7 +471,7 @@ def _sobol(count: int, sets: int, seed: int) -> Array:
     coins = keys.reshape(sets, 1, 2)
     scrambled = np.zeros((sets, count, 2), dtype=np.uint64)
     for digit in range(DIGITS):
-        # The leading 1 tells prefixes of different lengths apart.
+        # The leading 1 distinguishes prefixes of different lengths.
         prefix = (digits + np.uint64(2**DIGITS)) >> np.uint64(DIGITS - digit)
         own = (digits >> np.uint64(DIGITS - 1 - digit)) & np.uint64(1)
         turned = _mix(coins ^ prefix) >> np.uint64(63)

@@ -171,7 +171,7 @@ class BakedScatter:
 
     @property
     def entering(self) -> float:
-        """Share of diffuse light that the polished interface lets through, for `exit_lobe`."""
+        """Fraction of diffuse light that the polished interface lets through, for `exit_lobe`."""
         return diffuse_interface(self.medium.ior).entering
 
     def radiance(self, light: npt.ArrayLike) -> Array:

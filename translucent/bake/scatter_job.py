@@ -216,7 +216,7 @@ class ScatterLook:
     Attributes
     ----------
     baked, true : (h, w, 3) float64
-        Radiance towards the eye; 0 where the body is not seen.
+        Radiance towards the eye; 0 where the body is not visible.
     seen : (h, w) bool
     mean_error : float
         nRMSE of the mean radiance, flux over pi: of what is baked.

@@ -31,7 +31,7 @@ MAX_SIZE = 16384
 #: Largest number of rays from one point, before a tolerance adds more.
 MAX_RAYS = 65536
 
-#: Default reach of mode "local", as a share of the diagonal; the customary one of baking tools.
+#: Default reach of mode "local", as a fraction of the diagonal; the customary one of baking tools.
 LOCAL_REACH = 0.1
 
 
@@ -113,7 +113,7 @@ class BakeSettings:
         _check_choice("weighting", self.weighting, Weighting)
         _check_choice("gaps", self.gaps, Gaps)
         _check_count("size", self.size, 1, MAX_SIZE, "give the texels along a side, for example 1024")
-        # One ray of many tells no error; mode "normal" has only one.
+        # One ray of many has no error estimate; mode "normal" has only one.
         _check_count("rays", self.rays, 1 if self.mode == "normal" else 2, MAX_RAYS, "give for example 64")
         _check_count("supersample", self.supersample, 1, 16, "give 1 for none, or for example 2")
         _check_count("padding", self.padding, 0, MAX_SIZE, "give the texels around each chart, for example 16")

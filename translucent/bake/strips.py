@@ -33,7 +33,7 @@ from translucent.files.paths import write_atomically
 from translucent.geometry.mesh import Mesh
 from translucent.version import VERSION
 
-#: Default distance on either side of the low mesh within which the high one is searched, as a share of the diagonal.
+#: Default distance on either side of the low mesh within which the high one is searched, as a fraction of the diagonal.
 SEARCH = 0.02
 
 

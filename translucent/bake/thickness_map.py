@@ -105,9 +105,9 @@ class BakeReport:
     uv_from : str
         "mesh", "xatlas", or "" for vertices.
     escaped : float
-        Share of the rays that left the mesh without an exit.
+        Fraction of the rays that left the mesh without an exit.
     missed : float
-        Share of the samples from which no surface of the high mesh was found.
+        Fraction of the samples from which no surface of the high mesh was found.
     mean_standard_error, max_standard_error : float
         Over texels or vertices with a value, in its unit.
     above_tolerance : int
@@ -151,7 +151,7 @@ class ThicknessMap:
     standard_error : (h, w) float32
         Of `values`, in their unit; 0 where a mode takes no samples, and beyond `coverage`.
     escaped : float
-        Share of rays that left the mesh without an exit: above 0 for meshes with holes.
+        Fraction of rays that left the mesh without an exit: above 0 for meshes with holes.
     mesh : Mesh
         With the uv that the map belongs to; new ones where the mesh that was given had none.
     settings : BakeSettings
@@ -289,9 +289,9 @@ def save_map(
     path : path
         One of the module's table, not ``.ply``.
     normalize : bool
-        Store shares of the largest value. A PNG always does; what turns them into metres is in file and record.
+        Store fractions of the largest value. A PNG always does; what turns them into metres is in file and record.
     invert : bool
-        Store 1 minus that share, the translucency that some engines want.
+        Store 1 minus that fraction, the translucency that some engines want.
     about : dict, optional
         More for the record, such as where the mesh is from.
 
@@ -303,9 +303,9 @@ def save_map(
     Raises
     ------
     InputError
-        If the suffix is another one, the folder is missing, or the file cannot hold what is asked.
+        If the suffix is another one, the folder is missing, or the file cannot hold what is requested.
     RenderError
-        If a file cannot be written, or ``.exr`` is asked for without the OpenEXR package.
+        If a file cannot be written, or ``.exr`` is requested without the OpenEXR package.
     """
     path = Path(path)
     if check_map_output(path, normalize=normalize, invert=invert) == ".glb":

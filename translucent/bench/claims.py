@@ -438,7 +438,7 @@ MEDIUM_CLAIMS: tuple[Judge, ...] = (
     ),
 )
 
-#: All claims about shadows and caustics, as the page tells them again.
+#: All claims about shadows and caustics, as the page repeats them.
 SHADOW_CLAIMS = (*SHADOW_MAP_CLAIMS, *SKY_CLAIMS, *CAUSTIC_CLAIMS, *MEDIUM_CLAIMS)
 
 

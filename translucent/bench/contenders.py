@@ -225,7 +225,7 @@ class Contender:
     def fitted(self, bench: BenchContext, scene: Scene, truth: Frame) -> Contender:
         """The contender with the thickness, or the settings of an engine, of least squared error.
 
-        Thickness is proportional to what is assumed, so one picture tells: with t for 1 m, the best is <t d> / <t t>
+        Thickness is proportional to what is assumed, so one picture suffices: with t for 1 m, the best is <t d> / <t t>
         over all pixels that truth or picture cover. That of sheets is declared.
         """
         if self.engine is not None:

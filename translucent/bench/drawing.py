@@ -1,9 +1,9 @@
-"""Drawings that are timed in turns: frames prepared once, drawn again and again, and read at the end.
+"""Drawings that are timed round robin: frames prepared once, drawn again and again, and read at the end.
 
-All is measured in turns, A B C A B C, and the floor before and after each: what slows the machine down for longer than
-a drawing slows both, and their quotient stays. Medians and quartiles are over rounds, so that single hiccups do not
+The order is A B C A B C, and the floor before and after each: what slows the machine down for longer than a drawing
+slows both, and their quotient stays. Medians and quartiles are over rounds, so that single hiccups do not
 count either. Slow drawings leave the rounds early, once they have had their part of the time; those whose rounds
-differ much stay longer. What takes less than clocks can tell apart is drawn several times for one sample.
+differ much stay longer. What takes less than clocks resolve is drawn several times for one sample.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ FEWEST_UNSURE, CHEAP = 9, 0.1
 #: Seconds of a sample, below which a drawing is repeated in it, and the largest number of repetitions.
 SHORTEST, MOST_REPEATED = 4e-3, 16
 
-#: Standard error of the median ratio, as a fraction of it, from which on more rounds are asked for.
+#: Standard error of the median ratio, as a fraction of it, from which on more rounds are requested.
 UNSURE = 0.03
 
 #: Draws of the floor on each side of a sample take this fraction of the time of the sample, up to `MOST_FLOORS` draws.
@@ -357,7 +357,7 @@ def timed_beside_floor(
     seconds: float,
     finished: Callable[[str, Drawing], None] = lambda *_: None,
 ) -> tuple[dict[str, Samples], dict[str, Exception]]:
-    """Make drawings of a scene and measure them in turns.
+    """Make drawings of a scene and measure them round robin.
 
     Parameters
     ----------
@@ -445,7 +445,7 @@ def interleaved(
     patience: float = 1.0,
     long: float = 0.3,
 ) -> dict[str, Samples]:
-    """Measure all drawings, in turns, for about as many seconds; each gets an equal part, and at least a few rounds.
+    """Measure all drawings round robin, for about as many seconds; each gets an equal part, and at least a few rounds.
 
     Parameters
     ----------

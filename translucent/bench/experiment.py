@@ -90,7 +90,7 @@ class Experiment(Generic[SceneT]):
         blank = self.blank(bench, scene)
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", TranslucentWarning)  # rows tell what pixels are not valid
+                warnings.simplefilter("ignore", TranslucentWarning)  # rows count the pixels that are not valid
                 bench.doing("truth")
                 truth = self.truth(bench, scene)
                 rows, contenders = [], self.contenders(truth)

@@ -102,7 +102,7 @@ def _guide(checks: Checks) -> None:
     _bent(checks, "end of a rod", [Object(rod, Medium(absorption=0.2, ior=1.5))], camera)
 
 
-#: Fraction of the power of a light that may be lost or won on its way through a wall.
+#: Fraction of the power of a light that may be lost or won between entering and leaving a wall.
 POWER = 0.1
 
 #: Radiance of a part that cells do not resolve, in light of 1 from all sides, that diffusion may be off by.

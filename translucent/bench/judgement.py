@@ -311,7 +311,7 @@ def _changes(old: Report, new: Report) -> Iterator[Change]:
     cases = {case.name: case for case in new.cases}
     for before in old.cases:
         if (after := cases.get(before.name)) is None:
-            continue  # fewer cases were asked for
+            continue  # fewer cases were requested
         if after.failure and not before.failure:
             yield Change("fails", before.name, after.failure)
         rows = {row.method: row for row in after.rows}

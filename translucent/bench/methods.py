@@ -1,4 +1,4 @@
-"""Methods and shortcuts on scenes, drawn, compared with the reference and timed in turns; and how their cost grows."""
+"""Methods and shortcuts on scenes, drawn, compared with the reference, timed round robin, and their cost growth."""
 
 from __future__ import annotations
 

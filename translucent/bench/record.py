@@ -558,7 +558,7 @@ class Claim:
     ----------
     text : str
     held : bool or None
-        None where the run has nothing to check it on, or its numbers are too noisy to tell.
+        None where the run has nothing to check it on, or its numbers are too noisy.
     measured : str
         The numbers behind that; where it does not hold, where and why.
     """

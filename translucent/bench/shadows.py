@@ -295,7 +295,7 @@ class ShadowMapComparison(Experiment[LightScene]):
         if len(sizes) > 1:
             x, y = np.log2(np.array(sizes, dtype=np.float64)).T
             order = float(-np.polyfit(x, y, 1)[0])
-        # Texels do not tell what is before the first opaque surface.
+        # Texels do not resolve what is before the first opaque surface.
         texels = None if ground.occluded else error_statistics(texel_errors(bench.renderer, scene, self.texels))
         return dataclasses.replace(
             blank,

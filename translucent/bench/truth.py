@@ -177,7 +177,7 @@ class CaseTruth:
         used = self.compared & frame.coverage & frame.valid
         one, other = (half[used] for half in self.halves)
         square, uncertainty = noise_free_square(np.asarray(frame.radiance[used], np.float64), one, other)
-        # Over pixels the error may be less than noise can tell: then the standard error of its square is reported.
+        # Over pixels the error may be below the noise: then the standard error of its square is reported.
         return math.sqrt(max(square, uncertainty if self.rays > 1 else 0.0))
 
     def light_errors(self, frame: Frame, solve_seconds: float | None) -> LightErrors | None:

@@ -212,7 +212,7 @@ def _read_fraction(name: str, text: str) -> float:
 
 
 def _read_length(name: str, text: str, unit: str) -> float | str:
-    """Length in metres, or a share as given, which depends on the mesh."""
+    """Length in metres, or a fraction as given, which depends on the mesh."""
     from translucent.units import parse_length
 
     if text.strip().endswith("%"):

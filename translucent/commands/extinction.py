@@ -46,7 +46,7 @@ _WITHOUT_SURFACE = ("css", "json")
 #: Pixels of the picture that is averaged; of the shape of the one that ``translucent render`` makes, and so framed.
 SIZE = (640, 360)
 
-#: Share of a channel's average beyond which the thin parts alone make its color.
+#: Fraction of a channel's average beyond which the thin parts alone make its color.
 MOST_THIN_SHARE = 0.5
 
 
@@ -356,7 +356,7 @@ def _echo(reported: dict[str, Any], medium: Medium, stated: float, given: Extinc
         echo(f"warning: {line}", err=True)
     roughness = MediumOptions(preset=given.preset).surface_roughness(given.roughness)
     if given.roughness is None and given.source is not None:
-        load_medium(given.source)  # which tells what is wrong with the file
+        load_medium(given.source)  # which reports what is wrong with the file
         roughness = load_roughness(given.source)
     if given.ior is not None:
         medium = dataclasses.replace(medium, ior=given.ior)

@@ -280,7 +280,7 @@ def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
     from translucent.media.conversion import CLAMP, clamp_colors
 
     triple, changed = clamp_colors(parse_color(color))
-    # As it was written, if nothing is to be done: errors tell it so.
+    # As it was written, if nothing is to be done: errors repeat it.
     return (triple, [f"color clamped to {CLAMP:g} where it was below"]) if changed.any() else (color, [])
 
 

@@ -54,13 +54,13 @@ if TYPE_CHECKING:
     from translucent.renderer import Renderer
     from translucent.scene.scene import Scene
 
-#: Below these shares of light, passed straight or scattered back, a picture shows little but black.
+#: Below these fractions of light, passed straight or scattered back, a picture shows little but black.
 NEARLY_BLACK, HARDLY_LIT = 0.02, 0.05
 
-#: Radiance from which on a picture is white, with what rounding adds, and the share of such pixels that hides a shape.
+#: Radiance from which on a picture is white, with what rounding adds, and the fraction of pixels that hides a shape.
 WHITE, BURNT_OUT = 1.02, 0.3
 
-#: Range of the share of light that passes in a picture that shows its medium.
+#: Range of the fraction of light that passes in a picture that shows its medium.
 SHOWS_MEDIUM = (0.05, 0.97)
 
 #: Metres across, from which on a model is rarely one of a thing that light shines through, and what such are usually.
@@ -329,7 +329,7 @@ class Pictures:
         scale = SMALL / max(width, height)
         small = max(round(scale * width), 1), max(round(scale * height), 1)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # they have been told
+            warnings.simplefilter("ignore")  # they have been reported
             frame = renderer.render_requested(scene, small, replace(request, samples=1), progress=progress)
         return frame, totals.summary((width, height))
 

@@ -150,7 +150,7 @@ def _measured(
             bar.update(done - bar.pos, what)
             bar.render_progress()  # without a step it would show nothing new
             now = time.monotonic()
-            # Nobody watches the bar in a file: lines tell of each scene, and now and then of what is done for it.
+            # Nobody watches the bar in a file: lines report each scene, and now and then its steps.
             if not watched and (done >= reported[0] or now - reported[1] >= FILE[1]):
                 reported = done + 1, now
                 echo(f"measuring {done + 1} of {steps}: {printable(what)}", err=True)
@@ -189,7 +189,7 @@ def _parts(only: str | None) -> tuple[Part, ...]:
 
 
 def _command(models: tuple[str, ...], given: ReportOptions) -> str:
-    """Command line of the user, as far as it tells what was measured."""
+    """Command line of the user, as far as it states what was measured."""
     medium = given.medium
     options: dict[str, object] = {
         "-o": given.output,

@@ -166,7 +166,7 @@ def read_array(
     size : int
         Bytes of the file.
     requested : str
-        What the error says was asked for.
+        What was requested, as errors state it.
     do : str
         What the user can do about it.
     kinds : str
@@ -238,7 +238,7 @@ def open_picture(
     data : bytes
         Of a whole file: a chunk may say that it is longer than that, and what reads on in a file makes room first.
     requested : str
-        What the error says was asked for.
+        What was requested, as errors state it.
     formats : tuple of str
         Of Pillow.
     per_pixel : int

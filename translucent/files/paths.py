@@ -31,7 +31,7 @@ def require_file(path: Path, requested: str) -> None:
     ----------
     path : Path
     requested : str
-        What the error says was asked for.
+        What was requested, as errors state it.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def require_output(path: Path, requested: str) -> None:
     ----------
     path : Path
     requested : str
-        What the error says was asked for.
+        What was requested, as errors state it.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def require_folder(path: Path, requested: str) -> None:
     ----------
     path : Path
     requested : str
-        What the error says was asked for.
+        What was requested, as errors state it.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def require_folder(path: Path, requested: str) -> None:
 
 def _require_writable(path: Path, requested: str) -> None:
     """Raise `RenderError` unless a file can be made beside the path."""
-    try:  # rights do not tell: disks may be read-only, and full; and a name may be too long
+    try:  # rights do not suffice: disks may be read-only, and full; and a name may be too long
         with suppress(FileNotFoundError):
             os.lstat(path)
         temporary, held = _temporary_file(Path(os.path.realpath(path)))
@@ -197,7 +197,7 @@ def remove_partial(path: Path) -> None:
     """Remove temporary files of processes that were killed while they wrote `path`; not those in use."""
     path = Path(os.path.realpath(path))
     for left in path.parent.glob(f"{_partial(path)}*"):
-        # It may be gone meanwhile, not be ours, or be where there are no locks to tell.
+        # It may be gone meanwhile, not be ours, or be where there are no locks.
         with suppress(OSError), left.open("r+b") as file:
             if _lock(file):
                 left.unlink()

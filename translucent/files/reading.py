@@ -2,7 +2,7 @@
 
 Every reader of the toolkit begins here. Opened are regular files only, since a device may never end and a pipe may wait
 forever; a linked file has to lie below the folder of its link, symlinks resolved. Nothing is allocated because
-a header says so: `require_room` is asked first. A file may unpack into `FREE` bytes, or into `RATIO` times its own
+a header says so: `require_room` checks first. A file may unpack into `FREE` bytes, or into `RATIO` times its own
 size: honest files stay far below, and a few bytes cannot fill the memory.
 """
 
@@ -53,7 +53,7 @@ def open_file(path: str | Path, requested: str, limit: int = MAX_FILE) -> Binary
     ----------
     path : str or Path
     requested : str
-        What the error says was asked for.
+        What was requested, as errors state it.
     limit : int
         Bytes that it may have.
 
@@ -109,7 +109,7 @@ def linked_file(folder: Path, link: str, requested: str, allow_outside: bool = F
     link : str
         Relative, percent-encoded or not.
     requested : str
-        What the error says was asked for.
+        What was requested, as errors state it.
     allow_outside : bool
         Whether the link may lead out of the folder: to where its user could not have meant.
 
@@ -136,7 +136,7 @@ def require_room(requested: str, found: str, size: int, stored: int, do: str = "
     Parameters
     ----------
     requested : str
-        What the error says was asked for.
+        What was requested, as errors state it.
     found : str
         What takes it, such as ``"16384x16384 pixels"``.
     size : int
@@ -264,7 +264,7 @@ def require_memory(requested: str, found: str, size: int, do: str) -> None:
     Parameters
     ----------
     requested : str
-        What the error says was asked for.
+        What was requested, as errors state it.
     found : str
         What takes it, such as ``"50000000 triangles"``.
     size : int

@@ -207,7 +207,7 @@ def _faces(accessors: Accessors, mode: Any, corners: AnyIndices, name: str) -> A
     first, second, third = corners[:-2], corners[1:-1], corners[2:]
     if mode == _FAN:
         return np.column_stack([second, third, np.full_like(first, corners[0])])
-    odd = np.arange(len(first)) % 2 == 1  # every other triangle of a strip is wound the other way
+    odd = np.arange(len(first)) % 2 == 1  # every other triangle of a strip is wound in reverse
     faces = np.column_stack([first, np.where(odd, third, second), np.where(odd, second, third)])
     # Strips are joined by triangles without area.
     return np.asarray(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])

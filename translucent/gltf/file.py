@@ -102,7 +102,7 @@ class GltfFile:
         return bytes(self._content(holder))
 
     def buffer(self, index: Any) -> bytes | memoryview:
-        """Bytes of a buffer, read when they are first asked for; raises `InputError` like `resource`."""
+        """Bytes of a buffer, read when they are first requested; raises `InputError` like `resource`."""
         entry = self.item("buffers", index)
         if index not in self._buffers:
             self._buffers[index] = self._content(entry)
@@ -136,7 +136,7 @@ class GltfFile:
 
 
 def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
-    """Read a .gltf or .glb file; its content tells which of them it is.
+    """Read a .gltf or .glb file; its content decides the format.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ _RIGHT_ANGLE = 0.5 * math.pi * (1.0 + 1e-6)
 def scene_camera(
     file: GltfFile, transforms: dict[int, Array], index: int | None, metres: float, left_out: LeftOut
 ) -> Camera | None:
-    """Camera of this index; None if none is asked for, or if the first is asked for and the file has none.
+    """Camera of this index; None if none is requested, or if the first is requested and the file has none.
 
     Parameters
     ----------

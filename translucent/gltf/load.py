@@ -65,7 +65,7 @@ class GltfScene(Scene):
     Parameters
     ----------
     left_out : tuple of str
-        What the file asks for and the scene does not hold, one line per kind with the names that have it.
+        Features of the file that the scene does not hold, one line per kind with the names that have it.
     has_camera : bool
         Whether the camera is one of the file's, rather than one that frames all objects.
     variants : tuple of str
@@ -120,7 +120,7 @@ def load_scene(
         shared one its own. Meshes are welded and wound as by `load_mesh`. What materials make of objects says
         `translucent.gltf.objects`. The environment, which glTF does not have, is `Environment.studio`, or that of
         `showcase` in a file without materials.
-        `left_out` lists what the scene does not hold, and a `TranslucentWarning` tells it.
+        `left_out` lists what the scene does not hold, and a `TranslucentWarning` reports it.
 
     Raises
     ------

@@ -3,7 +3,7 @@
 ============================  =======================================================  =======================
 extension                     field here                                               default
 ============================  =======================================================  =======================
-KHR_materials_transmission    transmission: share of light that enters, 0..1           0
+KHR_materials_transmission    transmission: fraction of light that enters, 0..1           0
 KHR_materials_volume          attenuation_color: linear, 0..1 per channel              (1, 1, 1)
 KHR_materials_volume          attenuation_distance: metres of the **world**, > 0       infinity
 KHR_materials_volume          thickness (factor), >= 0, in **mesh** space              0: thin-walled
@@ -11,7 +11,7 @@ KHR_materials_volume          thickness_texture: its G channel multiplies the fa
 KHR_texture_transform         thickness_transform: of the UVs of that texture          none
 KHR_materials_ior             ior: 0 or >= 1                                           1.5
 KHR_materials_dispersion      dispersion = 20 / Abbe number, >= 0                      0
-KHR_materials_iridescence     iridescence: share of the surface with a thin film, 0..1  0
+KHR_materials_iridescence     iridescence: fraction of the surface with a thin film, 0..1  0
 KHR_materials_iridescence     iridescence_ior: of the film, >= 1                       1.3
 KHR_materials_iridescence     iridescence_thickness: **metres** of the file's nm       400e-9
 KHR_materials_clearcoat       clearcoat, clearcoat_roughness: 0..1                     0
@@ -120,7 +120,7 @@ class DraftScattering:
     anisotropy : float
         Henyey-Greenstein g.
     strength : float
-        Share of the color that counts.
+        Fraction of the color that counts.
     """
 
     extension: str

@@ -226,7 +226,7 @@ def thickness_at(file: GltfFile, material: GltfMaterial, uv: npt.ArrayLike) -> A
 _KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 _MODES = ("LINEAR", "STEP", "CUBICSPLINE")
 
-#: Cosine between quaternions from which a straight way between them is as good as an arc.
+#: Cosine between quaternions from which a straight line between them is as good as an arc.
 _NEAR = 1.0 - 1e-9
 
 
@@ -337,7 +337,7 @@ def sampled_channel(times: Array, values: Array, seconds: float, mode: str, *, a
 
 def _slerp(start: Array, end: Array, t: float) -> Array:
     cosine = float(start @ end)
-    if cosine < 0:  # the same rotation, the shorter way
+    if cosine < 0:  # the same rotation along the shorter arc
         end, cosine = -end, -cosine
     if cosine > _NEAR:
         return np.asarray((1.0 - t) * start + t * end)

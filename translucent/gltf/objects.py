@@ -16,14 +16,14 @@ everything else                                    opaque: metal, or a coat over
                                                    with transmissionFactor 0, lets no light in
 KHR_materials_unlit                                opaque: has its base color everywhere, and mirrors nothing
 alphaMode BLEND, with an alpha below 1 somewhere   layer: a sheet that shows what the opaque object would, with alpha as
-                                                   its share, over what is behind it with the rest (the specification's
+                                                   this much, over what is behind it with the rest (the specification's
                                                    ``over``), whatever the angle. Layers are painted object by object,
                                                    far ones first, as viewers do. What lies behind a body is dimmed by
                                                    all that its ray crosses, and seen straight, not bent
 =================================================  ==================================================================
 
 The tint of a wall is that of a straight view. A slanted view has it deeper, as in a pane with the wall's ior: at most
-by the 1.34th power with the ior of 1.5 that materials have by default. A wall that transmits only a share of the light
+by the 1.34th power with the ior of 1.5 that materials have by default. A wall that transmits a fraction of the light
 has its tint whatever the view, like its diffuse reflection.
 
 alphaMode MASK makes holes in opaque objects and walls; a body with holes would have no inside, and is drawn closed.
@@ -81,7 +81,7 @@ UNREAD_TEXTURES = {
 }
 
 
-#: Thickness of a thin wall as a share of the scene's diagonal: too little to see, enough to count as covered.
+#: Thickness of a thin wall as a fraction of the scene's diagonal: too little to see, enough to count as covered.
 WALL_SHARE = 1e-5
 
 #: Medium of a partly transparent layer: empty.
@@ -93,7 +93,7 @@ BLENDED = (
     "cast no shadows, and rays that bend do not meet them"
 )
 
-#: Smallest share of metal in a texture that is not taken for noise.
+#: Smallest fraction of metal in a texture that is not taken for noise.
 _METAL = 0.1
 
 
@@ -352,7 +352,7 @@ def _fitted(material: SceneMaterial, mesh: Mesh, left_out: LeftOut) -> tuple[Sce
             what = "holes of solids by alphaMode MASK, drawn closed (a solid with a hole has no inside)"
             left_out.add(what, material.name)
         surface = dataclasses.replace(surface, alpha_cutoff=0.0)
-    # A metallicFactor alone does not tell, since its default is 1 for glass, too.
+    # A metallicFactor alone decides nothing, since its default is 1 for glass, too.
     metals = surface.roughness_texture if material.translucent and surface.metallic > 0 else None
     if metals is not None and mesh.uv is not None and (metals.sample(mesh.uv)[:, 2] > _METAL).any():
         left_out.add("metal parts of translucent objects", repr(mesh.name))

@@ -2,7 +2,7 @@
 
 Formula of KHR_texture_transform: u' = offset_u + c scale_u u + s scale_v v, v' = offset_v - s scale_u u + c scale_v v,
 with c and s the cosine and sine of the rotation. It is counter-clockwise in the UVs of glTF, whose v points down, as
-the words and the example of the extension have it; its GLSL listing turns the other way, a known mistake.
+the words and the example of the extension have it; its GLSL listing rotates in the opposite direction, a known mistake.
 
 Read are PNG and JPEG, from buffer views, data URIs and files beside; all over TEXCOORD_0. A picture that is missing or
 broken is left out, and the factors of the material stand alone. Not read: mip levels; between texels, values are
@@ -137,7 +137,7 @@ class Textures:
         normal_scale : float
             Of a normal map, by which the normals' x and y are multiplied.
         strength : float
-            Share of the picture, 0 to 1, that is mixed into white.
+            Fraction of the picture, 0 to 1, that is mixed into white.
 
         Raises
         ------

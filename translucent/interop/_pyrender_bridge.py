@@ -1,4 +1,4 @@
-"""Scenes of pyrender and of the toolkit, converted both ways, and opaque objects drawn by pyrender.
+"""Scenes of pyrender and of the toolkit, converted in both directions, and opaque objects drawn by pyrender.
 
 It draws in the context of a renderer, or in one of its own. Import this module by `load_pyrender` only.
 """
@@ -298,7 +298,7 @@ def _camera(scene: Scene, near: float | None) -> Any:
     camera = scene.camera
     closest, far = depth_range(scene.boxes[~scene.filled], camera, scene.diagonal)
     if camera.fov_y is None:
-        # What is behind an orthographic picture is not seen, and what is ahead has the same precision everywhere.
+        # What is behind an orthographic picture is not visible, and what is ahead has the same precision everywhere.
         far = max(far, scene.diagonal)
         return pyrender.OrthographicCamera(1.0, 0.5 * (camera.height or 1.0), znear=1e-6 * far, zfar=far)
     return pyrender.PerspectiveCamera(np.radians(camera.fov_y), znear=near or closest, zfar=far)

@@ -13,7 +13,7 @@ faces it, each its intensity times its color, and `ambient_light` is the radianc
 
 Stock pyrender 0.1.45 needs three fixes on today's NumPy and Python, which `load_pyrender` makes:
 
-- NumPy 2 removed `infty`, which every bounding box of pyrender asks for.
+- NumPy 2 removed `infty`, which every bounding box of pyrender uses.
 - From Python 3.12 on, ctypes references have another type name, which PyOpenGL 3.1.0 does not know: textures and
   depth-only pictures fail.
 - `OffscreenRenderer.delete`, and its garbage collection, end the EGL display, which all contexts of the process share:
@@ -127,7 +127,7 @@ def _address(pointer: Any) -> int | None:
     return ctypes.cast(pointer, ctypes.c_void_p).value
 
 
-#: What pyrender sees first is taken to be this share nearer: it may lie between the pixel centers that were looked at.
+#: What pyrender sees first is taken to be this fraction nearer: it may lie between the pixel centers.
 _NEARER = 0.5
 
 
@@ -222,7 +222,7 @@ def render(
         and arrays are copied. None: shared where that works. ``frame.provenance["opaque"]`` says which, and why.
     flags : int
         `pyrender.RenderFlags` for shadows, culling and wireframes. Media cast colored shadows in any case: what
-        pyrender draws is multiplied by the share of its lights and `ambient_light` that they leave, in pyrender's own
+        pyrender draws is scaled by the fraction of its lights and `ambient_light` that they leave, in pyrender's own
         shadows, too.
 
     Returns

@@ -34,7 +34,7 @@ SIZE, SAMPLES = (240, 180), 1
 #: Triangles from which on a scene is not drawn unasked, and objects that are named.
 MANY_TRIANGLES, MOST_NAMES = 500_000, 6
 
-#: What was shown of a scene, so that it is drawn once.
+#: Views of scenes, so that each is drawn once.
 _SHOWN: WeakKeyDictionary[Scene, Bundle] = WeakKeyDictionary()
 
 
@@ -144,7 +144,7 @@ def view(
     SceneView
         A widget. Its traits are the material of one medium, ``color``, ``distance``, ``ior``, ``roughness`` and
         ``preset``, and ``camera``, a `Camera`: set in Python they are seen in the viewer, and changed there they change
-        in Python (``observe`` tells when). ``medium`` chooses which of ``media`` they are of, and ``scene`` is the
+        in Python (``observe`` reports when). ``medium`` chooses which of ``media`` they are of, and ``scene`` is the
         scene as it is shown, to be rendered.
 
     Raises

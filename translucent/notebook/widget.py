@@ -111,7 +111,7 @@ class SceneView(Widget):  # type: ignore[misc]
                 if name in values:
                     setattr(self, name, values[name])
 
-    # Both ways
+    # Both directions
 
     def _show(self) -> None:
         """Show what `_media` and `_camera` hold in the traits that Python sees."""
@@ -244,7 +244,7 @@ def _changed(body: Object, values: Json) -> Object:
 
 
 def _same(body: Object, values: Json) -> bool:
-    """True if a body has what is shown, so that it need not be made anew."""
+    """True if a body has the shown values, so that it need not be made anew."""
     assert body.medium is not None
     roughness = 0.0 if body.surface is None else body.surface.roughness
     alike = np.allclose(body.medium.extinction, values["extinction"], rtol=1e-12, atol=0)

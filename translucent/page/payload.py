@@ -40,7 +40,7 @@ LIGHT_BITS = 13
 #: Endings of names that meshes have of their files.
 _FILES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 
-#: Indices of refraction from 1 to 3 for which pages know the share of diffuse light that an interface mirrors.
+#: Indices of refraction from 1 to 3 for which pages know the fraction of diffuse light that an interface mirrors.
 MIRROR_STEPS = 65
 
 #: Samplers of textures that hold light.
@@ -113,7 +113,7 @@ def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, e
 def _recorded(
     recorder: FrameRecorder, planned: PagePlan
 ) -> tuple[dict[str, tuple[Scene, RecordedFrame]], dict[str, str]]:
-    """Frames of the scene and of its variants, and which of them each switch setting is shown by."""
+    """Frames of the scene and of its variants, and the frame that each switch setting shows."""
     frames = {"base": (planned.scene, recorder.record(planned.plan))}
     aliases: dict[str, str] = {}
     if all(editable(body) for body in planned.scene.objects):
@@ -130,7 +130,7 @@ def _recorded(
                 frames[key] = rendered, recorder.record(planned.planned(rendered))
                 aliases[key] = key
             except InputError:
-                continue  # a way of drawing that was asked for cannot do it
+                continue  # a requested method cannot draw it
     return frames, aliases
 
 

@@ -105,7 +105,7 @@ def write_page(
     Raises
     ------
     InputError
-        If WebGL2 cannot draw the scene, or not by what was asked for; if the path is no .html file, or nothing can be
+        If WebGL2 cannot draw the scene, or not by what was requested; if the path is no .html file, or nothing can be
         written there.
     """
     file = Path(path)

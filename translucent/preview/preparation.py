@@ -2,7 +2,7 @@
 
 A driver takes up to a second to compile the shaders of a new type of scene, and meanwhile the window would stand still.
 But drivers keep what they have compiled on disk, for all processes (Mesa and NVIDIA do): another process that draws a
-frame of that type first leaves the window almost nothing to do. Blender compiles its shaders in such a way since 4.2.
+frame of that type first leaves the window almost nothing to do. Blender compiles its shaders like this since 4.2.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ SIDES = {True: 64, False: 60}
 #: Largest number of directions of the environment whose shadows are drawn.
 SHADOWS = 16
 
-#: Number of nested boxes that replace a mesh: rays then cross as many layers as methods can tell apart. For a convex
+#: Number of nested boxes that replace a mesh: rays then cross as many layers as methods can separate. For a convex
 #: mesh it is one, since lights go straight on to a convex body, and have to be followed to others.
 BOXES = 4
 
@@ -254,7 +254,7 @@ def _object_like(item: Object) -> Object:
             pictures[field.name] = dataclasses.replace(texture, pixels=pixels)
     if surface is not None:
         surface = dataclasses.replace(surface, **pictures)
-    # A mesh as flat as a ground casts its shadow in another way than boxes.
+    # A mesh as flat as a ground casts its shadow with another method than boxes.
     simple = item.medium is None and len(item.mesh.faces) <= len(Box().tessellate().faces)
     return dataclasses.replace(item, mesh=item.mesh if simple else _boxes(item.mesh), surface=surface)
 

@@ -40,8 +40,8 @@ Factor = TypeVar("Factor", int, float)
 #: each step costs the window a frame.
 OVERDRAWN = 1.5
 
-#: Recent frames, whose quickest tells what the rest of a window takes; seconds of it that cost drawing nothing; and the
-#: least fraction of its budget that drawing keeps.
+#: Recent frames, whose quickest measures the rest of a window; seconds of it that cost drawing nothing; and the least
+#: fraction of its budget that drawing keeps.
 RECENT, FREE, LEAST_SHARE = 16, 0.010, 1.0 / 3.0
 
 #: Fraction of its budget after which a frame that makes what a picture needs leaves the drawing to the next one.

@@ -304,7 +304,7 @@ def material_of(scene: Scene, number: int | None = None) -> Material:
     if medium is None or body.covers:
         absorption = triple_of(Medium.from_color(DEFAULT_COLOR, reach).absorption)
         return Material(color=DEFAULT_COLOR, distance=reach, absorption=absorption, thickness=thickness)
-    # Where the showcase states it; if that is too dark or too bright to tell, where 1/e is left.
+    # Where the showcase states it; if that is too dark or too bright, where 1/e is left.
     near = reach if (medium.transmittance(reach) > 1e-3).all() else None
     color, distance = color_at(medium, near)
     return Material(

@@ -83,7 +83,7 @@ class Task:
                 self.result = self.work(self)
         except CancelledError:
             pass
-        except Exception as error:  # noqa: BLE001 - whatever it is, the window tells it and stays
+        except Exception as error:  # noqa: BLE001 - whatever it is, the window reports it and stays
             self.error = error
         finally:
             self.finished = True

@@ -44,7 +44,7 @@ from translucent.scene.texture import Texture
 if TYPE_CHECKING:
     from translucent.renderer import Renderer
 
-#: Seconds between checks whether the result is still wanted.
+#: Seconds between checks whether the result is still requested.
 PATIENCE = 0.1
 
 #: Policy of a scheduler that has others run at once when they want to, so that the window comes first. Before a frame

@@ -67,7 +67,7 @@ class Body:
         Directions of view rays; `cosines` (m,) are theirs with the surface where they enter, `seen_stated` (m,) is the
         thickness stated there, `chords` (m,) all that they cross.
     escaped : float
-        Share of rays that found no exit.
+        Fraction of rays that found no exit.
     texture_problem : str
         Why the thickness texture could not be read, if so.
     """

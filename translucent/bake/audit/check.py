@@ -1,6 +1,6 @@
 """Audit of a glTF file: every material that light passes, every body that it fills; and the repair of what it finds.
 
-Repaired is what can be told from the file. Baked, into a material of its own, is each primitive whose thickness is
+Repaired is what the file alone determines. Baked, into a material of its own, is each primitive whose thickness is
 wrong; metallicFactor of what transmits becomes 0, and doubleSided of volumes goes. Everything else stays as it is: what
 the file holds keeps its bytes and its index, and new images are put behind. Holes, windings, units and attenuations are
 not touched: only who made the file knows what was meant.
@@ -125,7 +125,7 @@ def _bodies(file: GltfFile) -> list[Body]:
         if index is None or not materials[index].transmits or not placed[key[0]]:
             continue
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", TranslucentWarning)  # of faces that are turned, which findings tell
+            warnings.simplefilter("ignore", TranslucentWarning)  # findings report faces that are turned
             body = measure_body(file, bodies, key, materials[index], tuple(placed[key[0]]))
         if body is not None:
             found.append(body)

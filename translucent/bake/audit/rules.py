@@ -49,19 +49,19 @@ LARGEST_IOR = 3.0
 #: Smallest reported error of a length as viewers scale it.
 SCALE_ERROR = 0.05
 
-#: Share of rays without an exit from which on a hole is an error.
+#: Fraction of rays without an exit from which on a hole is an error.
 LEAKS = 0.02
 
 #: Points of each of two bodies whose boxes overlap, and the most winding numbers, times triangles, to work out.
 POINTS, MOST_WORK = 48, 5e7
 
-#: Winding numbers between these are those of points on a surface; shares of points that make bodies cross.
+#: Winding numbers between these are those of points on a surface; fractions of points inside that make bodies cross.
 ON_SURFACE, CROSSING = (0.2, 0.8), 0.05
 
 #: Ratios of stated to true thickness from which on it is a warning, and an error.
 SUSPECT, WRONG = 1.5, 3.0
 
-#: A wall is this share of the smallest side of the body at most; the thickness of the body is within this factor of it.
+#: Largest wall, as a fraction of the body's smallest side; the thickness of the body is within this factor of it.
 WALL_SHARE, OF_THE_BODY = 0.3, 2.0
 
 #: Rank correlation below which a map is dark where the body is thick, and the least spread that has a meaning.
@@ -325,7 +325,7 @@ def _pair(one: Body, at: Placement, other: Body, there: Placement) -> Iterator[M
 
 
 def _inside(body: Body, at: Placement, other: Body, there: Placement) -> float:
-    """Share of a body's surface that lies inside another, of the part that is not on its surface."""
+    """Fraction of a body's surface that lies inside another, of the part that is not on its surface."""
     step = max(1, len(body.points) // POINTS)
     world = body.points[::step] @ at.matrix[:3, :3].T + at.matrix[:3, 3]
     local = np.linalg.solve(there.matrix[:3, :3], (world - there.matrix[:3, 3]).T).T
