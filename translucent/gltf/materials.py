@@ -316,7 +316,7 @@ def _film_thickness(film: JsonFields) -> float:
 def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -> GltfMaterial:
     name = str(entry.get("name", ""))
     problems: list[str] = []
-    told: list[str] = []
+    notes: list[str] = []
     fields = JsonFields(file, f"material {index} {name!r}", entry, problems)
     stated = fields.section("extensions")
     extensions = stated.values
@@ -338,7 +338,7 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
     found = GltfMaterial(
         index=index,
         name=name,
-        transmission=(share := transmission.number("transmissionFactor", 0.0, 0.0, 1.0)),
+        transmission=(fraction := transmission.number("transmissionFactor", 0.0, 0.0, 1.0)),
         ior=index_of_refraction,
         thickness=volume.number("thicknessFactor", 0.0, 0.0),
         attenuation_color=volume.numbers("attenuationColor", (1.0, 1.0, 1.0), 0.0, 1.0),
@@ -352,13 +352,13 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
         emissive=(scale * red, scale * green, scale * blue),
         thickness_texture=texture,
         thickness_transform=transform,
-        scatter=read_draft(stated, told) if draft_extensions else None,
+        scatter=read_draft(stated, notes) if draft_extensions else None,
         has_volume=VOLUME in extensions,
-        transmits=share > 0 or _lets_light_in(extensions),
+        transmits=fraction > 0 or _lets_light_in(extensions),
     )
     if problems:
         raise file.refused(f"{fields.where}: {', '.join(problems)}", "mend the file")
-    return GltfMaterial(**{**vars(found), "warnings": (*_warnings(found, entry, extensions, volume.values), *told)})
+    return GltfMaterial(**{**vars(found), "warnings": (*_warnings(found, entry, extensions, volume.values), *notes)})
 
 
 def _thickness_texture(volume: JsonFields, count: int) -> tuple[int | None, TextureTransform]:

@@ -78,8 +78,8 @@ def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: floa
         If the target is unknown, the distance is not positive and finite, the color is not that of the medium, or the
         roughness is outside its range.
     """
-    wanted = TARGETS.get(target.lower().replace("-", "_").replace(" ", "_").replace(".", ""))
-    if wanted is None:
+    writer = TARGETS.get(target.lower().replace("-", "_").replace(" ", "_").replace(".", ""))
+    if writer is None:
         raise InputError(f"target {target!r}", "not a known target", f"use one of {', '.join(TARGETS)}")
     if not 0 < distance < np.inf:
         raise InputError(f"distance {distance!r}", "not above 0 and finite", "give it in metres, for example 0.02")
@@ -92,7 +92,7 @@ def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: floa
             f"the medium has {tuple(own.round(4).tolist())} there",
             "give medium.transmittance(distance)",
         )
-    return wanted.write(medium, float(distance), float(roughness)).rstrip("\n")
+    return writer.write(medium, float(distance), float(roughness)).rstrip("\n")
 
 
 @checked

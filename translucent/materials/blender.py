@@ -57,8 +57,8 @@ def principled_node(medium: Medium) -> tuple[Array, Array, float]:
     scattering, absorption = np.asarray(medium.scattering), np.asarray(medium.absorption)
     left = density - scattering
     # A channel that scatters all that it takes has no absorption, whatever its absorption color.
-    share = np.where(left > 0, absorption / np.where(left > 0, left, 1.0), 0.0)
-    return scattering / density, (1.0 - np.minimum(share, 1.0)) ** 2, density
+    fraction = np.where(left > 0, absorption / np.where(left > 0, left, 1.0), 0.0)
+    return scattering / density, (1.0 - np.minimum(fraction, 1.0)) ** 2, density
 
 
 def from_principled_node(

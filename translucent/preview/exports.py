@@ -173,8 +173,8 @@ def painted(body: Object, baked: ThicknessMap) -> Scene:
     colors[~np.asarray(baked.coverage, dtype=bool)] = EMPTY
     texture = Texture(srgb_to_linear(colors / 255.0).astype(np.float32))
     surface = Surface(transmission=0.0, roughness=1.0, color_texture=texture)
-    shown = dataclasses.replace(body, medium=Medium(absorption=1.0), surface=surface, sheet_thickness=None)
-    return Scene([shown], camera_of(Orbit()), environment=Environment.constant((1.0, 1.0, 1.0)))
+    colored = dataclasses.replace(body, medium=Medium(absorption=1.0), surface=surface, sheet_thickness=None)
+    return Scene([colored], camera_of(Orbit()), environment=Environment.constant((1.0, 1.0, 1.0)))
 
 
 @dataclass(frozen=True)
@@ -293,8 +293,8 @@ def python_code(recipe: Recipe) -> str:
     elif own:
         lines += [f"scene = dataclasses.replace(scene, environment={own})"]
     if hidden := [i for i in document.hidden if i < count]:
-        shown = f"[item for i, item in enumerate(scene.objects) if i not in {hidden}]"
-        lines += [f"scene = dataclasses.replace(scene, objects={shown})"]
+        visible = f"[item for i, item in enumerate(scene.objects) if i not in {hidden}]"
+        lines += [f"scene = dataclasses.replace(scene, objects={visible})"]
     if look.light:
         towards = _numbers(-direction_from(look.light_yaw, look.light_pitch), ", ")
         light = f"tl.DirectionalLight(({towards}), {look.light_irradiance:.12g})"

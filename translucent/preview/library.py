@@ -257,11 +257,11 @@ def draw_panorama(name: str) -> Picture:
         return np.rint(255.0 * np.clip(linear_to_srgb(tone_curve(STAGED_TONE)(light)), 0.0, 1.0)).astype(np.uint8)
 
 
-def model_picture(seen: Picture) -> Picture:
+def model_picture(picture: Picture) -> Picture:
     """Small picture of a view, from its middle."""
     from PIL import Image, ImageOps
 
-    return np.asarray(ImageOps.fit(Image.fromarray(seen), MODEL, Image.Resampling.BOX))
+    return np.asarray(ImageOps.fit(Image.fromarray(picture), MODEL, Image.Resampling.BOX))
 
 
 class ThumbnailCache:

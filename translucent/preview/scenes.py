@@ -265,7 +265,7 @@ def _environment(name: str, background: str, rotation: float, default: Environme
     return lit.with_background(environment_of(background)) if background else lit
 
 
-def _shown_from(loaded: Loaded, name: str) -> Camera:
+def _stage_camera(loaded: Loaded, name: str) -> Camera:
     """Camera that a stage faces: the model's own, or the one that frames it there."""
     scene = loaded.scene
     return scene.camera if loaded.has_camera else framing(scene.objects, (16, 9), stage=stage_named(name))
@@ -274,25 +274,25 @@ def _shown_from(loaded: Loaded, name: str) -> Camera:
 @lru_cache(maxsize=2)
 def _standing(loaded: Loaded, name: str, environment: str, background: str, rotation: float) -> Scene:
     """Loaded scene on a stage; cached, as the ground, the lights and the environment stay while the camera moves."""
-    posed = dataclasses.replace(loaded.scene, camera=_shown_from(loaded, name))
-    return staged(posed, name, _own_environment(environment, background, rotation), rotation)
+    rendered = dataclasses.replace(loaded.scene, camera=_stage_camera(loaded, name))
+    return staged(rendered, name, _own_environment(environment, background, rotation), rotation)
 
 
 def turn_from(document: Document, loaded: Loaded, camera: Camera) -> float:
     """Degrees by which the stage is turned about +Y from where `staged` puts it for a camera."""
-    from_, to = (view_axes(one)[2] for one in (camera, _shown_from(loaded, stage_name(document.look, loaded))))
+    from_, to = (view_axes(one)[2] for one in (camera, _stage_camera(loaded, stage_name(document.look, loaded))))
     turn = math.degrees(math.atan2(to[0], to[2]) - math.atan2(from_[0], from_[2]))
     return math.remainder(turn + document.look.rotation, 360.0)
 
 
 def first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
     """First orbit of a model: of the file's own camera, or from the view of ``translucent render``, framed as by F."""
-    scene, posed = loaded.scene, None
+    scene, rendered = loaded.scene, None
     if loaded.has_camera:
         return orbit_of(scene.camera, scene.bounds.mean(axis=0))
     if stage != NO_STAGE:
-        posed = orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
-    return framed(posed, scene.objects, size)
+        rendered = orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
+    return framed(rendered, scene.objects, size)
 
 
 def material_of(scene: Scene, number: int | None = None) -> Material:

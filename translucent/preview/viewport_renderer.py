@@ -179,11 +179,11 @@ class ViewportRenderer:
                 return True
             self._left -= min(spent, self.preparing * self._left)
         request = self.quality.request
-        wanted = (scene, request, second, self.viewport.size, self.renderer)
-        if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
+        target = (scene, request, second, self.viewport.size, self.renderer)
+        if self._compiler is not None and self._compiler.lane.task is not None and target == self._postponed:
             self.idle = True
             return True
-        fresh = wanted != self._rendered
+        fresh = target != self._rendered
         stopped = (fresh or not display.converges) and self.paths.stop()
         stopped |= (fresh or not display.follows_photons) and self.photons.stop(self.viewport)
         if not fresh and not stopped:
@@ -192,13 +192,13 @@ class ViewportRenderer:
         else:  # or the interactive picture is drawn again
             plan = partial(self.renderer.plan_requested, scene)
             self.plans = [plan(request), plan(replace(request, method=second)) if both else None]
-            self._rendered = wanted
+            self._rendered = target
             self.viewport.restart()
             self.presenter.truth = None
             self._strides.begin(self.plans, self._left)
             self._moving, self.simpler = None, ""
             if self._compiler is not None and self._compiler.budget.postpones and unsmoothed(self._drawn_plans):
-                self._postpone(workspace, wanted)
+                self._postpone(workspace, target)
                 return True
             if display.mode == "picture" and display.compare == "off":
                 return self._draw_at_once(scene, workspace)
@@ -271,8 +271,8 @@ class ViewportRenderer:
         expected = 0.0 if self.plans[0] is None else self._times.known(self.plans[0])
         request = replace(self.quality.request, interfaces=None)
         if not photons.ready(workspace, scene, self.renderer, self.viewport, request, self._left, expected):
-            if (shown := photons.show_media(self.viewport)) is not None:
-                self.plans[0], strides[0] = shown, self._times.stride(shown, self._left)
+            if (media_plan := photons.show_media(self.viewport)) is not None:
+                self.plans[0], strides[0] = media_plan, self._times.stride(media_plan, self._left)
             return False, False
         if not photons.drawing or photons.plan is None or photons.light is None:
             return True, False

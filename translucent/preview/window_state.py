@@ -139,8 +139,8 @@ class WindowState:
             return
         self._pictured = path
         with self.view.current():
-            seen = self.view.viewport.pixels()
-        self.work.thumbnails.put(model_key(path), model_picture(seen))
+            pixels = self.view.viewport.pixels()
+        self.work.thumbnails.put(model_key(path), model_picture(pixels))
 
     def texture(self, key: str, pixels: Any) -> Any:
         """Texture of a small picture."""
@@ -248,10 +248,10 @@ class WindowState:
         if scene is None:
             return
 
-        shown = self.work.document.shown_among(len(self.objects))  # before the ground of a stage
+        visible = self.work.document.shown_among(len(self.objects))  # before the ground of a stage
 
         def take(found: int | None) -> None:
-            then(shown[found] if found is not None and found < len(shown) else None)
+            then(visible[found] if found is not None and found < len(visible) else None)
 
         pixel = pixel_at(position, size)
         if self.work.loaded is not None and self.work.loaded.triangles <= PICKED_AT_ONCE:
@@ -389,12 +389,12 @@ class WindowState:
         if scene is None:
             return
         look = document.look.exposure, tone_of(document.look, scene)
-        shown, request = (scene, self.view.viewport.size, look), request_of(document, self._caustics(scene))
+        view, request = (scene, self.view.viewport.size, look), request_of(document, self._caustics(scene))
         if kind == "turntable":
-            self.work.export(path, write_turntable, *shown, request, self.export["pictures"])
+            self.work.export(path, write_turntable, *view, request, self.export["pictures"])
         else:
             request = replace(request, transparent=bool(self.export["transparent"]))
-            self.work.export(path, write_picture, *shown, request)
+            self.work.export(path, write_picture, *view, request)
 
     def copy_recipe(self, kind: str) -> str | None:
         """Copy a ``command``, or ``python``, that makes the picture from here; None before there is one."""

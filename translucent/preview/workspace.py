@@ -178,8 +178,8 @@ class Workspace:
         """Frame the whole model, or one of its objects, from the side of the camera."""
         if self.loaded is not None:
             objects = self.loaded.scene.objects
-            shown = [objects[i] for i in self.document.shown_among(len(objects))]
-            chosen = [objects[number]] if number is not None and number < len(objects) else shown
+            visible = [objects[i] for i in self.document.shown_among(len(objects))]
+            chosen = [objects[number]] if number is not None and number < len(objects) else visible
             self.do(SetOrbit(framed(self.document.orbit, chosen, self.size)))
 
     def update(self) -> None:
@@ -287,13 +287,13 @@ class Workspace:
         self, scene: Scene, method: Method | None, size: tuple[int, int], levels: tuple[int, ...] | None
     ) -> None:
         """Draw the reference of the whole picture in the background; `truth` is the finest that is there."""
-        seen, divisors = reference_plan(scene, levels)
+        rendered, divisors = reference_plan(scene, levels)
 
         def work(task: Task) -> None:
             for number, level in enumerate(divisors):
                 task.report(number / len(divisors), f"at 1/{level}")
                 small = max(size[0] // level, 1), max(size[1] // level, 1)
-                frame = self.pool.call(task, reference_frame, seen, method, small, urgency=Urgency.LATER)
+                frame = self.pool.call(task, reference_frame, rendered, method, small, urgency=Urgency.LATER)
                 self.truth = ReferencePicture(scene, method, frame, level, straight=levels is not None)
 
         self.lanes["truth"].start("float64 reference", work)
@@ -404,8 +404,8 @@ class Workspace:
             return
         if not self.document.shown_among(len(self.loaded.scene.objects)):
             self.tell("warning", "all objects of the model were hidden: they are shown")
-            shown = dataclasses.replace(self.document, hidden=())
-            self.history = dataclasses.replace(self.history, present=shown)
+            visible = dataclasses.replace(self.document, hidden=())
+            self.history = dataclasses.replace(self.history, present=visible)
         present = self.document
         own = own_material(self._lighting.lit(present, self.loaded).look, self.loaded)
         if present.material.source == "file" and present.material != own:

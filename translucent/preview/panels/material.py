@@ -183,9 +183,9 @@ def _swatches(state: WindowState, material: Material) -> None:
 
 def _curves(state: WindowState, material: Material) -> None:
     """Draw transmittance over thickness, with bars for the thickness of the model."""
-    seen, unit = None if state.work.measured is None else state.work.measured.seen, state.get("display.unit")
+    statistics, unit = None if state.work.measured is None else state.work.measured.seen, state.get("display.unit")
     scale, medium = metres_per_unit(unit), medium_of(material)
-    distances = np.linspace(0.0, 3.0 * material.distance if seen is None else float(seen.edges[-1]), 64)
+    distances = np.linspace(0.0, 3.0 * material.distance if statistics is None else float(statistics.edges[-1]), 64)
     curves = medium.transmittance(distances)
     quiet = implot.AxisFlags_.no_menus | implot.AxisFlags_.no_highlight
     plain = implot.Flags_.no_menus | implot.Flags_.no_inputs | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text
@@ -193,26 +193,26 @@ def _curves(state: WindowState, material: Material) -> None:
         return
     implot.setup_axes(f"thickness, {unit}", "transmittance", quiet, quiet)
     implot.setup_axes_limits(0.0, distances[-1] / scale, 0.0, 1.05, implot.Cond_.always)
-    if seen is not None and seen.pixels:
-        centers = np.ascontiguousarray((seen.edges[:-1] + seen.edges[1:]) / 2 / scale)
+    if statistics is not None and statistics.pixels:
+        centers = np.ascontiguousarray((statistics.edges[:-1] + statistics.edges[1:]) / 2 / scale)
         spec = implot.Spec()
         spec.fill_color = spec.line_color = imgui.ImVec4(*BARS)
         width = float(centers[1] - centers[0])
-        implot.plot_bars("how much of the model is so thick", centers, seen.counts, width, spec)
+        implot.plot_bars("how much of the model is so thick", centers, statistics.counts, width, spec)
     for channel, name in enumerate(("red", "green", "blue")):
         spec = implot.Spec()
         spec.line_color, spec.line_weight = imgui.ImVec4(*CURVES[channel]), 2.0
         implot.plot_line(name, distances / scale, np.ascontiguousarray(curves[:, channel]), spec)
     implot.end_plot()
-    if seen is not None and seen.thickness.size:
-        median, average = length_text(float(np.median(seen.thickness)), unit), _average_hex(seen, material)
+    if statistics is not None and statistics.thickness.size:
+        median, average = length_text(float(np.median(statistics.thickness)), unit), _average_hex(statistics, material)
         ui.wrapped(f"bars: thickness of the model, median {median}; on average it shows {average}", ui.FAINT)
 
 
 @lru_cache(maxsize=1)
-def _average_hex(seen: ThicknessStatistics, material: Material) -> str:
+def _average_hex(statistics: ThicknessStatistics, material: Material) -> str:
     """Average color of the model."""
-    return to_hex(average_color(seen.thickness, medium_of(material)))
+    return to_hex(average_color(statistics.thickness, medium_of(material)))
 
 
 def _copies(state: WindowState, material: Material) -> None:
@@ -328,9 +328,9 @@ def swatches(material: Material) -> list[tuple[float, str]]:
 def scene_panel(state: WindowState) -> None:
     """Draw the panel that lists the objects of the model, to show, hide and select them."""
     count = len(state.objects)
-    shown = len(state.work.document.shown_among(count))
-    ui.wrapped(f"{shown} of {count} objects are on show. Drop a preset of the Library on one.", ui.FAINT)
-    imgui.begin_disabled(shown == count)
+    visible = len(state.work.document.shown_among(count))
+    ui.wrapped(f"{visible} of {count} objects are on show. Drop a preset of the Library on one.", ui.FAINT)
+    imgui.begin_disabled(visible == count)
     if imgui.button("Show all"):
         state.work.do(Hide(()))
     imgui.end_disabled()
