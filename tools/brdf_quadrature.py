@@ -1,4 +1,4 @@
-"""Quadrature of the reflectance of rough interfaces, of which `translucent.formulas.brdf_table` stores a table."""
+"""Quadrature of the reflectance of rough interfaces; `translucent.formulas.brdf_table` stores its results."""
 
 from __future__ import annotations
 

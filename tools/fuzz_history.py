@@ -177,7 +177,7 @@ def draw(renderer: tl.Renderer, scene: tl.Scene, options: Options) -> tl.Frame |
 
 
 def difference(one: tl.Frame | str, other: tl.Frame | str) -> tuple[str, float]:
-    """What differs between two frames, nothing if they are alike; and by how much of the largest value at most."""
+    """Text on the differences of two frames, empty if none, and the largest as a fraction of the largest value."""
     if isinstance(one, str) or isinstance(other, str):
         return ("", 0.0) if one == other else (f"{one} | {other}", np.inf)
     if str(one.plan) != str(other.plan):

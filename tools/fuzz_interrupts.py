@@ -50,7 +50,7 @@ def scene() -> tl.Scene:
 
 
 def made_by(kind: str) -> Callable[[], bytes]:
-    """What makes bytes in Python; each time from nothing but a renderer that lives on."""
+    """Function that makes bytes in Python anew at each call; only its renderer lives on."""
     if kind == "notebook":
         return made_by_cell("scene()")
     renderer, mesh = tl.Renderer(), tl.load_mesh(mesh_path("bear"), unit="m")
@@ -68,7 +68,7 @@ def made_by(kind: str) -> Callable[[], bytes]:
 
 
 def made_by_cell(code: str) -> Callable[[], bytes]:
-    """What a cell of a notebook shows."""
+    """Function that runs a notebook cell and returns what it shows."""
     from IPython.core.interactiveshell import InteractiveShell
     from traitlets.config import Config
 

@@ -74,5 +74,5 @@ def plan_over_backdrop(
 
 
 def many_times(found: RenderPlan) -> bool:
-    """Whether a plan shows light that is scattered many times."""
+    """True if a plan shows multiple scattering."""
     return bool(found.treated(Treatment.LAYER, Treatment.DIFFUSION, Treatment.VOLUME))

@@ -144,7 +144,7 @@ def test_each_body_has_its_own_way() -> None:
 
 
 def test_two_media_of_one_extinction_are_told_apart() -> None:
-    """In which light diffuses: what rays see of both is the same."""
+    """Bodies in which light diffuses: rays see the same of both."""
     bright, dark = tl.Medium(0.1, 5.0, ior=1.4), tl.Medium(1.1, 4.0, ior=1.4)
     plans = [plan(scene(body(medium))) for medium in (bright, dark)]
     assert plans[0].scene.objects[0].medium == plans[1].scene.objects[0].medium

@@ -291,7 +291,7 @@ class _PhotonTracer:
         return photons, straight, lands
 
     def _sampled(self, at: Interaction, alpha: Array, power: Array) -> tuple[Mask, Array, Array]:
-        """Whether photons are transmitted (k,), factors (k, 3) of their power, and their directions (k, 3)."""
+        """Mask (k,) of photons that are transmitted, factors (k, 3) on their power, and directions (k, 3)."""
         facets = at.normal.copy()
         rough = np.flatnonzero((alpha > 0.0) & ~at.thin_walled & (at.ior != 1.0))
         if rough.size:

@@ -172,7 +172,7 @@ def _with_point_lights(scene: Scene, rendered: Scene) -> tuple[Scene, tuple[Note
 
 
 def _treatments(scene: Scene, request: RenderRequest, machine: Capabilities) -> Treatments:
-    """How bodies show light that they scatter many times."""
+    """Choose the treatment of multiple scattering for each body."""
     method, scattering = request.method, request.scattering
     # Where nothing bends, a method that is requested is the sum that is requested, of light scattered once; and ambient
     # light represents what is scattered often.

@@ -151,7 +151,7 @@ class RenderPlan:
 
     @property
     def multiple_scattering(self) -> str:
-        """How light that is scattered many times is shown, and in how many bodies; empty if it is not."""
+        """Text on the models of multiple scattering and the number of bodies of each; empty without any."""
         modes = (
             (Treatment.DIFFUSION, f"diffuses ({self.diffusion})"),
             (Treatment.VOLUME, f"is scattered on ({self.diffusion})"),

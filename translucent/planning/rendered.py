@@ -20,7 +20,7 @@ _BLACK = Environment.constant((0.0, 0.0, 0.0))
 
 
 class Treatment(Enum):
-    """How a plan shows light that a body scatters."""
+    """Model of scattered light that a plan uses for a body."""
 
     #: What is scattered once into a ray; what is scattered again is lost. Also of what does not scatter.
     SINGLE = "single scattering"

@@ -1,4 +1,4 @@
-"""What is requested of a picture, as one value from whoever asks to the planner and the renderer."""
+"""Request for a picture: one value that callers hand to the planner and the renderer."""
 
 from __future__ import annotations
 
