@@ -14,7 +14,7 @@ from translucent.arrays import Array
 from translucent.diffusion import cache
 from translucent.diffusion.entering import flux_of
 from translucent.diffusion.grid import body_grid
-from translucent.diffusion.photons import FineCells, photons_in_media
+from translucent.diffusion.photons import FineCells, photon_segments, photons_in_media
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning import caustics
 from translucent.planning.plan import plan
@@ -101,6 +101,40 @@ def test_no_light_is_lost() -> None:
     cells = FineCells(np.full(3, -4.0), 0.2, (40, 40, 40), 1)
     taken = 4.0 * fluence(one, cells).sum() * 0.2**3
     assert taken / (4.0 * np.pi) == pytest.approx(1.0, abs=5e-3)
+
+
+def covered_by_cube(points: Array) -> Array:
+    """Fraction (n,) of all directions that a cube from -1 to 1 covers as seen from points (n, 3) outside."""
+    found = np.zeros(len(points))
+    for axis, side in ((axis, side) for axis in range(3) for side in (-1.0, 1.0)):
+        high = np.maximum(side * points[:, axis] - 1.0, 0.0)
+        for i, j in ((i, j) for i in (-1.0, 1.0) for j in (-1.0, 1.0)):
+            u, v = i - points[:, axis - 1], j - points[:, axis - 2]
+            angle = np.arctan2(u * v, high * np.sqrt(u * u + v * v + high * high))
+            found += np.where(high > 0.0, i * j * angle, 0.0) / (4.0 * np.pi)
+    return found
+
+
+@pytest.mark.parametrize("radius", [0.2, 1.5])
+def test_a_sphere_of_light_shines_its_power_onto_a_cube(radius: float) -> None:
+    """Of each point of the sphere, the fraction of all directions that the cube covers as seen from there.
+
+    The sphere looks like an even disc from everywhere: its light has a density of 1 / sqrt(1 - r^2) over its radius r.
+    """
+    cube = tl.Object(Box().tessellate(), tl.Medium(ior=1.5), transform=np.diag([2.0, 2.0, 2.0, 1.0]))
+    lamps = tl.SphereLight((0, 3, 0), 1.0, radius).points(4)
+    parts = photon_segments(tl.Scene([cube], CAMERA, lamps), 16 * PHOTONS, 1)
+    arriving = np.concatenate([part.power[~part.bent, 0] for part in parts])
+    angle, number = np.meshgrid((np.arange(40) + 0.5) / 40 * np.pi / 2, np.arange(400))
+    up, turn = (number + 0.5) / 200 - 1.0, np.pi * (1.0 + np.sqrt(5.0)) * number
+    across = np.sqrt(1.0 - up**2)
+    directions = np.stack([across * np.cos(turn), up, across * np.sin(turn)], axis=-1)
+    points = np.array([0.0, 3.0, 0.0]) + radius * np.sin(angle)[..., None] * directions
+    fractions = covered_by_cube(points.reshape(-1, 3))
+    expected = 4.0 * np.pi * np.average(fractions, weights=np.sin(angle).ravel() ** 2)
+    noise = float(np.sqrt(np.square(arriving).sum()))
+    assert noise < 0.01 * expected
+    assert abs(arriving.sum() - expected) < 3.0 * noise
 
 
 def test_media_that_overlap_take_their_shares() -> None:

@@ -335,14 +335,16 @@ def _visible_bounds(clouds: list[Array], middle: Array, at: Array, away: float, 
     """
     axis, across, found = (middle - at) / away, _across((middle - at) / away), []
     for corners in clouds:
-        ahead = (corners - at) @ axis
-        if not (ahead > 0.0).all():
+        ahead = ((corners - at) @ axis)[:, None]
+        if not (ahead > radius).all():
             return None
-        tangents = (corners - at) @ across.T / ahead[:, None]
-        if float(np.abs(tangents).max()) > _WIDEST:
+        aside = (corners - at) @ across.T
+        # Slopes of the lines from a corner that touch the ball, in the plane of the axis and each vector across it.
+        angle, spread = np.arctan2(aside, ahead), np.arcsin(radius / np.hypot(ahead, aside))
+        slopes = np.tan(np.stack([angle - spread, angle + spread]))
+        if (np.abs(angle) + spread > np.arctan(_WIDEST)).any():
             return None
-        aside = radius * float(np.abs(1.0 - away / ahead).max())
-        found.append(_bounds(tangents * away) + aside * np.array([[-1.0], [1.0]]))
+        found.append(_bounds((aside + (away - ahead) * slopes).reshape(-1, 2)))
     return found
 
 
