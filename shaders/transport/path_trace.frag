@@ -23,6 +23,7 @@
 #include "transport/hierarchy.glsl"
 #include "transport/interior_list.glsl"
 #include "transport/surface_hit.glsl"
+#include "transport/textured_hit.glsl"
 #include "transport/interaction.glsl"
 #include "transport/microfacets.glsl"
 #include "transport/sampled_branch.glsl"
@@ -331,7 +332,7 @@ void follow(inout Path path, vec2 pixel, ivec2 texel, inout Draws draws) {
     }
     bool sound = true;
     SurfaceHit surface = surface_hit(path.origin, path.direction, path.interior, 0.0, hit, before, CHANNEL, sound);
-    ObjectRow body = traced_body(surface.object);
+    ObjectRow body = body_at(surface.object, surface.triangle, surface.weights, 0.0);
     path.lost = !sound && (all_closed == 0 || is_full(path.interior));
     path.light += path.throughput * surface.emitted;
     path.throughput *= surface.transmittance;

@@ -13,6 +13,7 @@
 #include "transport/hierarchy.glsl"
 #include "transport/interior_list.glsl"
 #include "transport/surface_hit.glsl"
+#include "transport/textured_hit.glsl"
 #include "transport/interaction.glsl"
 #include "transport/microfacets.glsl"
 #include "transport/sampled_branch.glsl"
@@ -111,7 +112,7 @@ bool follow(inout Photon photon, vec3 power, int channel, inout Draws draws) {
     bool sound = true;
     SurfaceHit surface = surface_hit(photon.origin, photon.direction, photon.interior, 0.0, hit, before, channel, sound);
     if (!sound && (all_closed == 0 || is_full(surface.interior))) { return false; }
-    ObjectRow body = traced_body(surface.object);
+    ObjectRow body = body_at(surface.object, surface.triangle, surface.weights, 0.0);
     photon.throughput *= surface.transmittance;
     if (photon.throughput == vec3(0.0)) { return false; }
     if (int(body.type) == TYPE_OPAQUE && (surface.outside || body.one_sided == 0.0)) {

@@ -1,5 +1,6 @@
 // Light of the scene's lights that comes straight to a place: through media, and interfaces that bend nothing. No path finds
-// what polished interfaces bend of it. Needs shade/lights.glsl, <Surfaces>, <View>, surface_hit.glsl and what that needs.
+// what polished interfaces bend of it. Needs shade/lights.glsl, <Surfaces>, <View>, surface_hit.glsl and what that needs,
+// and textured_hit.glsl.
 
 // Transmittance of the straight path to a light. skipped: metres between the place and the origin, which lies beside a
 // surface that is not to be hit.
@@ -17,7 +18,7 @@ vec3 straight_transmittance(vec3 origin, float skipped, uvec4 interior, vec3 tow
         if (passed == vec3(0.0)) { return passed; }
         bool sound = true;
         SurfaceHit found = surface_hit(origin, towards, interior, 0.0, hit, before, channel, sound);
-        ObjectRow body = traced_body(found.object);
+        ObjectRow body = body_at(found.object, found.triangle, found.weights, 0.0);
         int type = int(body.type);
         passed *= found.transmittance;
         if (type == TYPE_OPAQUE && (found.outside || body.one_sided == 0.0)) { return vec3(0.0); }

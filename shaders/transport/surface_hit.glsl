@@ -38,6 +38,8 @@ vec3 base_color(ObjectRow body, vec3 point) {
 struct SurfaceHit {
     int object;          // whose interface it is: of the solid that is entered, else of that left, else of a thin wall; or opaque
     bool outside;        // its outer side is hit
+    int triangle;
+    vec2 weights;        // of its second and third corner
     vec3 smooth_normal;  // towards the ray, as is face_normal
     vec3 face_normal;
     uvec4 interior;      // list beyond
@@ -105,7 +107,7 @@ Hit first_hit(vec3 origin, vec3 direction, float start, float end) {
 // All surfaces where a ray has hit the first. A thin wall that lies on the interface of a solid only absorbs. first: the hit, or
 // that of `first_hit` from `start` on, which it is then found for; of no object where there is none.
 SurfaceHit surface_hit(vec3 origin, vec3 direction, uvec4 interior, float start, inout Hit first, int before, int channel, inout bool sound) {
-    SurfaceHit found = SurfaceHit(AIR, false, vec3(0.0), vec3(0.0), interior, 0.0, vec3(1.0), vec3(0.0));
+    SurfaceHit found = SurfaceHit(AIR, false, 0, vec2(0.0), vec3(0.0), vec3(0.0), interior, 0.0, vec3(1.0), vec3(0.0));
     Hit hit = first;
     float end = first.path;
     int rank = -1;  // of what decides: 0 a thin wall, 1 a solid, 2 what is opaque
@@ -145,6 +147,8 @@ SurfaceHit surface_hit(vec3 origin, vec3 direction, uvec4 interior, float start,
         if (decides) {
             found.object = hit.object;
             found.outside = outside;
+            found.triangle = hit.triangle;
+            found.weights = hit.weights;
             found.smooth_normal = smooth_normal;
             found.face_normal = face_normal;
         }

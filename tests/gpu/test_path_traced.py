@@ -13,6 +13,7 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
+from tests.textured import TEXTURED
 from translucent import assets
 from translucent.formulas.interface import slab_reflectance, slab_transmittance
 from translucent.geometry.solids import Box, Sphere
@@ -85,6 +86,7 @@ SCENES = {
         ),
         60,
     ),
+    **{name: (scene, 120) for name, scene in TEXTURED.items()},
 }
 
 

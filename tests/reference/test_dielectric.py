@@ -229,9 +229,9 @@ def test_what_cannot_be_followed_is_refused() -> None:
         render(scene, (1, 1), paths=1)
     mesh = slab(-0.5, 0.5)
     with_uv = Mesh(mesh.vertices, mesh.faces, uv=np.zeros((len(mesh.vertices), 2)))
-    textured = Surface(color_texture=Texture(np.ones((2, 2, 3))))
-    picture = Scene([Object(with_uv, Medium(ior=1.5), surface=textured)], camera)
-    with pytest.raises(InputError, match="textures"):
+    mapped = Surface(normal_texture=Texture(np.ones((2, 2, 3))))
+    picture = Scene([Object(with_uv, Medium(ior=1.5), surface=mapped)], camera)
+    with pytest.raises(InputError, match="normal_texture"):
         render(picture, (1, 1))
     assert render(picture, (1, 1), refraction=False).valid.all()
 

@@ -22,6 +22,7 @@ from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
 
 CAMERA = Camera.look_at((0.4, 0.5, 6.0), (0, 0, 0), fov_y=20)
 BALL = Sphere().tessellate(12)
@@ -190,8 +191,9 @@ def test_seeds_and_refusals() -> None:
     first, again, other = (path_trace(scene, (3, 2), paths=4, seed=seed)[0].radiance for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert (first != other).any()
-    colored = Mesh(BALL.vertices, BALL.faces, colors=np.ones((len(BALL.vertices), 4)))
-    with pytest.raises(InputError, match=r"colors.*refraction=False"):
-        path_trace(Scene([Object(colored, CLEAR)], CAMERA), (2, 2))
+    unwrapped = Mesh(BALL.vertices, BALL.faces, uv=BALL.vertices[:, :2])
+    mapped = Surface(normal_texture=Texture(np.ones((1, 1, 3))))
+    with pytest.raises(InputError, match=r"normal_texture.*refraction=False"):
+        path_trace(Scene([Object(unwrapped, CLEAR, surface=mapped)], CAMERA), (2, 2))
     with pytest.raises(InputError, match="a sheet that scatters"):
         path_trace(Scene([Object(BALL, Medium(1.0, 1.0, ior=1.5), sheet_thickness=0.1)], CAMERA), (2, 2))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 import translucent as tl
 from tests.values.plan_scenes import plan_over_backdrop
 from translucent.geometry.solids import Box
+from translucent.planning import surface_textures
 from translucent.planning.passes import NoteKind, PassName
 from translucent.planning.plan import plan
+from translucent.planning.surface_textures import halvings
 from translucent.scene.surface import Surface
 
 METHOD = tl.PathTraced(paths=16)
@@ -66,10 +69,28 @@ def test_what_no_path_shows_is_told(objects: list[tl.Object], kind: NoteKind, wo
     assert words in notes[0]
 
 
-def test_textures_of_interfaces_are_told() -> None:
-    mesh = body().mesh
-    colored = tl.Mesh(mesh.vertices, mesh.faces, colors=np.ones((len(mesh.vertices), 4)))
-    assert plan(scene(tl.Object(colored, MILK)), METHOD).says(NoteKind.TEXTURES)
+def test_what_paths_do_not_read_of_surfaces_is_told() -> None:
+    mesh, texture = body().mesh, tl.Texture(np.ones((4, 4, 3)))
+    unwrapped = tl.Mesh(mesh.vertices, mesh.faces, uv=np.zeros((len(mesh.vertices), 2)))
+    read = tl.Surface(color_texture=texture, roughness_texture=texture, transmission_texture=texture)
+    assert not plan(scene(tl.Object(unwrapped, MILK, surface=read)), METHOD).says(NoteKind.TEXTURES)
+    for surface in (replace(read, normal_texture=texture), replace(read, occlusion_texture=texture)):
+        assert plan(scene(tl.Object(unwrapped, MILK, surface=surface)), METHOD).says(NoteKind.TEXTURES)
+    holes = tl.Object(unwrapped, None, surface=replace(read, alpha_cutoff=0.5))
+    assert plan(scene(body(), holes), METHOD).says(NoteKind.TEXTURES)
+
+
+def test_textures_that_do_not_fit_are_halved_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, small, large = body().mesh, tl.Texture(np.ones((8, 8, 3))), tl.Texture(np.ones((5, 40, 3)))
+    unwrapped = tl.Mesh(mesh.vertices, mesh.faces, uv=np.zeros((len(mesh.vertices), 2)))
+    surface = tl.Surface(color_texture=large, roughness_texture=small)
+    one = scene(tl.Object(unwrapped, MILK, surface=surface))
+    assert halvings(one) == {large: 0, small: 0}
+    monkeypatch.setattr(surface_textures, "MOST_TEXELS", 64 + 2 * 20)
+    assert halvings(one) == {large: 1, small: 0}
+    assert plan(one, METHOD).says(NoteKind.TEXTURES)
+    monkeypatch.setattr(surface_textures, "MOST_TEXELS", 2)
+    assert halvings(one) == {large: 5, small: 3}
 
 
 def test_frosted_and_matched_bodies_leave_no_light_out() -> None:

@@ -24,6 +24,7 @@ from translucent.geometry.bvh import BLOCK, LEAF_SIZE, Floats, Hierarchy, build_
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
+from translucent.gpu.hit_textures import surface_key, surface_table
 from translucent.gpu.shaders import before_making
 from translucent.gpu.textures import unlike_powers
 from translucent.gpu.uniforms import Fields
@@ -186,9 +187,13 @@ class SceneHierarchies:
     nodes, triangles : moderngl.Texture
     object_nodes : int
         Nodes of the hierarchy of objects, in each of eight orders.
+    surface_table : int
+        Texel behind the triangles at which the table of the textures of surfaces begins, if the scene has any.
     """
 
-    def __init__(self, gl: moderngl.Context, meshes: Sequence[Mesh], objects: int) -> None:
+    def __init__(
+        self, gl: moderngl.Context, meshes: Sequence[Mesh], objects: int, textured: Scene | None = None
+    ) -> None:
         _require_room(gl, meshes)
         for mesh in meshes:
             if not has_packed(mesh):
@@ -209,9 +214,16 @@ class SceneHierarchies:
             ]
             first += 8 * count
             triangle += len(part.triangles) // 3
-        for texels in (first, 3 * triangle):
+        self.surface_table = end = 3 * triangle
+        if textured is not None:
+            table = surface_table(
+                textured, end, lambda mesh: self._spans[id(mesh)].triangle, lambda mesh: packed_mesh(mesh).faces
+            )
+            triangles.append(_Piece(end, table))
+            end += len(table)
+        for texels in (first, end):
             _check_texels(gl, texels)
-        self.nodes, self.triangles = _texture(gl, first, nodes), _texture(gl, 3 * triangle, triangles)
+        self.nodes, self.triangles = _texture(gl, first, nodes), _texture(gl, end, triangles)
         self.object_nodes = 0
         self._placed: tuple[Hashable, tuple[Fields, ...], tuple[float, float, float, float]] | None = None
 
@@ -277,21 +289,20 @@ class SceneHierarchies:
 
 
 class HierarchyCache:
-    """Cache of the hierarchies of the last scene, kept as long as the meshes are the same."""
+    """Cache of the hierarchies of the last scene, kept as long as the meshes and textures are the same."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         self._held: SceneHierarchies | None = None
-        self._meshes: tuple[Mesh, ...] = ()
-        self._objects = 0
+        self._key: tuple[object, ...] = ()
 
     def of(self, scene: Scene) -> SceneHierarchies:
         """The hierarchies of a scene."""
-        meshes = tuple(dict.fromkeys(body.mesh for body in scene.objects))
-        if self._held is None or self._meshes != meshes or self._objects != len(scene.objects):
+        meshes, surfaces = tuple(dict.fromkeys(body.mesh for body in scene.objects)), surface_key(scene)
+        if self._held is None or self._key != (meshes, len(scene.objects), surfaces):
             self.release()
-            self._held = SceneHierarchies(self._gl, meshes, len(scene.objects))
-            self._meshes, self._objects = meshes, len(scene.objects)
+            self._held = SceneHierarchies(self._gl, meshes, len(scene.objects), scene if surfaces else None)
+            self._key = meshes, len(scene.objects), surfaces
         return self._held
 
     def release(self) -> None:

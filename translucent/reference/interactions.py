@@ -21,6 +21,7 @@ from translucent.reference.hits import Lines, Rays
 from translucent.reference.interfaces import FirstInterfaces, Inside, Optics, interface_normals
 from translucent.reference.light_paths import LightPaths, SurfaceLight
 from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
+from translucent.reference.surfaces import interface_surfaces
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light
 
@@ -143,9 +144,9 @@ class Interactions:
         self.is_sheet = interfaces.before == interfaces.after
         beyond = np.where(self.is_sheet, interfaces.item, interfaces.after)
         self.ior = own.iors[beyond] / own.iors[interfaces.before]
-        self.alpha = self._table("roughness") ** 2
-        self.transmission = self._table("transmission")[:, None]
-        self.color = self._table("color")
+        place = interfaces.item, interfaces.face, interfaces.barycentric
+        roughness, transmission, self.color = interface_surfaces(own.scene, *place)
+        self.alpha, self.transmission = roughness**2, transmission[:, None]
         self.bare = optics.fresnel_dielectric(self.cosine, self.ior)
         #: (k, 3): with the films on the interfaces, of sheets that of their side towards the light.
         self.reflectance = own.filmed(self.bare, interfaces.item, interfaces.before, self.cosine, self.ior)
@@ -388,8 +389,6 @@ class StraightLight:
 
     def __init__(self, light: LightPaths, own: Optics) -> None:
         self.light, self.own = light, own
-        self.transmission = np.array([surface.transmission for surface in own.surfaces])
-        self.color = np.array([surface.color for surface in own.surfaces], dtype=np.float64)
 
     def at_interfaces(self, points: Array) -> Array:
         """(lights, k, 3): unit vectors from points (k, 3) to all lights."""
@@ -447,11 +446,13 @@ class StraightLight:
             hit = np.flatnonzero(np.isfinite(interfaces.distance))
             if not hit.size:
                 return transmittance
-            before, after, item = (column[hit] for column in (interfaces.before, interfaces.after, interfaces.item))
+            first = interfaces.where(hit)
+            before, after, item = first.before, first.after, first.item
             sheet = before == after
             bends = self.own.iors[before] != self.own.iors[np.where(sheet, item, after)]
-            tint = np.where((sheet | (item == after))[:, None], self.color[item], 1.0)
-            transmittance[hit] *= np.where(bends[:, None], 0.0, self.transmission[item, None] * tint)
+            _, passing, color = interface_surfaces(self.own.scene, item, first.face, first.barycentric)
+            tint = np.where((sheet | (item == after))[:, None], color, 1.0)
+            transmittance[hit] *= np.where(bends[:, None], 0.0, passing[:, None] * tint)
             passed = np.full(len(points), np.inf)
             passed[hit] = np.where(bends, np.inf, interfaces.distance[hit] + self.own.tolerance)
             hits = [line.where(line.distance > passed[line.pixel]) for line in hits]

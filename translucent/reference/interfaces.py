@@ -169,7 +169,7 @@ class Optics:
 
     def matters(self, before: Integers, after: Integers) -> Mask:
         """(n,): whether a change of medium has an optical effect."""
-        plain = np.array([surface.plain for surface in self.surfaces] + [True])
+        plain = np.array([body.plain for body in self.scene.objects] + [True])
         changes = (self.iors[before] != self.iors[after]) | ~plain[before] | ~plain[after]
         return np.asarray((before != after) & changes)
 

@@ -28,7 +28,7 @@ from translucent.reference.interfaces import FirstInterfaces, Inside, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge
 from translucent.reference.light_paths import LightPaths, SurfaceLight
 from translucent.reference.phase import scattered_directions
-from translucent.reference.refracted import RayEnds, check_untextured
+from translucent.reference.refracted import RayEnds, check_surfaces
 from translucent.reference.render import scene_hits, shade_hits
 from translucent.reference.surfaces import OpaqueHits, nearest_opaque, scene_crossings, sheet_thicknesses
 from translucent.reference.volume import Segments, Volume, multiplicities, points_on, volume_segments
@@ -353,8 +353,8 @@ def path_trace(
     Raises
     ------
     InputError
-        If an argument is not in its range, a body is open, a sheet scatters, an interface has textures, the media are
-        too deep, or radiance is ambient.
+        If an argument is not in its range, a body is open, a sheet scatters, a surface is one that it does not know,
+        the media are too deep, or radiance is ambient.
     """
     began = time.perf_counter()
     width, height = check_size(size)
@@ -407,7 +407,7 @@ def _check(scene: Scene, paths: int, max_events: int | None) -> None:
         raise InputError(f"path tracing with {paths} paths", "no spread without two", "use for example 64")
     if max_events is not None and max_events < 0:
         raise InputError(f"max_events {max_events}", "below 0", "use 1 for single scattering, None for no limit")
-    check_untextured(scene, "use tl.reference.render with refraction=False", random=True)
+    check_surfaces(scene, "use tl.reference.render with refraction=False", random=True)
     for body in scene.bodies:
         if body.sheet_thickness is None and not body.mesh.diagnosis.solid:
             raise InputError(f"path tracing {body.mesh.name!r}", "not closed", "use tl.reference.render")

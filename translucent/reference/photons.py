@@ -18,7 +18,7 @@ from translucent.reference.interactions import LiveRays
 from translucent.reference.interfaces import Optics
 from translucent.reference.light_paths import LightPaths, SurfaceLight, parts_of
 from translucent.reference.path_trace import BENT_BATCH, InterfacePaths, _alike, _Flight
-from translucent.reference.refracted import RayEnds, check_untextured
+from translucent.reference.refracted import RayEnds, check_surfaces
 from translucent.reference.surfaces import sheet_thicknesses
 from translucent.scene.camera import check_size
 from translucent.scene.lights import DirectionalLight, PositionalLight
@@ -68,11 +68,11 @@ def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> Landed
     Raises
     ------
     InputError
-        If a body is open, an interface has textures, or there are no photons.
+        If a body is open, a surface is one that it does not know, or there are no photons.
     """
     if photons < 1:
         raise InputError(f"{photons} photons", "no light without any", "use for example 100_000")
-    check_untextured(scene, "photons follow even interfaces alone", random=True)
+    check_surfaces(scene, "use photons of the renderer", random=True)
     for body in scene.bodies:
         if body.sheet_thickness is None and not body.mesh.diagnosis.solid:
             raise InputError(f"photons through {body.mesh.name!r}", "not closed", "close it, or declare it a sheet")

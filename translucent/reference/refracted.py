@@ -135,7 +135,7 @@ class RefractedRays:
     Parameters
     ----------
     light : SurfaceLight
-        On the surfaces of a scene; none of them has textures.
+        On the surfaces of a scene.
     aspect : float
         Width of the picture divided by its height.
     bounces : int
@@ -316,7 +316,7 @@ def refracted_light(
     Raises
     ------
     InputError
-        If an argument is not in its range, or a surface has textures.
+        If an argument is not in its range, or a surface is one that the reference does not know.
     """
     _check(scene, bounces, paths)
     rays, rough = pixel_rays(scene.camera, size), _is_rough(scene)
@@ -360,7 +360,7 @@ def light_over_pixels(
     valid : (k,) bool
         All rays of a pixel are.
     """
-    check_untextured(scene, "use refracted_light along the centers")
+    check_surfaces(scene, "use refracted_light along the centers")
     rng = np.random.default_rng(seed)
     moves = rng.random((2, *pixels.shape))
     chosen = np.flatnonzero(pixels)
@@ -414,30 +414,28 @@ def _check(scene: Scene, bounces: int, paths: int) -> None:
         raise InputError(f"{bounces} bounces", "below 0", "use for example 8")
     if paths < 2:
         raise InputError(f"{paths} paths through rough interfaces", "no spread without two", "use for example 64")
-    check_untextured(scene, "use refraction=False")
+    check_surfaces(scene, "use refraction=False")
 
 
-def check_untextured(scene: Scene, instead: str, *, random: bool = False) -> None:
-    """Raise unless interfaces are the same all over each body, without textures.
+def check_surfaces(scene: Scene, instead: str, *, random: bool = False) -> None:
+    """Raise unless the reference knows the surfaces of all interfaces.
 
     Errors say what to do `instead`. `random`: paths are followed by chance, which know films on rough interfaces of
     solids, and polished coats on these.
     """
     for body in scene.bodies:
-        if body.covers or not body.has_interface:
+        surface, what = body.surface, f"reference of {body.mesh.name!r}"
+        if body.covers or not body.has_interface or surface is None:
             continue
-        if body.surface is not None and any(texture is not None for texture in body.surface.textures):
-            what = f"reference of {body.mesh.name!r}"
-            raise InputError(what, "its surface has textures", f"give it a surface without, or {instead}")
-        surface = body.surface
-        if surface is not None and (surface.iridescence or surface.clearcoat):
+        unknown = ("normal_texture", "emissive_texture", "occlusion_texture")
+        if found := [name for name in unknown if getattr(surface, name) is not None]:
+            raise InputError(what, f"its surface has a {found[0]}", f"give it a surface without, or {instead}")
+        if body.has_holes:
+            raise InputError(what, "its surface has holes by alpha", f"give it a surface without, or {instead}")
+        if surface.iridescence or surface.clearcoat:
             rough = surface.clearcoat_roughness if surface.clearcoat else 0.0
             walks = random and body.sheet_thickness is None
             if max(0.0 if walks else surface.roughness, rough) > 0.0:
-                what = f"reference of {body.mesh.name!r}"
                 raise InputError(
                     what, "a film or a clear coat on it that is rough", f"give it a polished one, or {instead}"
                 )
-        if body.mesh.colors is not None:
-            what = f"reference of {body.mesh.name!r}"
-            raise InputError(what, "its vertices have colors", f"give it a mesh without, or {instead}")

@@ -14,7 +14,7 @@ from translucent.planning.limits import SHEET_ON_OPAQUE
 from translucent.planning.methods import Method
 from translucent.reference.hits import Hits, Rays, world_normals
 from translucent.scene.scene import Object, Scene
-from translucent.scene.surface import LEAST_COVER
+from translucent.scene.surface import LEAST_COVER, SMOOTH
 from translucent.scene.texture import Texture
 
 
@@ -32,6 +32,28 @@ def sampled(body: Object, face: Integers, barycentric: Array, texture: Texture |
         found = texture.sample(_across(body, face, barycentric, body.mesh.uv))
         values[:, : found.shape[1]] = found
     return values
+
+
+def interface_surfaces(scene: Scene, item: Integers, face: Integers, barycentric: Array) -> tuple[Array, Array, Array]:
+    """Roughness (k,), transmission (k,) and base color (k, 3) of interfaces, with their textures.
+
+    Parameters
+    ----------
+    scene : Scene
+    item, face : (k,) int64
+        Index into `Scene.objects`, and into the faces of its mesh.
+    barycentric : (k, 3) float64
+        Weights of the face's corners.
+    """
+    roughness, transmission, color = np.zeros(len(item)), np.ones(len(item)), np.ones((len(item), 3))
+    for i in np.unique(item):
+        own = np.flatnonzero(item == i)
+        body, surface = scene.objects[i], scene.objects[i].surface or SMOOTH
+        place = body, face[own], barycentric[own]
+        roughness[own] = surface.roughness * sampled(*place, surface.roughness_texture)[:, 1]
+        transmission[own] = surface.transmission * sampled(*place, surface.transmission_texture)[:, 0]
+        color[own] = np.asarray(surface.color) * color_and_opacity(*place)[:, :3]
+    return roughness, transmission, color
 
 
 def without_cut_out(body: Object, hits: Hits) -> Hits:

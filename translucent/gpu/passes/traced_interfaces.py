@@ -236,6 +236,7 @@ def traced_scene(job: FrameJob, stack: ExitStack) -> tuple[dict[str, moderngl.Te
         "start_interior": interior_at_eye(job),
         "object_nodes": hierarchies.object_nodes,
         "objects_frame": frame,
+        "surface_table": hierarchies.surface_table,
         # Metres from the center of the media within which all bodies are.
         "bodies_radius": 0.5 * float(np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0))),
     }

@@ -10,6 +10,7 @@ from translucent.errors import InputError
 from translucent.planning.bodies import indices, open_bodies
 from translucent.planning.methods.base import Method, check_count
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
+from translucent.planning.surface_textures import left_out_at_hits
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Largest number of paths of each pixel.
@@ -96,11 +97,7 @@ class PathTraced(Method):
         if rough := [body for body, one in surfaces if one.clearcoat > 0.0 and one.clearcoat_roughness > 0.0]:
             text = f"roughness of clear coats: {object_names(rough)} have polished ones"
             notes.append(Note(NoteKind.COATS, text))
-        textured = [body for body, surface in surfaces if any(one is not None for one in surface.textures)]
-        textured += [body for body in scene.bodies if body.mesh.colors is not None and body not in textured]
-        if textured:
-            text = f"textures and vertex colors of interfaces: {object_names(textured)} are the same all over"
-            notes.append(Note(NoteKind.TEXTURES, text))
+        notes += left_out_at_hits(scene)
         if emitting := [body for body, surface in surfaces if surface.glows]:
             notes.append(Note(NoteKind.GLOW, f"light of surfaces that emit: {object_names(emitting)}"))
         if scene.opaque:
