@@ -22,6 +22,7 @@ from translucent.files.paths import require_file
 from translucent.files.reading import open_file, require_memory, require_room, shown, size_text
 from translucent.geometry.mesh import PER_TRIANGLE, Mesh, Triangles, adopted, joined, mended
 from translucent.gltf.load import read_whole
+from translucent.model_size import scale_to
 from translucent.signals import import_trimesh
 from translucent.units import metres_per_unit
 
@@ -62,34 +63,51 @@ _SCENES_OF_PROGRAMS = (
 
 
 @checked
-def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False) -> Mesh:
+def load_mesh(
+    path: str | Path,
+    unit: str | None = None,
+    *,
+    allow_outside: bool = False,
+    height: float | None = None,
+    longest: float | None = None,
+) -> Mesh:
     """Read a triangle mesh from a file, weld it and wind it consistently.
 
     Parameters
     ----------
     path : path
         What trimesh reads: obj, stl, ply, glb, gltf, off and more. The parts of a scene become one mesh.
-    unit : str
-        Unit of the file's coordinates. glTF is in metres by definition; another unit rescales it.
+    unit : str, optional
+        Unit of the file's coordinates, or a length such as ``25mm``. Default: m. glTF is in metres by definition;
+        another unit rescales it.
     allow_outside : bool
         Whether the buffers of a .gltf file may lie outside its folder: only for files that you trust.
+    height, longest : float, optional
+        Extent along +Y, or of the longest side, in metres, that the mesh is scaled to, whatever the unit of its file.
 
     Returns
     -------
     Mesh
         In metres. Vertices within 1e-6 of the diagonal are one (with equal uv: seams stay); faces are wound alike per
         part, and closed parts outwards. `repairs` says what was done; a changed winding is also a `TranslucentWarning`.
+        Of a file that names no unit, `assumed_unit` says which one was assumed.
 
     Raises
     ------
     InputError
         If the file is missing, unreadable, has no faces, has coordinates that are not finite, or would take more memory
-        than is free.
+        than is free; if more than one of unit, height and longest is given.
     """
     path = Path(path)
-    scale = metres_per_unit(unit)
+    stated = [name for name, value in (("unit", unit), ("height", height), ("longest", longest)) if value is not None]
+    if len(stated) > 1:
+        raise InputError(f"load_mesh {stated[0]}", f"{stated[1]} is given, too", "give one of them")
+    scale = metres_per_unit(unit or "m")
     vertices, faces, uv = _read(path, allow_outside)
-    raw = adopted(vertices if scale == 1 else vertices * scale, faces, uv, path.name)
+    assumed = "" if stated or path.suffix[1:].lower() in _GLTF else "m"
+    if height is not None or longest is not None:
+        scale = scale_to(adopted(vertices, faces, uv, path.name).bounds, height, longest, path.name)
+    raw = adopted(vertices if scale == 1 else vertices * scale, faces, uv, path.name, assumed_unit=assumed)
     raw.require_finite()
     return mended(raw)
 

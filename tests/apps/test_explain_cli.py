@@ -12,6 +12,7 @@ import trimesh
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Run, one_error_line, strict_json
+from translucent.geometry.solids import Box
 from translucent.planning.scattering import SCATTERINGS
 
 
@@ -127,3 +128,18 @@ def test_a_repair_is_a_warning_line_and_no_part_of_the_json(run: Run, tmp_path: 
     assert result.code == 0
     assert result.err.splitlines() == ["warning: mesh 'inverted.off': turned 1 closed part outwards"]
     assert strict_json(result.out)["mesh"]["repairs"] == ["turned 1 closed part outwards"]
+
+
+def test_the_size_of_a_model_is_said_and_may_be_requested(run: Run, tmp_path: Path) -> None:
+    model = tmp_path / "cow.obj"
+    box = Box((0, 0, 0), (1, 1.7, 1)).tessellate()
+    trimesh.Trimesh(box.vertices, box.faces, process=False).export(model)
+    assert "\nsize: 1.7 m tall; taken as metres; for a figurine --height 12cm\n" in run("explain", model).out
+    assert "size:" not in run("explain", model, "--unit", "m").out
+    for size in (["--height", "17cm"], ["--longest", "17cm"], ["--unit", "10cm"]):
+        assert strict_json(run("explain", model, *size, "--json").out)["mesh"]["bounds"][1] == [0.1, 0.17, 0.1]
+    refused = run("explain", model, "--unit", "mm", "--height", "12cm")
+    assert refused.code == 2
+    assert refused.err == "error: --unit mm; --height is given, too; give one of them: each scales the model\n"
+    wax = run("explain", model, "--preset", "wax").out
+    assert "'cow.obj': opaque at this size, as plastic" in wax

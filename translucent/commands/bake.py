@@ -16,7 +16,7 @@ import click
 from click.core import ParameterSource
 
 from translucent.commands.console import echo, is_terminal, time_text
-from translucent.commands.model import mesh_file
+from translucent.commands.model import assumes_metres, file_unit, mesh_file
 from translucent.commands.options import (
     AnyMediumOptions,
     FileOptions,
@@ -29,6 +29,7 @@ from translucent.commands.options import (
 )
 from translucent.errors import InputError, RenderError, TranslucentError, printable
 from translucent.extras import require_package
+from translucent.model_size import size_note
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -60,8 +61,8 @@ _SETTINGS = (
 #: Options that have a meaning for thickness alone, but for those of many models, and for scattered light alone.
 _SCATTER_ALONE = ("resolution", "scattering_color", "mean_free_path")
 _TAKEN_BY_SCATTER = {
-    "models", "output", "check", "as_json", "mode", "size", "padding", "unwrap", "vertices", "unit", "allow_outside",
-    "color", "distance", "preset", "clamp", *_SCATTER_ALONE,
+    "models", "output", "check", "as_json", "mode", "size", "padding", "unwrap", "vertices", "unit", "height",
+    "longest", "allow_outside", "color", "distance", "preset", "clamp", *_SCATTER_ALONE,
 }  # fmt: skip
 
 
@@ -152,7 +153,7 @@ def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
     for name in ("jobs", "dask", "max_escaped"):
         if (value := getattr(given, name)) is not None:
             raise InputError(f"{_option(name)} {value}", "it is for many models", "add --out-dir, or leave it out")
-    return _bake_one(_read_job(models[0], output, given), given, as_json)
+    return _bake_one(_read_job(models[0], output, given, file_unit(models[0], given.file)), given, as_json)
 
 
 def _named() -> list[str]:
@@ -165,15 +166,14 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def _read_job(model: str, output: Path, given: BakeOptions) -> Job:
-    """Job of a model, from the options.
+def _read_job(model: str, output: Path, given: BakeOptions, unit: str) -> Job:
+    """Job of a model with a `file_unit`, from the options.
 
     Raises
     ------
     InputError
         If a value is wrong.
     """
-    unit = given.file.unit
     if given.high is None:
         for name in ("cage", "high_distance"):
             if (value := getattr(given, name)) is not None:
@@ -186,13 +186,17 @@ def _read_job(model: str, output: Path, given: BakeOptions) -> Job:
         settings["tile"] = given.tile
     medium = MediumOptions.read(given.medium)
     job: Job = {
-        "model": mesh_file(model, unit),
+        "model": mesh_file(model, given.file.unit),
         "output": str(output),
         "unit": unit,
         "settings": settings,
         "medium": None if medium is None else medium.extinction.tolist(),
     }
-    job |= {name: mesh_file(mesh, unit) for name in ("high", "cage") if (mesh := getattr(given, name)) is not None}
+    job |= {
+        name: mesh_file(mesh, given.file.unit)
+        for name in ("high", "cage")
+        if (mesh := getattr(given, name)) is not None
+    }
     refuse_overwriting(output, job["model"], job.get("high"), job.get("cage"))
     if given.file.allow_outside:
         job["outside"] = True
@@ -242,7 +246,7 @@ def _read_scatter_job(model: str, output: Path, given: BakeOptions) -> ScatterJo
         size=given.size if "size" in _named() else SIZE,
         padding=given.padding,
         resolution=given.resolution,
-        unit=given.file.unit,
+        unit=file_unit(model, given.file),
         unwrap=given.unwrap,
         outside=given.file.allow_outside,
     )
@@ -265,7 +269,11 @@ def _bake_one(job: Job, given: BakeOptions, as_json: bool) -> None:
 
         found = check_output(job, record, results)
         checks = _check_report(found, job["output"], write_picture, "with the map, true, difference")
-    _print({**reported, "record": record, **checks}, [*_lines(record, reported), *checks.get("lines", [])], as_json)
+    lines = [*_lines(record, reported), *checks.get("lines", [])]
+    if assumes_metres(job["model"], given.file):
+        reported["size"] = size_note(next(iter(results.values())).mesh, "m")
+        lines.append(f"size: {reported['size']}")
+    _print({**reported, "record": record, **checks}, lines, as_json)
 
 
 def _print(reported: dict[str, Any], lines: list[str], as_json: bool) -> None:
@@ -381,10 +389,11 @@ def _bake_many(models: tuple[str, ...], out_dir: Path, given: BakeOptions, as_js
         output = out_dir / f"{Path(model).stem}.{given.format}"
         try:
             mesh_file(model, given.file.unit)
+            unit = file_unit(model, given.file)
         except InputError as error:
             absent.append(failed_entry({"model": model, "output": str(output)}, str(error)))
         else:
-            requested.append(_read_job(model, output, given))
+            requested.append(_read_job(model, output, given, unit))
     notify = _reporter([*requested, *absent], as_json)
     with made_folder(out_dir), _executor(given.dask) as executor:
         report = bake_many(requested, executor, given.jobs, notify)

@@ -21,6 +21,7 @@ from translucent.commands.options import (
     takes,
 )
 from translucent.errors import TranslucentError
+from translucent.model_size import size_note
 
 if TYPE_CHECKING:
     from translucent.geometry.mesh import Mesh
@@ -113,6 +114,8 @@ def _echo_mesh(mesh: Mesh) -> None:
     echo(f"mesh: {mesh.diagnosis}")
     for repair in mesh.repairs:
         echo(f"repaired: {repair}")
+    if note := size_note(mesh):
+        echo(f"size: {note}")
 
 
 def _echo_scene(model: str, scene: Scene) -> None:

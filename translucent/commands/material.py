@@ -37,7 +37,7 @@ def material() -> None:
 class ShowOptions:
     """Options of ``translucent material show``."""
 
-    file: FileOptions = group(FileOptions, without=("unit", "allow_outside"))
+    file: FileOptions = group(FileOptions, without=("unit", "height", "longest", "allow_outside"))
 
 
 @material.command(epilog="Example: translucent material show model.glb")

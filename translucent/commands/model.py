@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,8 +27,10 @@ from translucent.commands.options import (
     with_options,
 )
 from translucent.errors import InputError
+from translucent.model_size import scale_to, size_note
 
 if TYPE_CHECKING:
+    from translucent.arrays import Array
     from translucent.geometry.mesh import Mesh
     from translucent.media.medium import Medium
     from translucent.scene.camera import Camera
@@ -155,7 +158,7 @@ def _file_scene(model: str, requested: SceneRequest, stage: str | None) -> tuple
 
     scene = load_scene(
         model,
-        requested.file.unit,
+        file_unit(model, requested.file),
         None if requested.camera.defining else requested.camera.camera or 0,
         requested.size,
         variant=requested.variant,
@@ -204,18 +207,43 @@ def read_mesh(model: str, file: FileOptions) -> Mesh:
     """The mesh of a file, or of the toolkit's own by name."""
     from translucent.mesh_files import load_mesh
 
-    return load_mesh(mesh_file(model, file.unit), unit=file.unit, allow_outside=file.allow_outside)
+    path, sizes = mesh_file(model, file.unit), file.sizes
+    # The toolkit's own are in metres, though their files do not say so.
+    unit = "m" if is_own(model) and not sizes else file.unit
+    return load_mesh(path, unit, allow_outside=file.allow_outside, **sizes)
 
 
-def mesh_file(model: str, unit: str) -> str:
+def file_unit(model: str, file: FileOptions) -> str:
+    """Unit of a file's coordinates: as stated, or the length by which the model gets the size that is requested."""
+    if not (sizes := file.sizes):
+        return file.unit or "m"
+    bounds = _file_bounds(model, file)
+    return f"{scale_to(bounds, sizes.get('height'), sizes.get('longest'), model)!r}m"
+
+
+def _file_bounds(model: str, file: FileOptions) -> Array:
+    """(2, 3): bounds of a model in metres, as its file has them."""
+    from translucent.gltf.load import load_scene
+    from translucent.mesh_files import load_mesh
+
+    if not is_scene_file(model):
+        return load_mesh(mesh_file(model, None), "m", allow_outside=file.allow_outside).bounds
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # they come again as the file is read with its unit
+        return load_scene(model, allow_outside=file.allow_outside).shown_bounds
+
+
+def mesh_file(model: str, unit: str | None) -> str:
     """The file of a mesh, which may be the name of one of the toolkit's own."""
     from translucent.assets import mesh_names, mesh_path
 
     if os.path.lexists(model):
         return model
     if is_own(model):
-        if unit != "m":
-            raise InputError(f"--unit {unit}", f"{model} comes with the toolkit, in metres", "leave --unit out")
+        if unit not in (None, "m"):
+            raise InputError(
+                f"--unit {unit}", f"{model} comes with the toolkit, in metres", "leave --unit out, or give --height"
+            )
         return str(mesh_path(model))
     if not os.path.dirname(model) and not Path(model).suffix:
         raise InputError(
@@ -249,6 +277,16 @@ def read_vector(option: str, text: str) -> list[float]:
     if len(values) != 3:
         raise InputError(f"{option} {text!r}", "not three numbers", f"write for example {option} 0,1.5,4")
     return values
+
+
+def assumes_metres(model: str, file: FileOptions) -> bool:
+    """True if neither MODEL nor an option says in which unit its coordinates are."""
+    return not (file.unit or file.sizes or is_scene_file(model) or is_own(model))
+
+
+def size_lines(scene: Scene) -> list[str]:
+    """Line about the size of a scene whose file names no unit, with what sets another; none where it is known."""
+    return [f"size: {note}" for note in dict.fromkeys(size_note(item.mesh) for item in scene.shown) if note]
 
 
 def medium_lines(scene: Scene, reach: Callable[[Object], float] | None = None) -> list[str]:

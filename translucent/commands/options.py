@@ -296,11 +296,31 @@ def outside_option() -> Any:
 class FileOptions:
     """Options for how the file of a model is read."""
 
-    unit: str = option("m", metavar="U", help="Unit of the file's coordinates: mm, cm, in, ...")
+    unit: str | None = option(metavar="U", help="Unit of the file's coordinates: mm, cm, in, ... or 25mm. Default: m.")
+    height: str | None = option(metavar="L", help="Scale the model to this height, along +Y: 12cm.")
+    longest: str | None = option(metavar="L", help="Scale the model so that its longest side is this: 12cm.")
     allow_outside: bool = outside_option()
     draft_extensions: bool = option(
         False, help="Of a glTF MODEL: read KHR_materials_scatter and KHR_materials_volume_scatter, which are drafts."
     )
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """The height or the longest side in metres that is requested, by its name in `load_mesh`.
+
+        Raises
+        ------
+        InputError
+            If two of unit, height and longest side are given.
+        """
+        from translucent.units import parse_length
+
+        given = {"unit": self.unit, "height": self.height, "longest": self.longest}
+        stated = [name for name, value in given.items() if value is not None]
+        if len(stated) > 1:
+            requested = f"--{stated[0]} {given[stated[0]]}"
+            raise InputError(requested, f"--{stated[1]} is given, too", "give one of them: each scales the model")
+        return {name: parse_length(value) for name, value in given.items() if name != "unit" and value is not None}
 
 
 @dataclass(frozen=True, kw_only=True)

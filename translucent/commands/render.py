@@ -27,6 +27,7 @@ from translucent.commands.model import (
     read_objects,
     read_scene,
     require_translucent,
+    size_lines,
 )
 from translucent.commands.options import (
     AnyMediumOptions,
@@ -43,7 +44,7 @@ from translucent.commands.options import (
     takes,
 )
 from translucent.errors import InputError
-from translucent.units import METRES_PER_UNIT, metres_per_unit
+from translucent.units import METRES_PER_UNIT, extent_text, metres_per_unit, short_length
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -205,12 +206,13 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
         else:
             frame = pictures.write(scene, draw)
             summary = frame.summary()
-    warn_if_black(scene, frame, given.file.unit, own=is_own(model))
+    warn_if_black(scene, frame, given.file.unit or "m", own=is_own(model) or bool(given.file.sizes))
     if given.output.suffix.lower() == ".png":
         warn_if_white(frame, given.look.exposure, pictures.tone)
-    media = medium_lines(scene)
+    media, sizes = medium_lines(scene), size_lines(scene)
     if as_json:
-        echo(json.dumps({"output": str(given.output), "medium": "; ".join(media), **summary}))
+        said = {"medium": "; ".join(media), "model_size": "; ".join(sizes)}
+        echo(json.dumps({"output": str(given.output), **said, **summary}))
         return
     drawn_by = [frame.provenance[key] for key in ("backend", "renderer") if key in frame.provenance]
     tiled = ", in tiles" if pictures.tiled else ""
@@ -219,6 +221,8 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
         echo(f"opaque objects: {frame.provenance['opaque']}")
     for line in media:
         echo(f"medium: {line}")
+    for line in sizes:
+        echo(line)
     echo(str(frame.plan))
     echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in summary["seconds"].items()))
 
@@ -364,7 +368,7 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
     visible = frame.coverage & frame.valid
     if not visible.any():
         return
-    from translucent.planning.limits import scattered_back
+    from translucent.planning.remarks import scattered_back
 
     passed = float(frame.transmittance[visible].mean())
     media = [body.medium for body in scene.bodies if body.medium is not None and body.has_interface]
@@ -383,8 +387,9 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
     times = float(f"{clearest / math.log(5.0):.2g}")
     clearer = f"in a medium {times:.3g} times as clear (a color at a --distance so much longer), a fifth would pass"
     echo(
-        f"warning: only {passed:.2%} of the light passes: the model is {_extent(high - low)} and {_length(thickness)} "
-        f"thick at the median, and this medium leaves a tenth of the light after {_length(tenth)}; "
+        f"warning: only {passed:.2%} of the light passes: the model is {extent_text(high - low)} and "
+        f"{short_length(thickness)} thick at the median, and this medium leaves a tenth of the light after "
+        f"{short_length(tenth)}; "
         f"{_other_unit(high - low, depth, unit, own) or clearer}",
         err=True,
     )
@@ -416,22 +421,7 @@ def _other_unit(size: np.ndarray, depth: np.ndarray, unit: str, own: bool) -> st
             passes = float(np.exp(-scale * depth).mean())
         usual = scale < 1 and USUAL[0] <= scale * size.max() <= USUAL[1]
         if usual and SHOWS_MEDIUM[0] <= passes <= SHOWS_MEDIUM[1]:
-            return f"is the file in {words}? With --unit {name} it is {_extent(scale * size)}, and {passes:.0%} passes"
+            return (
+                f"is the file in {words}? With --unit {name} it is {extent_text(scale * size)}, and {passes:.0%} passes"
+            )
     return ""
-
-
-def _extent(size: np.ndarray) -> str:
-    unit, scale = _unit(float(size.max()))
-    return f"{' x '.join(f'{value / scale:.3g}' for value in size)} {unit}"
-
-
-def _length(metres: float) -> str:
-    unit, scale = _unit(metres)
-    return f"{metres / scale:.3g} {unit}"
-
-
-def _unit(metres: float) -> tuple[str, float]:
-    """Unit in which a length is read best."""
-    return next(
-        ((name, METRES_PER_UNIT[name]) for name in ("m", "cm", "mm") if metres >= METRES_PER_UNIT[name]), ("um", 1e-6)
-    )

@@ -199,7 +199,7 @@ def _command(models: tuple[str, ...], given: ReportOptions) -> str:
     }
     options |= {"--only": given.only, "--from": given.source, "--limit": given.limit}
     options |= {"--color": medium.color, "--distance": medium.distance, "--preset": medium.preset}
-    options |= {"--unit": given.file.unit if given.file.unit != "m" else None}
+    options |= {"--unit": given.file.unit, "--height": given.file.height, "--longest": given.file.longest}
     words = ["translucent", "report", *models]
     for name, value in options.items():
         words += [name, str(value)] if value is not None else []

@@ -12,7 +12,14 @@ from pathlib import Path
 import click
 
 from translucent.commands.console import echo
-from translucent.commands.model import SceneRequest, medium_lines, read_scene, require_translucent
+from translucent.commands.model import (
+    SceneRequest,
+    file_unit,
+    medium_lines,
+    read_scene,
+    require_translucent,
+    size_lines,
+)
 from translucent.commands.options import (
     AnyMediumOptions,
     CameraOptions,
@@ -86,7 +93,7 @@ def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
     if stage is not None:
         document = dataclasses.replace(document, look=dataclasses.replace(document.look, stage=stage))
     if model is not None:
-        document = dataclasses.replace(document, model=Model(model, given.file.unit))
+        document = dataclasses.replace(document, model=Model(model, file_unit(model, given.file)))
     todo = read_script(script) if script is not None else Script.of([]) if screenshot is not None else None
     require_display()
     from translucent.preview.app import leave, run
@@ -215,6 +222,8 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
         echo(f"simplified: {before:,} triangles to {triangles(scene):,}")
     for line in media:
         echo(f"medium: {line}")
+    for line in size_lines(scene):
+        echo(line)
     echo(str(planned.plan))
     for note in planned.own_notes:
         echo(f"  page: {note}")

@@ -18,6 +18,7 @@ from translucent.geometry.diagnosis import Diagnosis, diagnose
 from translucent.geometry.grouping import CHUNK, equal_rows, extent, use_mask
 from translucent.geometry.repair import WELD_EDGE_FRACTION, WELD_TOLERANCE, all_apart, orient, weld
 from translucent.geometry.winding import winding_number
+from translucent.model_size import size_note
 from translucent.signals import import_trimesh
 
 #: Largest index of a vertex.
@@ -54,6 +55,8 @@ class Mesh(Frozen):
         What `load_mesh` has mended, for the record.
     colors : array_like (n, 4), optional
         Linear RGB and opacity of the vertices, 0 to 1, which multiply those of a surface.
+    assumed_unit : str
+        Unit that `load_mesh` took coordinates to be in, since neither their file nor its caller named one.
 
     Raises
     ------
@@ -67,6 +70,7 @@ class Mesh(Frozen):
     name: str = "mesh"
     repairs: tuple[str, ...] = ()
     colors: Array | None = None
+    assumed_unit: str = ""
 
     def __post_init__(self) -> None:
         self._settle(copy=True)
@@ -120,7 +124,8 @@ class Mesh(Frozen):
         object.__setattr__(self, field, array)
 
     def __repr__(self) -> str:
-        return f"Mesh({self.name!r}, {len(self.vertices)} vertices, {len(self.faces)} faces)"
+        about = f"{len(self.vertices)} vertices, {len(self.faces)} faces"
+        return f"Mesh({self.name!r}, {about}{f'; {size}' if (size := size_note(self, python=True)) else ''})"
 
     @cached_property
     def diagnosis(self) -> Diagnosis:
@@ -256,7 +261,7 @@ def _beyond_indices(array: npt.NDArray[Any]) -> bool:
 
 def adopted(vertices: Array, faces: npt.NDArray[np.int32], uv: Array | None, name: str, **others: Any) -> Mesh:
     """Make a mesh of arrays that nobody else holds, which are checked but not copied."""
-    given = {"uv": uv, "name": name, "repairs": (), "colors": None} | others
+    given = {"uv": uv, "name": name, "repairs": (), "colors": None, "assumed_unit": ""} | others
     mesh = object.__new__(Mesh)
     mesh.__dict__.update(vertices=vertices, faces=faces, **given)
     mesh._settle(copy=False)
@@ -299,7 +304,15 @@ def mended(raw: Mesh) -> Mesh:
     # Of vertices that are welded to one, its position is the first one's.
     positions = raw.vertices[kept if same is None else same[kept]]
     uv, colors = (None if values is None else values[kept] for values in (raw.uv, raw.colors))
-    mesh = adopted(positions, split_faces, uv, raw.name, repairs=tuple(repairs), colors=colors)
+    mesh = adopted(
+        positions,
+        split_faces,
+        uv,
+        raw.name,
+        repairs=tuple(repairs),
+        colors=colors,
+        assumed_unit=raw.assumed_unit,
+    )
     mesh.__dict__[_ONE_CLOSED_PART] = one_closed_part
     return mesh
 

@@ -14,6 +14,7 @@ from translucent.errors import InputError, RenderError, TranslucentError
 from translucent.extras import install_command, require_package
 from translucent.formulas.color import to_hex
 from translucent.frames.writing import Bundle, bundle, png
+from translucent.model_size import size_note
 from translucent.page.payload import header_of, payload
 from translucent.page.plans import plan_page
 from translucent.planning.interfaces import InterfaceMode
@@ -46,7 +47,8 @@ def scene_bundle(scene: Scene) -> Bundle:
 
 
 def _bundle(scene: Scene) -> Bundle:
-    lines = [repr(scene), *_contents(scene), _view(scene)]
+    sizes = dict.fromkeys(size_note(item.mesh, python=True) for item in scene.shown)
+    lines = [repr(scene), *_contents(scene), *filter(None, sizes), _view(scene)]
     if why := _takes_long(scene):
         lines.append(f"Not drawn here, since {why}: renderer.render(scene, size) does.")
         return bundle([], lines, "\n".join(lines))

@@ -53,6 +53,8 @@ class NoteKind(StrEnum):
 
     # What is right and shows nothing.
     BLACK = "black"
+    OPAQUE_BODIES = "opaque bodies"
+    UNSEEN_BODIES = "unseen bodies"
 
     # What a page in a browser does with a scene.
     MANY_TRIANGLES = "many triangles"

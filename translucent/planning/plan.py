@@ -45,7 +45,6 @@ from translucent.planning.limits import (
     AMBIENT,
     MAX_LIGHTS,
     MAX_SCATTER_LIGHTS,
-    black_bodies,
     layers_instead,
     mesh_limits,
     open_limits,
@@ -64,6 +63,7 @@ from translucent.planning.methods import (
 )
 from translucent.planning.methods.ray_marched import MAX_STEPS
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
+from translucent.planning.remarks import remarks
 from translucent.planning.render_plan import Capabilities, MapPlan, RenderPlan
 from translucent.planning.rendered import Treatment, darkened, occluder_scene, occluders, straight_scene, treatment_of
 from translucent.planning.request import RenderRequest
@@ -147,7 +147,7 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
             paths=paths,
         )
     unmodelled = (*found.unmodelled, *spheres)
-    found = replace(found, request=request, unmodelled=unmodelled, remarks=black_bodies(scene))
+    found = replace(found, request=request, unmodelled=unmodelled, remarks=remarks(scene))
     if request.caustics is not None:
         found = _with_caustics(found, scene, request.caustics, machine)
     return found if found.traced else _with_shadows(found, scene, machine)
