@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests.textured import TEXTURED
 from translucent.arrays import Array
 from translucent.assets import mesh_path
 from translucent.cpu import ray_tree
@@ -127,6 +128,10 @@ SCENES = {
     "ambient": lambda: scene_of(
         glass(medium=tl.Medium(absorption=(1, 1, 1), scattering=(1, 1, 1), ior=1.4)), ambient=(0.5, 0.5, 0.5)
     ),
+    "painted cube in glass": lambda: TEXTURED["painted cube in glass"],
+    "painted slab behind glass": lambda: TEXTURED["painted slab behind glass"],
+    "painted pane": lambda: TEXTURED["painted pane before a painted cube"],
+    "glass over a base in places": lambda: TEXTURED["glass over a base in places"],
     "far": lambda: scene_of(glass(), camera=tl.Camera.look_at((1.5e4, 1.2e4, 2e4), (0.0, 0.1, 0.0), fov_y=0.005)),
 }
 

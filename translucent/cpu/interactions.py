@@ -17,8 +17,10 @@ from translucent.formulas.bsdf import Interaction, below_coat, diffuse_radiance,
 from translucent.formulas.interface import CLEARCOAT_IOR, reflected_direction, refracted_direction
 from translucent.formulas.light import highlight_from
 from translucent.geometry.ray_caster import SceneRayCaster, dot, unit
+from translucent.planning.surface_textures import textured_at_hits
 from translucent.reference.hits import Rays
 from translucent.reference.light_paths import SurfaceLight
+from translucent.reference.surfaces import interface_surfaces
 from translucent.scene.lights import PositionalLight
 
 #: Interfaces of a ray that have points of their own; later interfaces take them again, with other offsets.
@@ -115,6 +117,8 @@ class BranchInteractions:
     at : Interaction
     alpha : (k,) float64
         Width of the distribution of microfacets.
+    transmission, color : (k,), (k, 3) float64
+        Of the base.
     reflected, refracted : (k, 3) float64
         Directions.
     reflectance, transmittance : (k, 3) float64
@@ -133,6 +137,8 @@ class BranchInteractions:
     item: Integers
     at: Interaction
     alpha: Array
+    transmission: Array
+    color: Array
     reflected: Array
     refracted: Array
     reflectance: Array
@@ -158,7 +164,15 @@ def interact(
     directions, item = branches.directions, places.item
     normals = caster.facing_normals(places.face, branches.origins, directions)
     at = table.interaction(item, places.before, places.after, channel, directions, normals)
-    alpha = np.where(at.ior != 1.0, table.alpha[item], 0.0)
+    alpha, transmission, color = table.alpha[item], table.transmission[item], table.color[item]
+    if textured_at_hits(table.scene):
+        weights = caster.barycentric(places.face, branches.origins)
+        face = caster.faces.number[places.face]
+        roughness, transmission, color = interface_surfaces(table.scene, item, face, weights)
+        alpha = roughness**2
+        enters = at.thin_walled | (item == places.after)
+        at = at._replace(base=np.where(enters[:, None], color, 1.0) * transmission[:, None])
+    alpha = np.where(at.ior != 1.0, alpha, 0.0)
     facets, bare = at.normal, optics.fresnel_dielectric(at.cosine(at.normal), at.ior)
     rough = np.flatnonzero(alpha > 0)
     if spread is not None and rough.size:
@@ -179,6 +193,8 @@ def interact(
         item,
         at,
         alpha,
+        transmission,
+        color,
         at.reflected(facets),
         at.refracted(facets),
         lobes.reflection + np.where(alike[:, None], coat, 0.0),
@@ -236,7 +252,7 @@ class InterfaceLight:
     def radiance(self, rays: Rays, found: BranchInteractions) -> Array:
         """(k, 3): radiance at the origins of rays, in metres from the eye, against their directions."""
         radiance, at = found.emitted.copy(), found.at
-        if (self.table.transmission < 1.0).any():
+        if (found.transmission < 1.0).any():
             self._add_diffuse(radiance, rays, found)
         if not self.light.scene.lights:
             return radiance
@@ -251,14 +267,14 @@ class InterfaceLight:
         return radiance
 
     def _add_diffuse(self, radiance: Array, rays: Rays, found: BranchInteractions) -> None:
-        weight = found.transmittance * (1.0 - self.table.transmission[found.item, None])
+        weight = found.transmittance * (1.0 - found.transmission[:, None])
         diffuse = np.flatnonzero((weight > 0.0).any(axis=1))
         item, points, normals = found.item[diffuse], rays.origins[diffuse], found.at.normal[diffuse]
         through = self._through[item]
         front, back = (self.light.on_interfaces(points, side * normals) for side in (1.0, -1.0))
         with np.errstate(under="ignore"):
             behind = through[:, None] * self._through_color[item]
-            color = self.table.color[item]
+            color = found.color[diffuse]
             radiance[diffuse] += weight[diffuse] * diffuse_radiance(front, back, color, behind, through)
 
     def _add_highlights(

@@ -507,8 +507,9 @@ class _Growth:
     def _end(self, branches: Branches, item: Integers, column: Integers) -> None:
         """End branches at opaque objects, `item` at `column` (n,), and add what these reflect."""
         ray = np.arange(len(branches))
-        number = self.caster.faces.number[branches.last[ray, column]]
-        wall = OpaqueHits(np.zeros(len(branches)), item[ray, column], number)
+        face = branches.last[ray, column]
+        weights = self.caster.barycentric(face, branches.origins)
+        wall = OpaqueHits(np.zeros(len(branches)), item[ray, column], self.caster.faces.number[face], weights)
         self._add(branches, reflected_radiance(self.scene, self._rays(branches), wall, self.tree.light.on_opaque))
 
     def _look_up(self, branches: Branches) -> None:

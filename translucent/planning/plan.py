@@ -69,6 +69,7 @@ from translucent.planning.rendered import Treatment, darkened, occluder_scene, o
 from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Scattering, SingleScattering, Treatments, choose_treatments, rendered_scene
 from translucent.planning.shadow_maps import ShadowMaps, shadow_passes, shadows_left_out
+from translucent.planning.surface_textures import unread_at_hits
 from translucent.scene.lights import SPREADS, PositionalLight, SphereLight, SpotLight, without_spheres
 from translucent.scene.scene import Object, Scene, check_scene, object_names
 
@@ -381,6 +382,7 @@ def _traced(
     limits = (*(chosen.limits(scene) if sheets else open_limits(scene)), *mesh_limits(scene, chosen))
     unmodelled = unmodelled_effects(scene, scattering=machine.scattering and scatters(scene), interfaces=followed)
     unmodelled = with_ambient(unmodelled) if ambient else unmodelled
+    unmodelled = (*unmodelled, *unread_at_hits(scene)) if followed else unmodelled
     return RenderPlan(scene, chosen, passes, True, limits, unmodelled, interfaces=followed, traced=True)
 
 

@@ -34,17 +34,23 @@ def textured_at_hits(scene: Scene) -> bool:
     return any(varies_at_hits(body) for body in scene.objects)
 
 
-def left_out_at_hits(scene: Scene) -> tuple[Note, ...]:
-    """Notes on what rays do not read of surfaces, and on textures that they read with fewer texels than these have."""
-    notes = []
-    if bodies := [body for body in scene.objects if body.surface is not None and _has_more(body, body.surface)]:
-        text = f"normal maps, occlusion and holes by alpha: rays find {object_names(bodies)} without"
-        notes.append(Note(NoteKind.TEXTURES, text))
+def unread_at_hits(scene: Scene) -> list[Note]:
+    """Notes on what rays do not read of surfaces."""
+    bodies = [body for body in scene.objects if body.surface is not None and _has_more(body, body.surface)]
+    if not bodies:
+        return []
+    text = f"normal maps, occlusion and holes by alpha: rays find {object_names(bodies)} without"
+    return [Note(NoteKind.TEXTURES, text)]
+
+
+def reduced_at_hits(scene: Scene) -> list[Note]:
+    """Notes on textures that rays on a GPU read with fewer texels than they have."""
     halved = {texture for texture, times in halvings(scene).items() if times}
-    if bodies := [body for body in scene.objects if halved.intersection(filter(None, textures_at_hits(body)))]:
-        text = f"fine texels: textures of {object_names(bodies)} are halved for rays, {MOST_TEXELS:,} texels fit in all"
-        notes.append(Note(NoteKind.TEXTURES, text))
-    return tuple(notes)
+    bodies = [body for body in scene.objects if halved.intersection(filter(None, textures_at_hits(body)))]
+    if not bodies:
+        return []
+    text = f"fine texels: textures of {object_names(bodies)} are halved for rays, {MOST_TEXELS:,} texels fit in all"
+    return [Note(NoteKind.TEXTURES, text)]
 
 
 def _has_more(body: Object, surface: Surface) -> bool:

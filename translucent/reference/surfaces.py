@@ -84,19 +84,18 @@ class OpaqueHits:
         Index into `Scene.objects`; -1 where there is none.
     face : (n,) int64
         Index into the mesh's faces.
-    barycentric : (n, 3) float64, optional
-        Weights of the face's corners; None: surfaces are even, and show neither textures nor colors of vertices.
+    barycentric : (n, 3) float64
+        Weights of the face's corners.
     """
 
     distance: Array
     item: Integers
     face: Integers
-    barycentric: Array | None = None
+    barycentric: Array
 
     def where(self, chosen: Integers) -> OpaqueHits:
         """Selection of rays by indices."""
-        across = None if self.barycentric is None else self.barycentric[chosen]
-        return OpaqueHits(self.distance[chosen], self.item[chosen], self.face[chosen], across)
+        return OpaqueHits(self.distance[chosen], self.item[chosen], self.face[chosen], self.barycentric[chosen])
 
 
 def nearest_opaque(scene: Scene, hits: Sequence[Hits], pixels: int) -> OpaqueHits:
@@ -142,12 +141,11 @@ def _lambert(body: Object, hits: OpaqueHits, rays: Rays, irradiance: Irradiance)
     normals[away] *= -1.0
     # From the eye, as the rays are, so that the vector to a light keeps its digits far from the world's origin.
     points = rays.origins + hits.distance[:, None] * rays.directions
-    color, emitted = np.broadcast_to(body.base_color, points.shape), np.zeros(3)
-    if hits.barycentric is not None:
-        color = color * color_and_opacity(body, hits.face, hits.barycentric)[:, :3]
-        if body.surface is not None and body.surface.glows:
-            texture = sampled(body, hits.face, hits.barycentric, body.surface.emissive_texture)
-            emitted = np.asarray(body.surface.emissive) * texture[:, :3]
+    color = body.base_color * color_and_opacity(body, hits.face, hits.barycentric)[:, :3]
+    emitted = np.zeros(3)
+    if body.surface is not None and body.surface.glows:
+        texture = sampled(body, hits.face, hits.barycentric, body.surface.emissive_texture)
+        emitted = np.asarray(body.surface.emissive) * texture[:, :3]
     with np.errstate(under="ignore"):
         return np.asarray(color / np.pi * irradiance(points, normals) + emitted)
 
