@@ -24,7 +24,6 @@ from translucent.diffusion.entering import from_light
 from translucent.diffusion.field import DiffusionField, lit_body
 from translucent.diffusion.first_events import (
     DEEP_EVENTS,
-    EVENTS,
     FLAT,
     diffuse_paths,
     half_space_excess,
@@ -47,6 +46,10 @@ def of_shell(at: Array, k: float, d: float, c: float) -> Array:
     return np.asarray(np.sinh(k * at) / (at * math.sinh(k)) / (c + d * (k / math.tanh(k) - 1)))
 
 
+#: Points of sums for integrals.
+FINE = 64
+
+
 def ball_truth(grid: BodyGrid, absorption: float, scattering: float, ior: float) -> float:
     """Mean fluence for unit flux, of sources as deep as the code has them; without what the exact half-space lacks."""
     interface, d = diffuse_interface(ior), float(diffusion_coefficient(absorption, scattering))
@@ -54,9 +57,9 @@ def ball_truth(grid: BodyGrid, absorption: float, scattering: float, ior: float)
     found, k, c = np.zeros(len(depth)), math.sqrt(absorption / d), interface.conductance
     slant = depth / interface.mean_cosine
     beyond = np.exp(-extinction * slant)
-    for quantile in (np.arange(EVENTS) + 0.5) / EVENTS:
+    for quantile in (np.arange(FINE) + 0.5) / FINE:
         at = 1 + np.log1p(-quantile * (1 - beyond)) * interface.mean_cosine / extinction
-        found += (1 - beyond) / EVENTS * of_shell(at, k, d, c)
+        found += (1 - beyond) / FINE * of_shell(at, k, d, c)
     for quantiles in tails(len(depth)):
         path = slant - np.log1p(-quantiles) / extinction
         at = np.linalg.norm(grid.points + path[:, None] * ways, axis=1)
@@ -200,7 +203,7 @@ def test_wide_slabs_reflect_and_transmit(slab: BodyGrid, albedo: float, ior: flo
 def test_deep_slabs_that_scatter_ahead_reflect(slab: BodyGrid, anisotropy: float) -> None:
     """Against layers that are added and doubled; similar ones that scatter to all sides alike reflect up to twice that.
 
-    Measured: up to 1.9 % more, at g = 0.9 and an albedo of 0.6, where four depths stand for all first events.
+    Measured: 0.002 % more; the solver may be off by `TOLERANCE`.
     """
     albedo = np.array([0.6, 0.95, 0.0])
     depth = 60 / (1 - albedo * anisotropy)
@@ -212,7 +215,7 @@ def test_deep_slabs_that_scatter_ahead_reflect(slab: BodyGrid, anisotropy: float
         slabs.scattered_fractions(w, d, 1.33, anisotropy)[0]
         for w, d in zip(albedo.tolist(), depth.tolist(), strict=True)
     ]
-    np.testing.assert_allclose(diffuse_interface(1.33).exit_share * fluence, exact, rtol=0.025)
+    np.testing.assert_allclose(diffuse_interface(1.33).exit_share * fluence, exact, rtol=5 * TOLERANCE)
 
 
 def test_exact_slabs_are_exact() -> None:
@@ -248,7 +251,8 @@ def test_lossless_bodies_give_back_what_enters(mesh: tl.Mesh, scattering: float)
     for quantiles in tails(len(grid.points)):
         path = slant - np.log1p(-quantiles) / scattering
         spread = grid.cells.step * (box_points(len(path)) - 0.5)
-        scattered += beyond / DEEP_EVENTS * grid.cell_at(grid.points + path[:, None] * ways + spread)[1]
+        places = (grid.points + path[:, None] * ways + spread - grid.cells.low) / grid.cells.step
+        scattered += beyond / DEEP_EVENTS * grid.cell_at(places.T)[1]
     # The residual is a share of the norm of all sources, weighted by the diagonal: of their sum it may be the root of
     # the number of cells over that of those with sources, three times here.
     assert interface.exit_share * found.sum() == pytest.approx(float(scattered.sum()), rel=5 * TOLERANCE)
@@ -280,7 +284,8 @@ def test_the_system_is_symmetric_and_positive() -> None:
     """So light goes both ways between any two places alike, and conjugate gradients get there."""
     grid = ball_grid(10)
     dense = even_densities(grid)
-    channel = _ChannelSystem(grid, 1.4, 0.0, 0.5, 5.0, dense, diffuse_paths(grid, dense, 1.4), corrected=False)
+    paths, scattered = diffuse_paths(grid, dense, 1.4), np.ones(len(grid.points))
+    channel = _ChannelSystem(grid, 1.4, 0.0, 0.5, 5.0, dense, paths, scattered, corrected=False)
     matrix = channel._cells._matrix.toarray()
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-14 * np.abs(matrix).max())
     np.linalg.cholesky(matrix)  # raises unless all is positive

@@ -247,11 +247,11 @@ def transfer(sky: Sky, solid_angles: Array, ior: float, interface: DiffuseInterf
 def sky_light(
     sky: Sky,
     visible: npt.NDArray[np.float32],
-    fluxes: Sequence[npt.NDArray[np.float32]],
+    radiances: Sequence[npt.NDArray[np.float32]],
     normals: Array,
     ior: float,
     mirrored: float,
-) -> tuple[Array, list[EnteringRays]]:
+) -> tuple[Array, EnteringRays]:
     """Light of the environment: flux (s, 3) that enters as uniform light does, and rays for its brighter parts.
 
     Parameters
@@ -259,53 +259,60 @@ def sky_light(
     sky : Sky
     visible : (s, k) float32
         See `Entrance`.
-    fluxes : three of (s, k) float32
-        Flux that enters from each direction, in each channel.
+    radiances : three of (s, k) float32
+        Mean radiance of the part of the sky around each direction as a sample sees it, in each channel.
     normals : (s, 3)
         Of the surface at the samples.
     ior : float
     mirrored : float
         Flux that the surface mirrors, as if it was diffuse, for a unit of what enters.
     """
-    uniform = visible * nearest_parts(sky.directions)[1].astype(np.float32)
-    whole = np.maximum(uniform.sum(axis=1), np.finfo(np.float32).tiny)
-    entering, bright = np.zeros((len(visible), 3)), []
-    for channel, flux in enumerate(fluxes):
-        most = BRIGHT * flux.sum(axis=1) / whole
-        bright.append(np.maximum(flux - most[:, None] * uniform, 0.0))
-        entering[:, channel] = (flux - bright[-1]).sum(axis=1, dtype=np.float64)
-    return entering, _sky_rays(sky, bright, normals, ior, mirrored)
+    angles = nearest_parts(sky.directions)[1].astype(np.float32)
+    transferred = visible * angles
+    whole = np.maximum(transferred.sum(axis=1), np.finfo(np.float32).tiny)
+    entering = np.stack([np.einsum("sk,sk->s", transferred, radiance) for radiance in radiances], axis=1)
+    most = BRIGHT * entering / whole[:, None]
+    bright = np.zeros(visible.shape, bool)
+    for radiance, limit in zip(radiances, most.T, strict=True):
+        bright |= radiance > limit[:, None]
+    flat = np.flatnonzero(bright & (visible > 0.0))
+    sample, direction = np.divmod(flat, len(angles))
+    received = transferred.ravel()[flat].astype(np.float64)
+    flux = np.stack(
+        [
+            np.maximum(radiance[sample, direction] - limit[sample], 0.0) * received
+            for radiance, limit in zip(radiances, most.T, strict=True)
+        ]
+    )
+    rest = np.stack([np.bincount(sample, channel, len(visible)) for channel in flux], axis=1)
+    return np.maximum(entering - rest, 0.0), _sky_rays(sky, sample, direction, flux, normals, ior, mirrored)
 
 
 def _sky_rays(
-    sky: Sky, fluxes: Sequence[npt.NDArray[np.float32]], normals: Array, ior: float, mirrored: float
-) -> list[EnteringRays]:
+    sky: Sky, sample: Integers, direction: Integers, flux: Array, normals: Array, ior: float, mirrored: float
+) -> EnteringRays:
     """Rays for the bright parts of the sky, `SKY_RAYS` of each sample.
 
-    The directions are divided among the rays by the flux from them, in their order on the spiral. All light of a ray
-    comes from one of them, chosen by its flux: neighboring samples have others.
+    The directions are divided among the rays by the flux (3, n) from them, in their order on the spiral. All light of a
+    ray comes from one of them, chosen by its flux: neighboring samples have others.
     """
-    summed = np.cumsum(np.add(*fluxes[:2]) + fluxes[2], axis=1, dtype=np.float64)
-    lit = np.flatnonzero(summed[:, -1] > 0.0)
-    if not len(lit):
-        return []
-    summed, count = summed[lit], len(lit)
-    middle = summed - 0.5 * np.diff(summed, axis=1, prepend=0.0)
-    number = np.minimum(SKY_RAYS * middle / summed[:, -1:], SKY_RAYS - 1).astype(np.int64)
-    place = (number + SKY_RAYS * np.arange(count)[:, None]).ravel()
-    size = SKY_RAYS * count
-    entering = np.stack([np.bincount(place, flux[lit].ravel(), size).reshape(count, -1) for flux in fluxes], axis=2)
-    ends = np.cumsum(entering.sum(axis=2), axis=1)
-    chance = other_plane_points(len(normals))[lit, 0]
-    rays = []
-    for i in range(SKY_RAYS):
-        before = ends[:, i - 1] if i else np.zeros(count)
-        level = np.minimum(before + chance * (ends[:, i] - before), summed[:, -1])
-        chosen = sky.directions[(summed < level[:, None]).sum(axis=1)]
-        of = np.flatnonzero((ends[:, i] > before) & ((chosen * normals[lit]).sum(axis=1) > 0.0))
-        refracted = refracted_direction(-chosen[of], normals[lit[of]], np.full(len(of), ior))
-        rays.append(EnteringRays(lit[of], refracted, entering[of, i], mirrored * entering[of, i]))
-    return rays
+    each = flux[0] + flux[1] + flux[2]
+    ends = np.cumsum(each)
+    first = np.flatnonzero(np.diff(sample, prepend=-1))
+    before = (ends - each)[first]
+    count = np.diff(first, append=len(sample))
+    total = np.repeat(np.maximum(ends[first + count - 1] - before, np.finfo(np.float64).tiny), count)
+    number = np.minimum(SKY_RAYS * (ends - 0.5 * each - np.repeat(before, count)) / total, SKY_RAYS - 1)
+    begin = np.flatnonzero(np.diff(SKY_RAYS * sample + number.astype(np.int64), prepend=-1))
+    entering = np.add.reduceat(flux, begin, axis=1) if len(begin) else flux
+    of = sample[begin]
+    level = (ends - each)[begin] + other_plane_points(len(normals))[of, 0] * entering.sum(axis=0)
+    last = np.append(begin[1:], len(sample)) - 1
+    chosen = sky.directions[direction[np.clip(np.searchsorted(ends, level), begin, last)]]
+    turned = (chosen * normals[of]).sum(axis=1) > 0.0
+    of, chosen, entering = of[turned], chosen[turned], entering.T[turned]
+    refracted = refracted_direction(-chosen, normals[of], np.full(len(of), ior))
+    return EnteringRays(of, refracted, entering, mirrored * entering)
 
 
 def from_itself(sky: Sky, transferred: Array, solid_angles: Array) -> sparse.csr_array:

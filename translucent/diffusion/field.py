@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.ndimage import map_coordinates, uniform_filter
+from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Floats, Integers
 from translucent.diffusion.entering import (
     BEFORE,
     Occluders,
@@ -28,7 +28,7 @@ from translucent.diffusion.entering import (
     sky_paths,
     transfer,
 )
-from translucent.diffusion.first_events import EnteringRays
+from translucent.diffusion.first_events import EnteringRays, joined_rays
 from translucent.diffusion.grid import BodyGrid, Densities, body_grid, densities
 from translucent.diffusion.photons import EnteringPhotons
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
@@ -169,6 +169,74 @@ class Entrance:
 
 
 @dataclass(frozen=True, eq=False)
+class Spreading:
+    """Means of samples' values in the cells where they lie, spread to cells around. Cells farther inside have others.
+
+    Attributes
+    ----------
+    means : (c, s) csr_array
+        Of the samples in each of the cells that have some.
+    rings : list of csr_array
+        Cells next to those that are known so far, each time: means of the known ones among the 26 around.
+    cells : (n,) int64
+        Places in the flat grid, of the cells that have samples and of each ring.
+    deep, numbers : (m,), (m,) int64
+        Places of the other cells in the system, and their numbers.
+    shape : tuple of 3 int
+    """
+
+    means: sparse.csr_array
+    rings: list[sparse.csr_array]
+    cells: Integers
+    deep: Integers
+    numbers: Integers
+    shape: tuple[int, ...]
+
+    @classmethod
+    def of(cls, grid: BodyGrid) -> Spreading:
+        """Spread over a grid."""
+        shape = grid.number.shape
+        place = np.floor((grid.points - grid.cells.low) / grid.cells.step).astype(int)
+        at = np.ravel_multi_index(tuple(np.clip(place, 0, np.array(shape) - 1).T), shape)
+        cells, row, count = np.unique(at, return_inverse=True, return_counts=True)
+        means = sparse.csr_array((1.0 / count[row], (row, np.arange(len(at)))), (len(cells), len(at)), np.float32)
+        # The grid gets a border, in which nothing is known.
+        wide = tuple(side + 2 for side in shape)
+        numbered = np.full(wide, -2)
+        numbered[1:-1, 1:-1, 1:-1] = -1
+        flat, inner = numbered.ravel(), np.flatnonzero(numbered == -1)
+        x, y, z = np.indices((3, 3, 3)).reshape(3, -1) - 1
+        around = (x * wide[1] + y) * wide[2] + z
+        known, rings = inner[cells], []
+        last, flat[known] = known, np.arange(len(known))
+        for _ in range(SPREAD):
+            near = np.zeros(len(flat), bool)
+            near[last[:, None] + around] = True
+            last = np.flatnonzero(near & (flat == -1))
+            column = flat[last[:, None] + around]
+            each = (column >= 0).sum(axis=1)
+            size, starts = (len(last), len(known)), np.concatenate([[0], np.cumsum(each)])
+            weights = np.repeat(1.0 / each, each).astype(np.float32)
+            rings.append(sparse.csr_array((weights, column[column >= 0], starts), size))
+            flat[last] = len(known) + np.arange(len(last))
+            known = np.concatenate([known, last])
+        number = grid.number.ravel()
+        deep = np.flatnonzero((flat[inner] < 0) & (number >= 0))
+        place = np.zeros(len(flat), np.int64)
+        place[inner] = np.arange(len(inner))
+        return cls(means, rings, place[known], deep, number[deep], shape)
+
+    def volume(self, values: Floats, deep: Floats) -> Floats:
+        """(x, y, z, n) float32: values (s, n) of the samples, spread, and `deep` (cells, n) farther inside."""
+        filled = self.means @ values
+        for ring in self.rings:
+            filled = np.concatenate([filled, ring @ filled])
+        volume = np.zeros((int(np.prod(self.shape)), values.shape[1]), np.float32)
+        volume[self.cells], volume[self.deep] = filled, deep[self.numbers]
+        return volume.reshape(*self.shape, -1)
+
+
+@dataclass(frozen=True, eq=False)
 class LitBody:
     """Geometry and densities of a body in which light diffuses, for any medium and lights.
 
@@ -184,6 +252,11 @@ class LitBody:
     sky: Sky
     _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
     _sky_paths: dict[tuple[Mesh, bytes], sparse.csr_array] = field(default_factory=dict)
+
+    @cached_property
+    def spreading(self) -> Spreading:
+        """From the samples of its surface to the cells around it."""
+        return Spreading.of(self.grid)
 
     @cached_property
     def densities(self) -> Densities:
@@ -264,7 +337,8 @@ class DiffusingBody:
         """
         dimming = dimming_bodies(scene, body)
         grid = self._lit.grid
-        entering, rays = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
+        entering, bright = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
+        rays = [bright]
         inside = np.zeros((grid.count, 3))
         for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
@@ -278,27 +352,29 @@ class DiffusingBody:
         found = self._system.solved(entering, self._entrance.itself, inside, rays)
         return _field(self._lit, self._medium, self._roughness, found)
 
-    def _from_sky(self, parts: Array, others: list[Object]) -> tuple[Array, list[EnteringRays]]:
+    def _from_sky(self, parts: Array, others: list[Object]) -> tuple[Array, EnteringRays]:
         """Flux (s, 3) that enters from radiance over solid angles (k, 3), less what other bodies on its path absorb.
 
         Parts of the sky that are brighter than the rest are returned as rays. Light that others scatter continues
         elsewhere, and as much comes from there: in uniform light it is not missing.
         """
         if not parts.any():
-            return np.zeros((len(self._lit.grid.points), 3)), []
+            return np.zeros((len(self._lit.grid.points), 3)), joined_rays([])
         visible, sky, ior = self._entrance.visible, self._lit.sky, self._medium.ior
-        fluxes = [visible * parts[:, channel].astype(np.float32) for channel in range(3)]
+        means = parts / nearest_parts(sky.directions)[1][:, None]
+        radiances = [np.broadcast_to(channel.astype(np.float32), visible.shape) for channel in means.T]
         absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
-        paths = self._lit.sky_paths(absorbing) if absorbing else []
-        for channel, flux in enumerate(fluxes):
+        paths = self._lit.sky_paths(absorbing)
+        for channel in range(3) if absorbing else ():
             depth = sparse.csr_array(visible.shape)
             for body, metres in zip(absorbing, paths, strict=True):
                 assert body.medium is not None
                 depth = depth + metres * float(np.asarray(body.medium.absorption)[channel])
             lost = depth.tocoo()
-            flux[lost.row, lost.col] *= optics.transmittance(lost.data)
+            radiances[channel] = radiances[channel].copy()
+            radiances[channel][lost.row, lost.col] *= optics.transmittance(lost.data)
         mirrored = (1.0 - diffuse_interface(ior).entering) / self._interface.entering
-        return sky_light(sky, visible, fluxes, self._lit.grid.normals, ior, mirrored)
+        return sky_light(sky, visible, radiances, self._lit.grid.normals, ior, mirrored)
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:
@@ -322,7 +398,7 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     scattered = np.maximum(found.scattered, LEAST_SCATTERED)
     values = np.concatenate([found.fluence, albedo * found.entering, scattered], axis=1)
     deep = np.concatenate([found.inside, np.zeros_like(found.inside), np.ones_like(found.inside)], axis=1)
-    volume = _spread(grid, values, deep).astype(np.float32)
+    volume = lit.spreading.volume(values.astype(np.float32), deep.astype(np.float32))
     cosine = emergent_cosine(float(albedo.mean()), medium.ior)
     ahead = np.asarray(medium.scattering) * max(medium.anisotropy, 0.0)
     # Of diffuse light, four times the volume over the area.
@@ -346,27 +422,3 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
             polished.reflected, optics.transmittance(np.asarray(medium.absorption) * chord)
         ),
     )
-
-
-def _spread(grid: BodyGrid, values: Array, deep: Array) -> Array:
-    """(x, y, z, n): means of samples' values (s, n) in the cells where they lie, spread to cells around.
-
-    Cells farther inside have those of `deep` (cells, n), for eyes there.
-    """
-    size = grid.number.shape
-    place = np.floor((grid.points - grid.cells.low) / grid.cells.step).astype(int)
-    at = np.ravel_multi_index(tuple(np.clip(place, 0, np.array(size) - 1).T), size)
-    total = int(np.prod(size))
-    count = np.bincount(at, minlength=total).astype(np.float64)
-    sums = np.stack([np.bincount(at, column, total) for column in values.T], axis=1)
-    filled = (sums / np.maximum(count, 1.0)[:, None]).reshape(*size, -1)
-    known = (count > 0.0).reshape(size)
-    for _ in range(SPREAD):
-        near = uniform_filter(known.astype(np.float64), 3, mode="constant")
-        mean = uniform_filter(filled * known[..., None], (3, 3, 3, 1), mode="constant")
-        new = ~known & (near > 1e-9)
-        filled[new] = mean[new] / near[new][:, None]
-        known |= new
-    rest = ~known & (grid.number >= 0)
-    filled[rest] = deep[grid.number[rest]]
-    return np.asarray(filled)

@@ -8,14 +8,13 @@ enters at a slant.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy import sparse
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array, Floats, Integers
 from translucent.diffusion.grid import BodyGrid, Densities, box_points
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
@@ -26,8 +25,11 @@ from translucent.formulas.diffuse_interface import (
 )
 from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 
-#: First events above the depth at which the fluence is read, and below it, for each sample.
-EVENTS, DEEP_EVENTS = 4, 2
+#: First events below the depth at which the fluence is read, for each sample.
+DEEP_EVENTS = 2
+
+#: Relative distance of two rates of decay that are equal, up to which one is moved: their difference divides.
+_ALIKE = 1e-6
 
 #: Fraction of the light below which no first events are looked for.
 _NOTHING = 1e-3
@@ -44,6 +46,10 @@ _LEAST_ALBEDO = 1e-6
 
 #: Least cosine of an entering direction with the surface normal; smaller ones, by smooth normals, are raised to it.
 _LEAST_COSINE = 0.05
+
+
+#: Cosines of light inside with the normal between which what half-spaces reflect of it is interpolated.
+_COSINES = np.linspace(0.0, 1.0, 513)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +72,13 @@ class EnteringRays:
     mirrored: Array
 
 
+def joined_rays(rays: Sequence[EnteringRays]) -> EnteringRays:
+    """All rays of several lights."""
+    nothing = EnteringRays(np.zeros(0, np.int64), *np.zeros((3, 0, 3)))
+    parts = zip(*((ray.samples, ray.directions, ray.entering, ray.mirrored) for ray in (nothing, *rays)), strict=True)
+    return EnteringRays(*map(np.concatenate, parts))
+
+
 @dataclass(frozen=True, eq=False)
 class LayerSolution:
     """One-dimensional solutions between the surface (depth 0) and the depth at which the fluence is read, per sample.
@@ -73,35 +86,53 @@ class LayerSolution:
     u is 1 at the surface, where it satisfies the condition; the fluence below is that at the depth over u there, and
     the flux to the surface D u' / u times it. All are given times exp(-k d), d the depth of reading, so that nothing
     overflows however dense the medium. Depths are integrals of the density.
+
+    Attributes
+    ----------
+    depth : (s,) float64
+        Of reading.
+    attenuation : float
+        k in 1/m.
+    condition : float
+        Of the surface: u' / u there.
+    scale, even, rise, u, slope : (s,) float64
+        At the depth of reading: exp(-k d), and times it cosh(k d), sinh(k d) / k, u and u'.
     """
 
     depth: Array
     attenuation: float
     condition: float
+    scale: Array
+    even: Array
+    rise: Array
+    u: Array
+    slope: Array
 
-    def u(self, depth: Array) -> Array:
-        """Solution without a source: cosh(k z) + c / D sinh(k z) / k."""
-        return np.asarray(self._cosh(depth) + self.condition * self.rise(depth))
-
-    def slope(self) -> Array:
-        """u' at the depth of reading."""
-        return np.asarray(self.attenuation**2 * self.rise(self.depth) + self.condition * self._cosh(self.depth))
-
-    def rise(self, depth: Array) -> Array:
-        """sinh(k z) / k, z where nothing is absorbed."""
-        both_ways = optics.mean_transmittance(2.0 * self.attenuation * depth)
-        return np.asarray(self._from(depth) * depth * both_ways)
+    @classmethod
+    def of(cls, depth: Array, attenuation: float, condition: float) -> LayerSolution:
+        """Solutions down to depths (s,)."""
+        scale = optics.transmittance(attenuation * depth)
+        even, rise = 0.5 * (1.0 + scale * scale), depth * optics.mean_transmittance(2.0 * attenuation * depth)
+        u, slope = even + condition * rise, attenuation**2 * rise + condition * even
+        return cls(depth, attenuation, condition, scale, even, rise, u, slope)
 
     def bend(self) -> Array:
         """(cosh(k d) - 1) / k^2 at the depth of reading, d^2 / 2 where nothing is absorbed."""
         return np.asarray(0.5 * (self.depth * optics.mean_transmittance(self.attenuation * self.depth)) ** 2)
 
-    def _cosh(self, depth: Array) -> Array:
-        return 0.5 * self._from(depth) * (1.0 + optics.transmittance(2.0 * self.attenuation * depth))
+    def events(self, samples: Integers, rate: Array) -> tuple[Array, Array]:
+        """Effects of first events above the depth of reading, where light decays with the depth at a rate (k,) in 1/m.
 
-    def _from(self, depth: Array) -> Array:
-        """exp(k (z - d))."""
-        return np.asarray(optics.transmittance(self.attenuation * np.maximum(self.depth - depth, 0.0)))
+        Integrals over the depth z of rate exp(-rate z) times sinh(k (d - z)) / k: fluence at the surface times D; and
+        times u(z): power for the cells. Both are over u at the depth of reading.
+        """
+        k, scale, u = self.attenuation, self.scale[samples], self.u[samples]
+        rate = np.where(np.abs(rate - k) < _ALIKE * rate, rate * (1.0 + _ALIKE), rate)
+        passed = optics.transmittance(rate * self.depth[samples])
+        factor = rate / ((rate - k) * (rate + k) * u)
+        at_surface = scale * passed - self.even[samples] + rate * self.rise[samples]
+        for_cells = scale * (rate + self.condition) - passed * (rate * u + self.slope[samples])
+        return factor * at_surface, factor * for_cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +150,9 @@ class EntryPaths:
         Whether the light is uniform outside; else each direction is the only one.
     length : callable
         From integrals of the density (k,), in m, along the paths, to metres (k,).
+    start, per_metre : (3, k) float32
+        Where the events of each are counted from, and way along it, in cells: each counts in the cell where it is, and
+        starts that differ by up to a cell interpolate by chance.
     """
 
     samples: Integers
@@ -126,19 +160,51 @@ class EntryPaths:
     cosine: Array | float
     diffuse: bool
     length: Callable[[Array], Array]
+    start: Floats
+    per_metre: Floats
+
+    @cached_property
+    def _between(self) -> tuple[Integers, Array]:
+        """Number of the last of `_COSINES` below that of each path, and how far it is from there to the next one."""
+        place = np.asarray(self.cosine) * (len(_COSINES) - 1)
+        number = np.minimum(place.astype(np.int64), len(_COSINES) - 2)
+        return number, place - number
+
+    def at_cosine(self, values: Array | float) -> Array | float:
+        """(k,): values that are given at `_COSINES`; one that is given for all of them stays."""
+        if np.ndim(values) == 0:
+            return values
+        (number, fraction), table = self._between, np.asarray(values)
+        return np.asarray(table[number] + fraction * np.diff(table)[number])
+
+    @classmethod
+    def of(
+        cls,
+        grid: BodyGrid,
+        dense: Densities,
+        samples: Integers,
+        directions: Array,
+        cosine: Array | float,
+        *,
+        diffuse: bool,
+    ) -> EntryPaths:
+        """Paths in a grid."""
+        lengths, cells = dense.lengths(samples, directions), grid.cells
+        start = ((grid.points - cells.low) / cells.step + _places(len(grid.points))[0])[samples]
+        single = (np.ascontiguousarray(part.T, np.float32) for part in (start, directions / cells.step))
+        return cls(samples, directions, cosine, diffuse, lengths, *single)
 
 
 def diffuse_paths(grid: BodyGrid, dense: Densities, ior: float) -> EntryPaths:
     """One path below each sample, in directions that are distributed as those of uniform light from outside."""
     directions, samples = grid.inward_directions(ior), np.arange(len(grid.points))
-    return EntryPaths(samples, directions, diffuse_interface(ior).mean_cosine, True, dense.lengths(samples, directions))
+    return EntryPaths.of(grid, dense, samples, directions, diffuse_interface(ior).mean_cosine, diffuse=True)
 
 
 def entry_paths(ray: EnteringRays, grid: BodyGrid, dense: Densities) -> EntryPaths:
     """Paths of entering rays below the surface."""
-    cosine = -(ray.directions * grid.face_normals[ray.samples]).sum(axis=1)
-    lengths = dense.lengths(ray.samples, ray.directions)
-    return EntryPaths(ray.samples, ray.directions, np.clip(cosine, _LEAST_COSINE, 1.0), False, lengths)
+    cosine = np.clip(-(ray.directions * grid.face_normals[ray.samples]).sum(axis=1), _LEAST_COSINE, 1.0)
+    return EntryPaths.of(grid, dense, ray.samples, ray.directions, cosine, diffuse=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,20 +226,13 @@ class Events:
     above: Array
     below: list[tuple[Integers, Array]]
 
-    def matrix(self, grid: BodyGrid, read: sparse.csr_array) -> sparse.csr_array:
-        """(cells, s): scattered power in each cell for a unit of flux that enters at each sample."""
-        count = len(self.near)
-        deep = sparse.csr_array((count, grid.count))
+    def power(self, grid: BodyGrid, samples: Integers, flux: Array) -> Array:
+        """(cells,): scattered power in each cell for a flux (k,) that enters at samples (k,), in W."""
+        above = np.bincount(samples, self.above * flux, len(grid.points))
+        total = np.asarray(grid.below[0].T @ above)
         for cell, weight in self.below:
-            deep = deep + sparse.csr_array((weight, (np.arange(count), cell)), deep.shape)
-        return sparse.csr_array((grid.area * (deep + sparse.diags_array(self.above) @ read)).T)
-
-    def power_below(self, flux: Array, cells: int) -> Array:
-        """(cells,): power scattered in each cell below the depth of reading, for an entering flux (k,)."""
-        total = np.zeros(cells)
-        for cell, weight in self.below:
-            total += np.bincount(cell, weight * flux, cells)
-        return total
+            total += np.bincount(cell, weight * flux, grid.count)
+        return grid.area * total
 
 
 class FirstEvents:
@@ -213,47 +272,40 @@ class FirstEvents:
 
     def of(self, paths: EntryPaths) -> Events:
         """First events of light along these paths."""
-        grid, extinction, cosine = self._grid, self._extinction, paths.cosine
-        layer = replace(self._layer, depth=self._layer.depth[paths.samples])
-        relative = 1.0 / layer.u(layer.depth)
+        grid, layer, extinction, cosine = self._grid, self._layer, self._extinction, paths.cosine
+        cosines = None if paths.diffuse else _COSINES
+        straight = paths.at_cosine(straight_back(self._albedo, self._ior, self._phase, cosines) * self._thick)
         # Excess of the reflectance by diffusion over that of the exact half-space.
-        cosines = None if paths.diffuse else np.asarray(cosine)
-        straight = straight_back(self._albedo, self._ior, self._phase, cosines) * self._thick
-        excess = (
+        excess = paths.at_cosine(
             self._flat * half_space_excess(self._albedo, self._ior, cosines) / diffuse_interface(self._ior).conductance
         )
-
-        def counted(path: Array) -> Array:
-            """Fraction of the first events after an optical path from the surface that count as isotropic."""
-            return np.asarray(1.0 - straight * optics.transmittance(STRAIGHT * path))
-
-        # Fractions of the light that is scattered above the depth of reading, and below it.
-        slant = layer.depth / cosine
-        below, above = optics.transmittance(extinction * slant), optics.opacity(extinction * slant)
-        near, into_cells = np.zeros(len(slant)), np.zeros(len(slant))
-        for quantile in (np.arange(EVENTS) + 0.5) / EVENTS:
-            path = -np.log1p(-quantile * above)
-            depth = path * cosine / extinction
-            weight = self._albedo / EVENTS * above * relative * counted(path)
-            into_cells += weight * layer.u(depth)
-            near += weight * layer.rise(layer.depth - depth) / self._d
-        deep = []
-        # Interpolation by chance: each place counts in the cell around it.
-        spread, quantiles = _places(len(grid.points))
-        start = grid.points[paths.samples] + grid.cells.step * spread[paths.samples]
-        for quantile in quantiles[:, paths.samples] if below.max(initial=0.0) > _NOTHING else ():
-            length = slant - np.log1p(-quantile) / extinction
+        rate = np.broadcast_to(extinction / np.asarray(cosine), paths.samples.shape)
+        near, above = layer.events(paths.samples, rate)
+        if np.any(straight):
+            # After an optical path t those count that are not turned straight back, 1 - straight exp(-STRAIGHT t).
+            fewer = straight / (1.0 + STRAIGHT)
+            less_near, less_above = layer.events(paths.samples, (1.0 + STRAIGHT) * rate)
+            near, above = near - fewer * less_near, above - fewer * less_above
+        slant = layer.depth[paths.samples] / cosine
+        below, deep = optics.transmittance(extinction * slant), []
+        farthest = grid.cells.step * sum(grid.number.shape)
+        quantiles = _places(len(grid.points))[1][:, paths.samples] if below.max(initial=0.0) > _NOTHING else ()
+        for quantile in quantiles:
+            length = slant - quantile / extinction
+            metres = np.minimum(paths.length(length), farthest).astype(np.float32)
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
-            at = start + paths.length(length)[:, None] * paths.directions
-            cell, inside = grid.cell_at(at)
-            deep.append((cell, self._albedo / DEEP_EVENTS * below * inside * counted(extinction * length)))
-        return Events(near - excess, into_cells, deep)
+            cell, weight = grid.cell_at(paths.start + metres * paths.per_metre)
+            weight = self._albedo / DEEP_EVENTS * below * weight
+            if np.any(straight):
+                weight *= 1.0 - straight * optics.transmittance(STRAIGHT * extinction * length)
+            deep.append((cell, weight))
+        return Events(self._albedo * near / self._d - excess, self._albedo * above, deep)
 
 
 @lru_cache(maxsize=16)
 def _places(samples: int) -> tuple[Array, Array]:
-    """Shifts (samples, 3) in cells, and quantiles, of the events of each sample."""
-    return box_points(samples) - 0.5, tails(samples)
+    """Shifts (samples, 3) in cells, and logarithms of the light that is left, of the events of each sample."""
+    return box_points(samples) - 0.5, np.log1p(-tails(samples))
 
 
 def tails(samples: int) -> Array:
@@ -263,16 +315,16 @@ def tails(samples: int) -> Array:
 
 
 def scattered_fractions(grid: BodyGrid, dense: Densities, ior: float, extinction: float) -> Array:
-    """(s,): fraction of uniform light entering at each sample of a body that is scattered before it leaves.
+    """(s,): fraction of uniform light entering near each sample of a body that is scattered before it leaves.
 
     The same fraction of what leaves there has been scattered: paths are the same in both directions.
     """
     directions, metres = grid.crossings(ior)
-    fractions = [
-        optics.opacity(extinction * dense.along(direction, to))
+    passed = [
+        optics.transmittance(extinction * dense.along(direction, to))
         for direction, to in zip(directions, metres, strict=True)
     ]
-    return np.asarray(np.mean(fractions, axis=0))
+    return np.asarray((1.0 - np.mean(passed, axis=0))[grid.nearest].mean(axis=1))
 
 
 def half_space_excess(albedo: float, ior: float, cosine: Array | None = None) -> Array | float:

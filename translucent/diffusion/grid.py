@@ -18,7 +18,7 @@ from scipy.ndimage import map_coordinates
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from translucent.arrays import Array, Integers, Mask, expanded
+from translucent.arrays import Array, Floats, Integers, Mask, expanded
 from translucent.formulas import optics
 from translucent.geometry.normals import corner_normals
 from translucent.geometry.ray_caster import ray_caster_of
@@ -158,6 +158,9 @@ LEAST_LENGTH, LEAST_DEPTH = 0.3, 0.1
 #: Paths below each sample that measure the unscattered light, and their start below it, in cells.
 INWARD_DIRECTIONS, START = 8, 1e-4
 
+#: Blocks of cells along the longest side of a grid, in each of which the solver looks for errors as one.
+BLOCKS = 8
+
 #: Samples next to each other for which something is found together.
 TOGETHER = 6
 
@@ -289,6 +292,25 @@ class BodyGrid:
         return sparse.csr_array(weights + nearest), np.maximum(depth, LEAST_DEPTH) * self.cells.step
 
     @cached_property
+    def blocks(self) -> Integers:
+        """(cells,): number of the block of cells that each is in, `BLOCKS` of them along the longest side."""
+        side = -(-max(self.number.shape) // BLOCKS)
+        x, y, z = np.nonzero(self.number >= 0)
+        block = ((x // side) * BLOCKS + y // side) * BLOCKS + z // side
+        return np.asarray(np.unique(block, return_inverse=True)[1])
+
+    @cached_property
+    def block_pairs(self) -> Integers:
+        """(n,): number of the pair of blocks that each number of the linear system stands between."""
+        of = self.blocks
+        return np.asarray(of[self.pattern.rows] * (of.max(initial=-1) + 1) + of[self.pattern.columns])
+
+    @cached_property
+    def pattern(self) -> MatrixPattern:
+        """Where the linear system of its cells has numbers."""
+        return MatrixPattern.of(self)
+
+    @cached_property
     def layers(self) -> Array:
         """(cells,): volume in m^3 of each cell that is less deep than the fluence is read, counted for each sample."""
         depth = self.below[1]
@@ -339,13 +361,20 @@ class BodyGrid:
         weights = sparse.csr_array((value / scale[row], (row, np.concatenate(columns))), (len(points), self.count))
         return Probe(weights, center / scale[:, None], around)
 
-    def cell_at(self, points: Array) -> tuple[Integers, Array]:
-        """(k,), (k,): number of the cell at points (k, 3) in metres, and its fraction inside; 0 outside the system."""
-        place = np.floor((points - self.cells.low) / self.cells.step).astype(int)
-        within = np.all((place >= 0) & (place < np.array(self.number.shape)), axis=1)
-        x, y, z = np.where(np.asarray(within)[:, None], place, 0).T
-        number = self.number[x, y, z]
-        return np.maximum(number, 0), np.where(number >= 0, self.cells.inside[x, y, z], 0.0)
+    def cell_at(self, places: Floats) -> tuple[Integers, Array]:
+        """(k,), (k,): number of the cell at places (3, k) in cells, and its fraction inside; 0 outside the system."""
+        number, inside = self._flat_cells
+        size = self.number.shape
+        # Cells at the sides of the grid are empty.
+        x, y, z = (np.clip(at, 0, n - 1).astype(np.intp) for at, n in zip(places, size, strict=True))
+        flat = (x * size[1] + y) * size[2] + z
+        return number[flat], inside[flat]
+
+    @cached_property
+    def _flat_cells(self) -> tuple[Integers, Array]:
+        """Number of each cell of the grid and its fraction inside, both 0 outside the system."""
+        number = self.number.ravel()
+        return np.maximum(number, 0), np.where(number >= 0, self.cells.inside.ravel(), 0.0)
 
     def _depth(self, probe: Probe) -> Array:
         """(s,): depth below the samples at which the fluence is read, in cells."""
@@ -361,6 +390,61 @@ class BodyGrid:
             found = np.where(found < 0, self.number[x, y, z], found)
         row = np.flatnonzero(missing & (found >= 0))
         return sparse.csr_array((np.ones(len(row)), (row, found[row])), (len(self.points), self.count))
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixPattern:
+    """Places of the numbers in the linear system of a grid: a cell has some for itself and for cells around it.
+
+    Attributes
+    ----------
+    starts, columns : (cells + 1,), (n,) int32
+        Of a csr_array.
+    rows : (n,) int64
+    diagonal, between : (cells,), (2, faces) int64
+        Where the numbers of cells stand, and those of faces between cells, on either side.
+    losses : (n, s) csc_array
+        From losses at the samples of the surface to numbers: each loses what is read there.
+    """
+
+    starts: npt.NDArray[np.int32]
+    columns: npt.NDArray[np.int32]
+    rows: Integers
+    diagonal: Integers
+    between: Integers
+    losses: sparse.csc_array
+
+    @classmethod
+    def of(cls, grid: BodyGrid) -> MatrixPattern:
+        """Pattern of a grid."""
+        (first, second, _), read, count = grid.faces, grid.below[0], grid.count
+        # Numbers of a cell are at first in 27 places, by where the other cell is.
+        flat = np.flatnonzero(grid.number.ravel() >= 0)
+        width, deep = grid.number.shape[1:]
+        x, rest = np.divmod(flat, width * deep)
+        y, z = np.divmod(rest, deep)
+        place = 9 * x + 3 * y + z
+
+        def at(one: Integers, other: Integers) -> Integers:
+            return np.asarray(27 * one + 13 + place[other] - place[one])
+
+        each = np.diff(read.indptr).astype(np.int64)
+        one, pair = expanded(read.indptr[:-1].astype(np.int64), each)
+        # Of each cell that a sample reads, all that it reads.
+        _, other = expanded(read.indptr[one].astype(np.int64), each[one])
+        pair = np.repeat(pair, each[one])
+        lost = at(read.indices[pair].astype(np.int64), read.indices[other].astype(np.int64))
+        own, sides = at(np.arange(count), np.arange(count)), np.stack([at(first, second), at(second, first)])
+        used = np.zeros(27 * count, bool)
+        used[lost], used[own], used[sides] = True, True, True
+        found, number = np.flatnonzero(used), np.cumsum(used) - 1
+        rows, way = np.divmod(found, 27)
+        dx, dy, dz = way // 9 - 1, way // 3 % 3 - 1, way % 3 - 1
+        columns = grid.number.ravel()[flat[rows] + (dx * width + dy) * deep + dz]
+        starts = np.searchsorted(rows, np.arange(count + 1))
+        ends = np.concatenate([[0], np.cumsum(each**2)])
+        losses = sparse.csc_array((read.data[pair] * read.data[other], number[lost], ends), (len(found), len(each)))
+        return cls(starts.astype(np.int32), columns.astype(np.int32), rows, number[own], number[sides], losses)
 
 
 def body_grid(body: Object, step: float) -> BodyGrid:

@@ -7,6 +7,7 @@ path.
 
 References
 ----------
+Nicolaides 1987, "Deflation of conjugate gradients with applications to boundary value problems" for the solver;
 Stam 1995, "Multiple scattering as a diffusion process"; Haber et al. 2005, "Embedded boundary method for shape
 optimization"; Haskell et al. 1994 for the condition at the surface; Grosjean 1956 for D.
 """
@@ -18,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import cg
+from scipy.sparse.linalg import LinearOperator, cg
 
 from translucent.arrays import Array
 from translucent.diffusion.first_events import (
@@ -28,11 +29,11 @@ from translucent.diffusion.first_events import (
     LayerSolution,
     diffuse_paths,
     entry_paths,
+    joined_rays,
     scattered_fractions,
 )
 from translucent.diffusion.grid import BodyGrid, Densities, even_densities
 from translucent.errors import RenderError
-from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient, half_space_reflectance
 from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 from translucent.media.medium import Medium
@@ -62,12 +63,13 @@ class KnownSolutions:
         most = max(2, min(MOST, MOST_NUMBERS // max(count, 1)))
         self._solutions = np.zeros((most, count))
         self._energies = np.zeros((most, most))
-        self._oldest = 0
+        self._next = self._count = 0
 
     def nearest(self, right_side: Array) -> Array:
         """(n,): the mixture of known solutions nearest in energy to the one for a right-hand side (n,)."""
-        mixture = np.linalg.lstsq(self._energies, self._solutions @ right_side, rcond=ROUNDING)[0]
-        return np.asarray(mixture @ self._solutions)
+        known, energies = self._solutions[: self._count], self._energies[: self._count, : self._count]
+        mixture = np.linalg.lstsq(energies, known @ right_side, rcond=ROUNDING)[0]
+        return np.asarray(mixture @ known)
 
     def add(self, solution: Array) -> None:
         """Take in a solution (n,) of unit energy, in place of the oldest."""
@@ -75,10 +77,12 @@ class KnownSolutions:
         if (energy := float(solution @ pushed)) <= 0.0:
             return
         size = np.sqrt(energy)
-        self._solutions[self._oldest] = solution / size
-        with_others = self._solutions @ pushed / size
-        self._energies[self._oldest], self._energies[:, self._oldest] = with_others, with_others
-        self._oldest = (self._oldest + 1) % len(self._solutions)
+        place, most = self._next % len(self._solutions), len(self._solutions)
+        self._next += 1
+        self._count = min(self._next, most)
+        self._solutions[place] = solution / size
+        with_others = self._solutions[: self._count] @ pushed / size
+        self._energies[place, : self._count], self._energies[: self._count, place] = with_others, with_others
 
 
 #: Relative residual at which a solution is good enough: far below what diffusion itself gets wrong.
@@ -86,6 +90,9 @@ TOLERANCE = 1e-4
 
 #: The same for factors that are near 1.
 ROUGH = 1e-3
+
+#: The same at first, while it is not known what falls on the body again; and as a fraction of the change of that.
+FIRST, OF_CHANGE = 5e-3, 0.05
 
 #: Steps after which conjugate gradients are given up.
 MOST_STEPS = 4000
@@ -106,43 +113,54 @@ class CellSystem:
     """
 
     def __init__(self, grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> None:
-        matrix = _balance(grid, d, absorbed, lost)
-        self._scale = 1.0 / np.sqrt(matrix.diagonal())
-        self._matrix = sparse.csr_array(sparse.diags_array(self._scale) @ matrix @ sparse.diags_array(self._scale))
+        pattern, values = grid.pattern, _balance(grid, d, absorbed, lost)
+        self._matrix = sparse.csr_array((values, pattern.columns, pattern.starts), (grid.count, grid.count))
+        self._approximate_inverse = _approximate_inverse(grid, self._matrix)
         self._known = KnownSolutions(self._matrix)
+        self._taken = float(absorbed.sum() + lost.sum())
 
-    def solved(self, source: Array) -> tuple[Array, int]:
+    def even(self, source: Array) -> Array:
+        """Fluence (cells,) that is the same everywhere and loses as much as powers (cells,) bring."""
+        return np.full(len(source), source.sum() / max(self._taken, np.finfo(np.float64).tiny))
+
+    def solved(self, source: Array, near: Array | None = None, tolerance: float = TOLERANCE) -> tuple[Array, int]:
         """Solve for the fluence (cells,) of powers (cells,); also returns the number of iterations.
 
-        There are none where the powers are a mixture of earlier ones.
+        They start from a fluence `near` (cells,); default: from the nearest mixture of all solutions so far that
+        started so. There are none where the powers are a mixture of those.
 
         Raises
         ------
         RenderError
             If the solver does not get there.
         """
-        right_side = source * self._scale
-        found, steps = self._found(right_side, self._known.nearest(right_side), TOLERANCE)
+        if near is not None:
+            return self._found(source, near, tolerance)
+        found, steps = self._found(source, self._known.nearest(source), tolerance)
         if steps:
             self._known.add(found)
-        return np.asarray(found * self._scale), steps
+        return found, steps
 
     def forget(self) -> None:
         """Start the next solution from nothing."""
         self._known = KnownSolutions(self._matrix)
 
-    def rough(self, source: Array) -> Array:
-        """Fluence (cells,) for powers (cells,) up to a residual of `ROUGH`; no other solution starts from it."""
-        return np.asarray(self._found(source * self._scale, None, ROUGH)[0] * self._scale)
-
-    def _found(self, right_side: Array, near: Array | None, tolerance: float) -> tuple[Array, int]:
+    def _found(self, right_side: Array, near: Array, tolerance: float) -> tuple[Array, int]:
         steps = 0
 
         def count(_: Array) -> None:
             nonlocal steps
             steps += 1
 
-        found, failed = cg(self._matrix, right_side, x0=near, rtol=tolerance, maxiter=MOST_STEPS, callback=count)
+        found, failed = cg(
+            self._matrix,
+            right_side,
+            x0=near,
+            rtol=tolerance,
+            maxiter=MOST_STEPS,
+            M=self._approximate_inverse,
+            callback=count,
+        )
         if failed:
             raise RenderError(
                 "diffusion in a body",
@@ -152,20 +170,33 @@ class CellSystem:
         return np.asarray(found), steps
 
 
-def _balance(grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> sparse.csr_array:
-    """Symmetric matrix of flow between cells, absorption, and losses through the surface."""
-    first, second, ratio = grid.faces
+def _approximate_inverse(grid: BodyGrid, matrix: sparse.csr_array) -> LinearOperator:
+    """Approximate inverse of a system: that of its diagonal, and that for solutions even in each block of cells.
+
+    Errors that single cells see vanish in a few steps of conjugate gradients, and those as wide as the body in many:
+    with the second part they need no more than others (Nicolaides 1987).
+    """
+    of, count = grid.blocks, int(grid.blocks.max(initial=-1)) + 1
+    between = np.bincount(grid.block_pairs, matrix.data, count * count).reshape(count, count)
+    diagonal, inverse = 1.0 / matrix.data[grid.pattern.diagonal], np.linalg.inv(between)
+
+    def apply(right_side: Array) -> Array:
+        return np.asarray(diagonal * right_side + (inverse @ np.bincount(of, right_side, count))[of])
+
+    return LinearOperator(matrix.shape, matvec=apply, dtype=np.float64)
+
+
+def _balance(grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> Array:
+    """Numbers of the symmetric matrix of flow between cells, absorption, and losses through the surface."""
+    (first, second, ratio), pattern = grid.faces, grid.pattern
     flow = 2.0 / (1.0 / d[first] + 1.0 / d[second]) * ratio
     # Crumbs that no sample reads would otherwise keep all of the light that is put into them.
     diagonal = absorbed + np.where(grid.crumbs, d * grid.cells.step, 0.0)
     diagonal += np.bincount(first, flow, grid.count) + np.bincount(second, flow, grid.count)
-    between = sparse.coo_array(
-        (np.concatenate([-flow, -flow]), (np.concatenate([first, second]), np.concatenate([second, first]))),
-        (grid.count, grid.count),
-    )
-    read, _ = grid.below
-    leaving = read.T @ sparse.diags_array(lost) @ read
-    return sparse.csr_array(between + sparse.diags_array(diagonal) + leaving)
+    values = np.asarray(pattern.losses @ lost)
+    values[pattern.diagonal] += diagonal
+    values[pattern.between] -= flow
+    return values
 
 
 #: Largest number of times that light of the body falls on the body again, and the change at which it is enough.
@@ -250,6 +281,7 @@ class BodySystem:
                 float(scattering),
                 self._dense,
                 paths,
+                scattered_fractions(grid, self._dense, medium.ior, float(absorption + scattering)),
                 medium.phase_function,
                 corrected=corrected,
             )
@@ -280,13 +312,14 @@ class BodySystem:
         """
         fluence, flux, cells = np.zeros_like(entering), entering.copy(), np.zeros_like(inside)
         scattered = np.ones_like(entering)
-        steps, paths = 0, [entry_paths(ray, self._grid, self._dense) for ray in rays]
+        steps, ray = 0, joined_rays(rays)
+        path = entry_paths(ray, self._grid, self._dense)
         for channel, system in self._channels.items():
             emission = float(self._emitted[channel])
-            straight = system.directional(channel, rays, paths)
-            if not self._warm_starts:
-                system.forget()
-            found = system.solved(entering[:, channel], from_itself, inside[:, channel], emission, straight)
+            straight = system.directional(ray.entering[:, channel], ray.mirrored[:, channel], path)
+            found = system.solved(
+                entering[:, channel], from_itself, inside[:, channel], emission, straight, self._warm_starts
+            )
             fluence[:, channel], flux[:, channel], cells[:, channel], taken = found
             scattered[:, channel] = system.scattered
             steps += taken
@@ -315,6 +348,7 @@ class _ChannelSystem:
         scattering: float,
         dense: Densities,
         paths: EntryPaths,
+        scattered: Array,
         phase: PhaseFunction = ISOTROPIC,
         *,
         corrected: bool,
@@ -326,28 +360,28 @@ class _ChannelSystem:
         self._albedo = scattering / extinction
         d = float(diffusion_coefficient(absorption, scattering))
         self._read, depth = grid.below[0], dense.depth
-        layer = LayerSolution(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
-        self._relative = 1.0 / layer.u(depth)
-        self._attenuated = optics.transmittance(layer.attenuation * depth) * self._relative
+        layer = LayerSolution.of(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
+        self._relative = 1.0 / layer.u
+        self._attenuated = layer.scale * self._relative
         # 4 V / S is the mean chord (Cauchy).
         chord = 4.0 * float(dense.cells @ grid.volumes) / (grid.area * len(depth))
         self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord)
-        diffuse = self._first.of(paths)
-        self._near, self._into_cells = diffuse.near, diffuse.matrix(grid, self._read)
+        self._diffuse = self._first.of(paths)
+        self._all = paths.samples
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
         # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
         self._emitted_near = layer.bend() / d * self._relative
-        below = grid.area * (layer.rise(depth) + layer.condition * layer.bend()) * self._relative
+        below = grid.area * (layer.rise + layer.condition * layer.bend()) * self._relative
         self._emitted_cells = dense.cells * grid.cores + self._read.T @ below
-        lost = grid.area * d * layer.slope() * self._relative
+        lost = grid.area * d * layer.slope * self._relative
         absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
         absorbed = absorption * dense.cells * absorbing
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
         self._correction = np.ones(len(depth))
         #: (s,): see `SurfaceLight`.
-        self.scattered = scattered_fractions(grid, dense, ior, extinction)[grid.nearest].mean(axis=1)
+        self.scattered = scattered
         if corrected:
-            lossless = _ChannelSystem(grid, ior, roughness, 0.0, extinction, dense, paths, corrected=False)
+            lossless = _ChannelSystem(grid, ior, roughness, 0.0, extinction, dense, paths, scattered, corrected=False)
             # What half-spaces absorb has not been in the body long enough to get to other parts of it.
             reflectance = half_space_reflectance(round(self._albedo, 6), ior)
             found = lossless.by_uniform_light()
@@ -361,32 +395,24 @@ class _ChannelSystem:
         of folds.
         """
         even = np.ones(len(self._grid.points))
-        found = (self._read @ self._cells.rough(self._into_cells @ even)) * self._attenuated + self._near * even
+        source = self._diffuse.power(self._grid, self._all, even)
+        cells, _ = self._cells.solved(source, self._cells.even(source), ROUGH)
+        found = (self._read @ cells) * self._attenuated + self._diffuse.near
         found, target = found[self._grid.nearest].mean(axis=1), self.scattered
         # The sum over all samples is right.
         least = np.finfo(np.float64).tiny
         correction = target / max(target.sum(), least) * found.sum() / np.maximum(found, least)
         return np.asarray(np.clip(correction, LEAST_CORRECTION, MOST_CORRECTION))
 
-    def forget(self) -> None:
-        """Start the next solution from nothing; its bounces start from each other."""
-        self._cells.forget()
+    def directional(self, entering: Array, mirrored: Array, paths: EntryPaths) -> _DirectionalEffects:
+        """Effects of rays that enter with a flux (k,), and are reflected with another: first events on their paths."""
+        events, count = self._first.of(paths), len(self._grid.points)
 
-    def directional(
-        self, channel: int, rays: Sequence[EnteringRays], paths: Sequence[EntryPaths]
-    ) -> _DirectionalEffects:
-        """Effects of rays that enter: first events along each of their paths."""
-        grid = self._grid
-        flux, mirrored, near, above = np.zeros((4, len(grid.points)))
-        below = np.zeros(grid.count)
-        for ray, path in zip(rays, paths, strict=True):
-            entering, events = ray.entering[:, channel], self._first.of(path)
-            flux[ray.samples] += entering
-            mirrored[ray.samples] += ray.mirrored[:, channel]
-            near[ray.samples] += events.near * entering
-            above[ray.samples] += events.above * entering
-            below += events.power_below(entering, grid.count)
-        return _DirectionalEffects(flux, mirrored, near, grid.area * (self._read.T @ above + below))
+        def at_samples(values: Array) -> Array:
+            return np.asarray(np.bincount(paths.samples, values, count), np.float64)
+
+        power, near = events.power(self._grid, paths.samples, entering), events.near * entering
+        return _DirectionalEffects(at_samples(entering), at_samples(mirrored), at_samples(near), power)
 
     def solved(
         self,
@@ -395,19 +421,23 @@ class _ChannelSystem:
         power: Array,
         emission: float,
         straight: _DirectionalEffects,
+        warm_starts: bool,
     ) -> tuple[Array, Array, Array, int]:
         """Fluence and flux at the samples, fluence in the cells, and steps.
 
         Light of the body falls on it again until little changes.
         """
         flux, steps = entering, 0
-        before = np.zeros_like(entering)
+        cells: Array | None = None
+        before, tolerance = np.zeros_like(entering), FIRST if from_itself.nnz else TOLERANCE
         inside = self._albedo * (power + emission * self._emitted_cells) + straight.power
         emitted = self._albedo * emission * self._emitted_near + straight.near
         for _ in range(MOST_BOUNCES):
-            cells, taken = self._cells.solved(self._into_cells @ flux + inside)
+            source = self._diffuse.power(self._grid, self._all, flux) + inside
+            near = None if warm_starts else self._cells.even(source) if cells is None else cells
+            cells, taken = self._cells.solved(source, near, tolerance)
             steps += taken
-            fluence = np.maximum((self._read @ cells) * self._attenuated + self._near * flux + emitted, 0.0)
+            fluence = np.maximum((self._read @ cells) * self._attenuated + self._diffuse.near * flux + emitted, 0.0)
             fluence *= self._correction
             # What the surface mirrors goes on as if it was diffuse.
             leaving = self._exit_fraction * fluence + self._mirrored * flux + straight.mirrored
@@ -418,7 +448,10 @@ class _ChannelSystem:
             returned = min(max(returned, 0.0), MOST_RETURNED)
             flux = np.maximum(flux + change / (1.0 - returned), 0.0)
             most = np.abs(flux + straight.flux).max(initial=0.0)
-            if np.abs(change).max(initial=0.0) <= ENOUGH * (1.0 - returned) * most:
+            largest = np.abs(change).max(initial=0.0)
+            if tolerance == TOLERANCE and largest <= ENOUGH * (1.0 - returned) * most:
                 break
+            tolerance = min(max(OF_CHANGE * largest / max(most, np.finfo(np.float64).tiny), TOLERANCE), FIRST)
             before = change if returned == 0.0 else np.zeros_like(entering)
+        assert cells is not None
         return fluence, flux + straight.flux, np.maximum(cells, 0.0), steps

@@ -243,6 +243,7 @@ def _inside_reflectance(cosine: Array, ior: float) -> Array:
     return optics.fresnel_dielectric(cosine, 1.0 / ior) if ior > 1.0 else np.zeros_like(cosine)
 
 
+@lru_cache(maxsize=8)
 def _gauss(number: int = NODES) -> tuple[Array, Array]:
     """Nodes and weights on 0 to 1."""
     x, weight = np.polynomial.legendre.leggauss(number)
