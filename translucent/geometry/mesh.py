@@ -125,7 +125,7 @@ class Mesh(Frozen):
 
     def __repr__(self) -> str:
         about = f"{len(self.vertices)} vertices, {len(self.faces)} faces"
-        return f"Mesh({self.name!r}, {about}{f'; {size}' if (size := size_note(self, python=True)) else ''})"
+        return f"Mesh({self.name!r}, {about}{f'; {size}' if (size := size_note(self, way='argument')) else ''})"
 
     @cached_property
     def diagnosis(self) -> Diagnosis:

@@ -214,7 +214,10 @@ def command_line(recipe: Recipe) -> tuple[str, list[str]]:
     document, look, display = recipe.document, recipe.document.look, recipe.document.display
     model, orbit = recipe.loaded.model, recipe.orbit
     words = ["translucent", "render", model.path, "-o", recipe.output, "--size", f"{recipe.size[0]}x{recipe.size[1]}"]
-    words += ["--unit", model.unit] if model.unit != "m" else []
+    if model.unit != "m":
+        low, high = recipe.loaded.scene.shown_bounds
+        own = model.path in mesh_names() and not Path(model.path).exists()
+        words += ["--height", f"{high[1] - low[1]:.12g}m"] if own else ["--unit", model.unit]
     own = document.material == own_material(look, recipe.loaded)  # which translucent render gives the model by itself
     medium, left_out = ([], []) if own else _medium_options(document.material)
     words += medium
