@@ -12,15 +12,13 @@ vec3 environment_radiance(vec3 point, vec3 direction, bool reflected, float blur
 #endif
 }
 
-// A ray that has left the scene, or ended at an opaque object: its radiance is found for all rays of a group together, apart from
-// following them.
+// The end of a ray that has left the scene, or has hit an opaque object.
 struct EscapedRay {
     int object;        // that is opaque; AIR for the environment
     vec3 normal;       // of the object
     vec3 origin;
     vec3 point;        // of the object
     vec3 direction;
-    vec3 throughput;
     bool reflected;
     float blur;
     Ellipse ellipse;
