@@ -43,6 +43,13 @@ def unread_at_hits(scene: Scene) -> list[Note]:
     return [Note(NoteKind.TEXTURES, text)]
 
 
+def untextured_rays(scene: Scene) -> list[Note]:
+    """Notes on textures where rays have the values of a surface where a pixel shows it first, or without textures."""
+    names = object_names(body for body in scene.objects if varies_at_hits(body))
+    text = f"textures and vertex colors behind the first surface of a ray: {names} are even there"
+    return [Note(NoteKind.TEXTURES, text)]
+
+
 def reduced_at_hits(scene: Scene) -> list[Note]:
     """Notes on textures that rays on a GPU read with fewer texels than they have."""
     halved = {texture for texture, times in halvings(scene).items() if times}

@@ -226,7 +226,7 @@ def blurred_fraction(samples: int) -> float:
 def traced_scene(job: FrameJob, stack: ExitStack) -> tuple[dict[str, moderngl.Texture], dict[str, Any]]:
     """Textures by which rays find what they hit in the scene of a job, and loose uniforms; released with the stack."""
     scene, center = job.scene, media_center(job.scene)
-    hierarchies = job.resources.hierarchies.of(scene)
+    hierarchies = job.resources.hierarchies.of(scene, textured=job.features.textured)
     placements, frame = hierarchies.place(scene, center)
     table = job.object_table(placements)
     stack.callback(table.release)
