@@ -15,6 +15,7 @@
 #include "transport/hierarchy.glsl"
 #include "transport/interior_list.glsl"
 #include "transport/surface_hit.glsl"
+#include "transport/textured_hit.glsl"
 #include "transport/interaction.glsl"
 #include "transport/light_passed.glsl"
 #include "transport/footprint.glsl"
@@ -90,7 +91,7 @@ void escape(Ray ray, EscapedRay end) {
 }
 
 EscapedRay escaped_ray(Ray ray, int object, vec3 normal, vec3 point) {
-    return EscapedRay(object, normal, ray.origin, point, ray.direction, is_reflected(ray), ray.blur, ellipse_of(ray.footprint));
+    return EscapedRay(object, -1, vec2(0.0), 0.0, normal, ray.origin, point, ray.direction, is_reflected(ray), ray.blur, ellipse_of(ray.footprint));
 }
 
 #if OPAQUE
@@ -166,13 +167,23 @@ bool starts_within(Ray ray, ObjectRow body, bool outside) {
 #endif
 }
 
-// Material where a ray has hit. Textures are read where a pixel's ray first hits an object; farther on it counts as the same all over.
+#if TEXTURED
+uniform float sample_width;  // of a sample, in pixels
+
+// Metres of a surface that a sample sees, as if its ray had gone straight.
+float width_at_hit(vec3 point, float facing) {
+    float away = length(point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz);
+    return sample_width * pixel_metres(away) * inversesqrt(max(facing, 0.05));
+}
+#else
+float width_at_hit(vec3 point, float facing) { return 0.0; }
+#endif
+
+// Material of the first interface as the rasterizer has it.
 void take_material(inout Interaction at, PrimaryHit primary) {
-    if (at.object == primary.object) {
-        at.roughness = primary.roughness;
-        at.transmission = primary.transmission;
-        at.color = primary.color;
-    }
+    at.roughness = primary.roughness;
+    at.transmission = primary.transmission;
+    at.color = primary.color;
 }
 
 // A clear coat: takes its part of the lobes and of what is emitted below, and reflects it as the interface below does, or adds
@@ -252,7 +263,6 @@ int branch(inout Ray ray, out Ray weaker, Ray back, Ray on, vec3 again, bool tot
 // The interaction of a ray with an interface; returns which branches go on. again, last: as for `branch`.
 int interact(inout Ray ray, out Ray weaker, Interaction at, ObjectRow body, Hit hit, SurfaceHit surface, PrimaryHit primary, float unoccluded,
     vec3 again, bool last) {
-    take_material(at, primary);
     int depth = depth_of(ray) + 1, interactions = interactions_of(ray) - 1;
     bool polished = at.roughness == 0.0;
     float alpha = at.roughness * at.roughness;
@@ -304,7 +314,8 @@ int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int chann
     }
     vec3 point = ray.origin + hit.path * ray.direction;
     advance(ray.footprint, hit.path);
-    ObjectRow body = traced_body(surface.object);
+    float width = width_at_hit(point, abs(dot(surface.face_normal, ray.direction)));
+    ObjectRow body = body_at(surface.object, surface.triangle, surface.weights, width);
     int type = int(body.type);
     if (starts_within(ray, body, surface.outside)) { return pass_on(ray, point, surface.face_normal, ray.interior, ray.outwards); }
     if (!sound && (all_closed == 0 || is_full(ray.interior))) { lose(ray); }
@@ -315,7 +326,11 @@ int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int chann
     if (type == TYPE_OPAQUE && (surface.outside || body.one_sided == 0.0)) {
         // It is in an open body, and whether rightly so, what is behind the opaque object would decide.
         if (all_closed == 0 && is_in_open_body(ray.interior)) { lose(ray); }
-        escape(ray, escaped_ray(ray, surface.object, normal, point));
+        EscapedRay end = escaped_ray(ray, surface.object, normal, point);
+        end.triangle = surface.triangle;
+        end.weights = surface.weights;
+        end.width = width;
+        escape(ray, end);
         return NONE;
     }
     int after = effective_medium(surface.interior);
@@ -323,6 +338,8 @@ int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int chann
         return pass_on(ray, ray.origin + surface.path * ray.direction, surface.face_normal, surface.interior, normal);
     }
     Interaction at = interaction_at(surface, body, point, ray.direction, normal, before, after, channel);
+    // Where rays cannot read textures, all of an object is as where it is first hit.
+    if (first || (TEXTURED == 0 && surface.object == primary.object)) { take_material(at, primary); }
     // Light that scatters inside leaves all the same as from a layer.
     vec3 again = surface.outside || is_layer(before) ? vec3(1.0) : passed;
     bool last = depth_of(ray) + 1 >= most_interfaces || interactions_of(ray) <= 1;

@@ -101,6 +101,8 @@ class TracedInterfacesPass:
             "most_interfaces": depth,
             "sample_number": job.sample,
             "blurred_fraction": blurred_fraction(job.samples),
+            "sample_width": job.samples**-0.5,
+            "picture_first": int(_shows_more(job)),
             **scene_values,
             **_ground(job.scene),
             **_footprint(job),
@@ -159,6 +161,7 @@ class TracedInterfacesPass:
             DEEP=job.plan.interfaces is not None and job.plan.interfaces.tree[0] > 16,
             FROM_EYE=job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
             **ray_switches(scene),
+            TEXTURED=job.features.textured,
             EMISSION=job.features.emits and not job.features.scatters,
             LAYERED=any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
             DIFFUSED=job.diffused_light is not None,
@@ -192,6 +195,12 @@ class TracedInterfacesPass:
             textures["diffused_light"] = job.diffused_light.texture
         self._variants.bind(emitted_radiance_sum=emitted, straight_transmittance=through, **textures)
         resources.shadows.use(self._variants.units)
+
+
+def _shows_more(job: FrameJob) -> bool:
+    """True if the picture has photons or shadows on opaque objects that rays do not look up."""
+    shadows = interface_shadow_switches(job)["SHADOW_MAPS"]
+    return job.features.has_caustics or (job.features.has_shadow_maps and not shadows)
 
 
 def _footprint(job: FrameJob) -> dict[str, float]:
