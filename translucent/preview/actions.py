@@ -28,6 +28,7 @@ from translucent.preview.document import (
     turned,
     zoomed,
 )
+from translucent.scene.showcase import SOLID_IOR
 from translucent.units import metres_per_unit
 
 #: Largest number of steps that can be undone.
@@ -187,7 +188,11 @@ def _changed(document: Document, action: SetField) -> Document:
     if owner is None or name not in owner.__dataclass_fields__ or section == "model":
         raise InputError(f"field {action.field!r}", "there is none to change", "use for example material.roughness")
     if isinstance(owner, Material):
-        return dataclasses.replace(document, material=changed_material(owner, name, action.value))
+        changed = changed_material(owner, name, action.value)
+        bare = Path(document.model.path).suffix.lower() not in SUFFIXES
+        if bare and owner.source == "file" and changed.source == "color":
+            changed = dataclasses.replace(changed, ior=max(owner.ior, SOLID_IOR))  # a solid, as of other verbs
+        return dataclasses.replace(document, material=changed)
     value = checked(action.field, action.value, getattr(owner, name))
     return dataclasses.replace(document, **{section: dataclasses.replace(owner, **{name: value})})
 

@@ -40,6 +40,7 @@ from translucent.preview.worker import Pool, Urgency, report
 from translucent.renderer import Renderer
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene
+from translucent.scene.showcase import SOLID_IOR
 from translucent.scene.stages import NO_STAGE
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Texture
@@ -253,9 +254,11 @@ def _medium_options(material: Material) -> tuple[list[str], list[str]]:
     if material.source == "preset":
         found, words = preset(material.preset).medium, ["--preset", material.preset]
     else:
-        found = Medium.from_color(material.color, material.distance)
+        found = Medium.from_color(material.color, material.distance, ior=SOLID_IOR)
         words = ["--color", f"linear({_numbers(material.color)})", "--distance", f"{material.distance:.12g}m"]
-    fields = {"ior": "the index of refraction", "scattering": "scattering", "emission": "emission"}
+    if material.ior != found.ior:
+        words += ["--ior", f"{material.ior:.12g}"]
+    fields = {"scattering": "scattering", "emission": "emission"}
     left_out = [part for name, part in fields.items() if np.any(getattr(found, name) != getattr(requested, name))]
     return [*words, "--roughness", f"{material.roughness:g}"], left_out + material.unsaid
 

@@ -54,7 +54,7 @@ from translucent.scene.showcase import (
     DEFAULT_COLOR,
     DEFAULT_REACH,
     LIGHT_TABLE,
-    STAGED_IOR,
+    SOLID_IOR,
     fillable,
     framing,
     named_environment,
@@ -273,7 +273,7 @@ def own_material(look: Look, loaded: Loaded) -> Material:
     """Material that a model comes with: a bare mesh on a stage has an interface, as ``translucent render`` gives it."""
     if not loaded.bare or stage_name(look, loaded) == NO_STAGE:
         return loaded.material
-    return dataclasses.replace(loaded.material, ior=STAGED_IOR)
+    return dataclasses.replace(loaded.material, ior=SOLID_IOR)
 
 
 def tone_of(look: Look, scene: Scene) -> str:
