@@ -18,7 +18,7 @@ import translucent as tl
 from translucent.arrays import Array
 from translucent.assets import mesh_path
 from translucent.diffusion.entering import Occluders, from_light
-from translucent.diffusion.field import lit_body
+from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import BodySystem
 from translucent.formulas import interface, optics
 from translucent.formulas.diffuse_interface import diffuse_interface

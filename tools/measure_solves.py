@@ -17,7 +17,8 @@ import numpy as np
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.diffusion import solution
-from translucent.diffusion.field import DiffusingBody, lit_body
+from translucent.diffusion.field import DiffusingBody
+from translucent.diffusion.lit_body import lit_body
 
 CAMERA = tl.Camera.look_at((0, 0, 5), (0, 0, 0))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Protocol
 
 from translucent.arrays import Array
 from translucent.errors import InputError
@@ -20,16 +20,6 @@ HARDLY_METRES = 20.0
 FIGURINE = 0.12
 
 #: Names of units in sentences.
-
-Way = Literal["option", "argument", "field"]
-
-#: Texts that set a unit, and a size.
-_WAYS: dict[Way, tuple[str, str]] = {
-    "option": ("--unit {}", "--{0} {2:g}cm"),
-    "argument": ("unit='{}'", "{0}={1:g}"),
-    "field": ("File > Unit of the file > {}", "set the height under Look to {2:g} cm"),
-}
-
 _ADJECTIVES = {"height": "tall", "longest": "long"}
 _NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches"}
 
@@ -47,7 +37,7 @@ class _Model(Protocol):
     def assumed_unit(self) -> str: ...
 
 
-def size_note(mesh: _Model, assumed_unit: str | None = None, *, way: Way = "option") -> str:
+def size_note(mesh: _Model, assumed_unit: str | None = None, *, python: bool = False) -> str:
     """Sentence on the size of a mesh whose file names no unit, with what sets another; empty where it is known.
 
     Parameters
@@ -55,8 +45,8 @@ def size_note(mesh: _Model, assumed_unit: str | None = None, *, way: Way = "opti
     mesh : Mesh
     assumed_unit : str, optional
         Default: that of the mesh.
-    way : {"option", "argument", "field"}
-        What sets another size: options, arguments of `load_mesh`, or fields of the window.
+    python : bool
+        What sets it are arguments of `load_mesh`, and else options.
     """
     assumed = mesh.assumed_unit if assumed_unit is None else assumed_unit
     if not assumed:
@@ -67,12 +57,12 @@ def size_note(mesh: _Model, assumed_unit: str | None = None, *, way: Way = "opti
     if (likely := likely_unit(longest / metres, Path(mesh.name).suffix)) is not None:
         unit, why = likely
         factor = METRES_PER_UNIT[unit] / metres
-        stated = _WAYS[way][0].format(unit)
+        stated = f"unit={unit!r}" if python else f"--unit {unit}"
         return f"{taken}; {why}: {stated} makes it {tall(factor * mesh.bounds)}"
     if USUAL[0] <= longest <= USUAL[1]:
         return taken
     name = side_of(mesh.bounds)[0]
-    stated = _WAYS[way][1].format(name, FIGURINE, 100 * FIGURINE)
+    stated = f"{name}={FIGURINE:g}" if python else f"--{name} {100 * FIGURINE:g}cm"
     return f"{taken}; for a figurine {stated}"
 
 

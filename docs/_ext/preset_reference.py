@@ -1,13 +1,12 @@
-"""Mean colors of media on the ball against path-traced truth, as tables for the page on named media."""
+"""Mean colors of media on the ball against path-traced truth, as tables for the page on media."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from sphinx.application import Sphinx
+from sphinx.application import Sphinx
 
 #: Largest deviation of a channel that passes, of our pictures and of those of Blender.
 MOST, MOST_BLENDER = 0.1, 0.05
@@ -37,7 +36,7 @@ def rows(measured: dict[str, Any], what: str = "drawn", most: float = MOST) -> l
 
 
 def write_tables(app: Sphinx) -> None:
-    """Write ``generated/presets.md`` and ``generated/blender.md``, which ``measurements/media.md`` includes."""
+    """Write ``generated/presets.md`` and ``generated/blender.md``, which ``media.md`` includes."""
     source = Path(app.srcdir)
     folder = source / "generated"
     folder.mkdir(exist_ok=True)

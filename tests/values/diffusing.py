@@ -9,11 +9,12 @@ import numpy.typing as npt
 from scipy import sparse
 
 import translucent as tl
-from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
+from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.diffusion.first_events import (
     EnteringRays,
 )
 from translucent.diffusion.grid import BodyGrid, body_grid
+from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.geometry.solids import Sphere
 from translucent.planning.scattering import Diffusion

@@ -10,8 +10,9 @@ import pytest
 from scipy import sparse
 
 import translucent as tl
-from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
+from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.diffusion.grid import BodyGrid, body_grid, densities
+from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import BodySystem
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.solids import Box, Sphere

@@ -25,8 +25,9 @@ from tests.values.diffusing import (
 from translucent.diffusion import entering
 from translucent.diffusion.cache import diffusion_key
 from translucent.diffusion.entering import Occluders, from_light, opaque_surfaces
-from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
+from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.diffusion.grid import other_plane_points, plane_points
+from translucent.diffusion.lit_body import lit_body
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.diffusion import IN_SCATTERED_REFLECTED, in_scattered_shares

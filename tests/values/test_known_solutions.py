@@ -6,8 +6,9 @@ import numpy as np
 from scipy import sparse
 
 import translucent as tl
-from translucent.diffusion.field import DiffusingBody, lit_body
+from translucent.diffusion.field import DiffusingBody
 from translucent.diffusion.grid import body_grid
+from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import MOST, TOLERANCE, BodySystem, KnownSolutions
 from translucent.diffusion.volume import DiffusingVolume, VolumeGrid
 from translucent.geometry.solids import Sphere

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.diffusion.field import DiffusingBody, lit_body
+from translucent.diffusion.field import DiffusingBody
 from translucent.diffusion.keys import diffusion_key
+from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.volume import _mean_attenuation
 from translucent.formulas.light import ALL_AROUND, cone_attenuation, light_cone
 from translucent.geometry.solids import Box, Sphere

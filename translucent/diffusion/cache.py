@@ -9,7 +9,7 @@ from threading import Lock
 from typing import TypeVar
 
 from translucent.diffusion.entering import opaque_surfaces
-from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
+from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.diffusion.keys import (
     coefficients_of,
     diffusing_media,
@@ -18,7 +18,9 @@ from translucent.diffusion.keys import (
     place_of,
     roughness_of,
 )
+from translucent.diffusion.lit_body import BodyShape, LitBody, body_shape, lit_body, own_frame
 from translucent.diffusion.photons import EnteringPhotons, FineCells, photons_in_media
+from translucent.diffusion.solution import BodySystem
 from translucent.diffusion.volume import DiffusingVolume, PhotonFluence, VolumeField, VolumeGrid
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
@@ -70,7 +72,8 @@ class FieldCache:
         self._lock = Lock()
         self._opaque: OrderedDict[Hashable, RayCaster | None] = OrderedDict()
         self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
-        self._diffusing: OrderedDict[Hashable, DiffusingBody] = OrderedDict()
+        self._shapes: OrderedDict[Hashable, BodyShape] = OrderedDict()
+        self._systems: OrderedDict[Hashable, BodySystem] = OrderedDict()
         self._grids: OrderedDict[Hashable, VolumeGrid] = OrderedDict()
         self._volumes: OrderedDict[Hashable, DiffusingVolume] = OrderedDict()
         self._scenes: OrderedDict[Hashable, Fields] = OrderedDict()
@@ -118,7 +121,8 @@ class FieldCache:
             for store in (
                 self._opaque,
                 self._bodies,
-                self._diffusing,
+                self._shapes,
+                self._systems,
                 self._grids,
                 self._volumes,
                 self._scenes,
@@ -128,15 +132,29 @@ class FieldCache:
     def _body(
         self, body: Object, medium: Medium, places: Hashable, opaque: RayCaster | None, diffusion: Diffusion
     ) -> DiffusingBody:
-        step, roughness = diffusion.cell_size(body), roughness_of(body)
-        place = place_of(body), body.density, places, step
-        lit = _kept(self._bodies, place, lambda: lit_body(body, opaque, step), KEPT_BODIES)
-        key = (place, medium, roughness)
+        roughness, own = roughness_of(body), own_frame(body)
+        step = diffusion.cell_size(own)
+        shape_key = place_of(own), body.density, step
+        shape = _kept(self._shapes, shape_key, lambda: body_shape(own, step), KEPT_BODIES)
+        lit = _kept(
+            self._bodies,
+            (place_of(body), shape_key, places),
+            lambda: lit_body(body, opaque, step, shape),
+            KEPT_BODIES,
+        )
 
-        def make() -> DiffusingBody:
-            return DiffusingBody(lit, medium, roughness, corrected=diffusion.corrected, warm_starts=self._warm_starts)
+        def make() -> BodySystem:
+            return BodySystem(
+                shape.grid,
+                medium,
+                roughness,
+                shape.densities,
+                corrected=diffusion.corrected,
+                warm_starts=self._warm_starts,
+            )
 
-        return _kept(self._diffusing, key, make, KEPT_BODIES)
+        system = _kept(self._systems, (shape_key, medium, roughness), make, KEPT_BODIES)
+        return DiffusingBody(lit, medium, roughness, system)
 
     def _volume(self, body: Object, medium: Medium, diffusion: Diffusion) -> DiffusingVolume:
         grid, key = self._grid(body, diffusion), (_density_place(body, diffusion), coefficients_of(medium))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from translucent.arrays import Array, Integers, Mask
+from translucent.arrays import Array, Floats, Integers, Mask
 from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, other_plane_points
 from translucent.diffusion.keys import may_dim
@@ -111,8 +111,48 @@ BRIGHT = 2.0
 #: Rays of each sample that carry such light.
 SKY_RAYS = 4
 
+#: Digits to which the stretch of a body is rounded, so that it does not depend on its rotation, and the least size of
+#: a body along one axis over that along another up to which this is done.
+_DIGITS, _LEAST_STRETCH = 12, 1e-6
+
 #: Bounds of the correction by which a quadrature over directions gives the known fraction of uniform light.
 _CORRECTION = (0.5, 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Rotation or reflection, and shift, of a body that is stretched along its own axes, to where it is in the world.
+
+    Its light depends on the stretch, and on where what lights it is as seen from there.
+
+    Attributes
+    ----------
+    turn : (3, 3) float64
+    shift : (3,) float64
+    """
+
+    turn: Array
+    shift: Array
+
+    @classmethod
+    def of(cls, matrix: Array) -> tuple[Placement, Array]:
+        """Placement by a transform (4, 4), and the stretch (4, 4) before it, the same for all rotations of a body."""
+        linear, stretch = matrix[:3, :3], np.eye(4)
+        _, sizes, axes = np.linalg.svd(linear)
+        if sizes[2] > _LEAST_STRETCH * sizes[0]:
+            unit = 2.0 ** np.floor(np.log2(sizes[0]))
+            stretch[:3, :3] = unit * np.round((axes.T * (sizes / unit)) @ axes, _DIGITS)
+        else:
+            stretch[:3, :3] = linear
+        return cls(linear @ np.linalg.inv(stretch[:3, :3]), matrix[:3, 3].copy()), stretch
+
+    def outwards(self, directions: Array) -> Array:
+        """(k, 3): directions of the body in the world."""
+        return np.asarray(directions @ self.turn.T)
+
+    def inwards(self, directions: Array) -> Array:
+        """(k, 3): directions of the world in the body."""
+        return np.asarray(directions @ self.turn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +169,11 @@ class Occluders:
 
     body: Object
     opaque: RayCaster | None = None
+
+    @cached_property
+    def placement(self) -> Placement:
+        """Of the body."""
+        return Placement.of(self.body.matrix)[0]
 
     def nearest(self, origins: Array, directions: Array) -> tuple[Array, Array]:
         """Distance in metres at which rays (k, 3), (k, 3) hit the body, and at which anything opaque; inf for none."""
@@ -153,11 +198,11 @@ def opaque_surfaces(objects: Sequence[Object]) -> RayCaster | None:
     return RayCaster(Mesh(vertices, faces))
 
 
-def flux_of(photons: EnteringPhotons, grid: BodyGrid) -> Array:
+def flux_of(photons: EnteringPhotons, grid: BodyGrid, placement: Placement) -> Array:
     """(s, 3): flux of photons at the samples of a surface: each counts at the nearest one."""
     flux = np.zeros((len(grid.points), 3))
     if len(photons.points):
-        sample = cKDTree(grid.points).query(photons.points)[1]
+        sample = cKDTree(grid.points).query(placement.inwards(photons.points - placement.shift))[1]
         for channel in range(3):
             flux[:, channel] = np.bincount(sample, photons.power[:, channel], len(flux)) / grid.area
     return flux
@@ -165,38 +210,44 @@ def flux_of(photons: EnteringPhotons, grid: BodyGrid) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Sky:
-    """Visibility of the sky and of the body itself from each sample of its surface.
+    """Visibility of the sky, and of the body itself, from each sample of its surface in directions above it.
 
     Attributes
     ----------
     directions : (k, 3) float64
-    cosine : (s, k) float64
-        With the normal, 0 where the direction is below the surface.
-    visible : (s, k) bool
-    facing : (h,), (h,), (h,) int
-        Pairs of sample and direction in which another place of the body is visible, and the sample nearest to it.
+    sample, direction : (n,) int32
+        Pairs of a sample and a direction above the surface there.
+    cosine : (n,) float32
+        With the normal.
+    distance : (n,) float32
+        In metres to where the body itself is hit; inf where the sky is visible.
+    facing, other : (h,) int64
+        Pairs in which the body itself is, and the sample nearest to the place.
     """
 
     directions: Array
-    cosine: Array
-    visible: Mask
-    facing: tuple[Integers, Integers, Integers]
+    sample: npt.NDArray[np.int32]
+    direction: npt.NDArray[np.int32]
+    cosine: Floats
+    distance: Floats
+    facing: Integers
+    other: Integers
 
 
-def sky_of(grid: BodyGrid, casters: Occluders) -> Sky:
+def sky_of(grid: BodyGrid) -> Sky:
     """Trace rays from each sample of a surface for the directions in which it sees the sky."""
-    directions = even_directions(DIRECTIONS)
-    cosine = np.maximum(grid.normals @ directions.T, 0.0)
-    cosine[grid.face_normals @ directions.T <= 0.0] = 0.0
-    sample, direction = np.nonzero(cosine)
-    start = grid.points + BEFORE * grid.cells.step * grid.face_normals
-    itself, others = casters.nearest(start[sample], directions[direction])
-    visible = np.zeros(cosine.shape, bool)
-    visible[sample, direction] = np.isinf(itself) & np.isinf(others)
-    faced = np.isfinite(itself) & (itself <= others)
-    places = start[sample[faced]] + itself[faced, None] * directions[direction[faced]]
-    nearest = cKDTree(grid.points).query(places)[1] if faced.any() else np.zeros(0, int)
-    return Sky(directions, cosine, visible, (sample[faced], direction[faced], nearest))
+    directions, body = even_directions(DIRECTIONS), grid.body
+    cosine = (grid.normals @ directions.T).astype(np.float32)
+    above = (cosine > 0.0) & (grid.face_normals @ directions.T > 0.0)
+    flat = np.flatnonzero(above)
+    sample, direction = (part.astype(np.int32) for part in np.divmod(flat, len(directions)))
+    start, into = grid.points + BEFORE * grid.cells.step * grid.face_normals, np.linalg.inv(body.matrix)
+    local = start @ into[:3, :3].T + into[:3, 3]
+    distance = ray_caster_of(body.mesh).distances(local, directions @ into[:3, :3].T, sample, direction)
+    facing = np.flatnonzero(np.isfinite(distance))
+    places = start[sample[facing]] + distance[facing, None] * directions[direction[facing]]
+    other = cKDTree(grid.points).query(places)[1] if len(facing) else np.zeros(0, np.int64)
+    return Sky(directions, sample, direction, cosine.ravel()[flat], distance, facing, np.asarray(other, np.int64))
 
 
 def even_directions(count: int) -> Array:
@@ -207,10 +258,14 @@ def even_directions(count: int) -> Array:
     return np.stack([level * np.cos(angle), level * np.sin(angle), up], axis=1)
 
 
-def environment_parts(environment: Environment, directions: Array) -> Array:
-    """(k, 3): radiance of the environment, integrated over the part of the sphere nearest to each direction."""
+def environment_parts(environment: Environment, directions: Array, turn: Array | None = None) -> Array:
+    """(k, 3): radiance of the environment, integrated over the part of the sphere nearest to each direction.
+
+    `turn` (3, 3) rotates the directions to those of the environment.
+    """
     nearest, _ = nearest_parts(directions)
     texels, angle = _map_directions()
+    texels = texels if turn is None else texels @ turn.T
     radiance = angle[:, None] * np.asarray(environment.lighting(texels), np.float64)
     return np.stack([np.bincount(nearest, radiance[:, channel], len(directions)) for channel in range(3)], axis=1)
 
@@ -235,19 +290,20 @@ def _map_directions() -> tuple[Array, Array]:
     return texel_directions(MAP_HEIGHT, 2 * MAP_HEIGHT).reshape(-1, 3), angle
 
 
-def transfer(sky: Sky, solid_angles: Array, ior: float, interface: DiffuseInterface) -> Array:
-    """(s, k): flux that enters at samples for a unit of radiance from each direction, per solid angle."""
-    passed = (1.0 - optics.fresnel_dielectric(sky.cosine, ior)) * sky.cosine
-    polished = passed @ solid_angles
+def transfer(sky: Sky, samples: int, ior: float, interface: DiffuseInterface) -> Array:
+    """(n,): flux that enters for a unit of radiance from the part of the sphere around each direction of the pairs."""
+    cosine, solid_angles = sky.cosine.astype(np.float64), nearest_parts(sky.directions)[1][sky.direction]
+    passed = (1.0 - optics.fresnel_dielectric(cosine, ior)) * cosine * solid_angles
+    polished = np.bincount(sky.sample, passed, samples)
     exact = np.pi * interface.entering
     correction = np.clip(exact / np.maximum(polished, 1e-9), *_CORRECTION)
-    return np.asarray(passed * correction[:, None])
+    return np.asarray(passed * correction[sky.sample])
 
 
 def sky_light(
-    sky: Sky,
-    visible: npt.NDArray[np.float32],
-    radiances: Sequence[npt.NDArray[np.float32]],
+    directions: Array,
+    received: Floats,
+    radiances: Sequence[Floats],
     normals: Array,
     ior: float,
     mirrored: float,
@@ -256,8 +312,8 @@ def sky_light(
 
     Parameters
     ----------
-    sky : Sky
-    visible : (s, k) float32
+    directions : (k, 3) float64
+    received : (s, k) float32
         See `Entrance`.
     radiances : three of (s, k) float32
         Mean radiance of the part of the sky around each direction as a sample sees it, in each channel.
@@ -267,29 +323,27 @@ def sky_light(
     mirrored : float
         Flux that the surface mirrors, as if it was diffuse, for a unit of what enters.
     """
-    angles = nearest_parts(sky.directions)[1].astype(np.float32)
-    transferred = visible * angles
-    whole = np.maximum(transferred.sum(axis=1), np.finfo(np.float32).tiny)
-    entering = np.stack([np.einsum("sk,sk->s", transferred, radiance) for radiance in radiances], axis=1)
+    whole = np.maximum(received.sum(axis=1), np.finfo(np.float32).tiny)
+    entering = np.stack([np.einsum("sk,sk->s", received, radiance) for radiance in radiances], axis=1)
     most = BRIGHT * entering / whole[:, None]
-    bright = np.zeros(visible.shape, bool)
+    bright = np.zeros(received.shape, bool)
     for radiance, limit in zip(radiances, most.T, strict=True):
         bright |= radiance > limit[:, None]
-    flat = np.flatnonzero(bright & (visible > 0.0))
-    sample, direction = np.divmod(flat, len(angles))
-    received = transferred.ravel()[flat].astype(np.float64)
+    flat = np.flatnonzero(bright & (received > 0.0))
+    sample, direction = np.divmod(flat, len(directions))
+    weight = received.ravel()[flat].astype(np.float64)
     flux = np.stack(
         [
-            np.maximum(radiance[sample, direction] - limit[sample], 0.0) * received
+            np.maximum(radiance[sample, direction] - limit[sample], 0.0) * weight
             for radiance, limit in zip(radiances, most.T, strict=True)
         ]
     )
-    rest = np.stack([np.bincount(sample, channel, len(visible)) for channel in flux], axis=1)
-    return np.maximum(entering - rest, 0.0), _sky_rays(sky, sample, direction, flux, normals, ior, mirrored)
+    rest = np.stack([np.bincount(sample, channel, len(received)) for channel in flux], axis=1)
+    return np.maximum(entering - rest, 0.0), _sky_rays(directions, sample, direction, flux, normals, ior, mirrored)
 
 
 def _sky_rays(
-    sky: Sky, sample: Integers, direction: Integers, flux: Array, normals: Array, ior: float, mirrored: float
+    directions: Array, sample: Integers, direction: Integers, flux: Array, normals: Array, ior: float, mirrored: float
 ) -> EnteringRays:
     """Rays for the bright parts of the sky, `SKY_RAYS` of each sample.
 
@@ -308,18 +362,11 @@ def _sky_rays(
     of = sample[begin]
     level = (ends - each)[begin] + other_plane_points(len(normals))[of, 0] * entering.sum(axis=0)
     last = np.append(begin[1:], len(sample)) - 1
-    chosen = sky.directions[direction[np.clip(np.searchsorted(ends, level), begin, last)]]
+    chosen = directions[direction[np.clip(np.searchsorted(ends, level), begin, last)]]
     turned = (chosen * normals[of]).sum(axis=1) > 0.0
     of, chosen, entering = of[turned], chosen[turned], entering.T[turned]
     refracted = refracted_direction(-chosen, normals[of], np.full(len(of), ior))
     return EnteringRays(of, refracted, entering, mirrored * entering)
-
-
-def from_itself(sky: Sky, transferred: Array, solid_angles: Array) -> sparse.csr_array:
-    """(s, s): form factors: flux that enters at a sample for a unit of diffuse flux that leaves another one."""
-    sample, direction, other = sky.facing
-    values = (transferred * solid_angles)[sample, direction] / np.pi
-    return sparse.csr_array((values, (sample, other)), (len(transferred), len(transferred)))
 
 
 def from_light(
@@ -335,39 +382,42 @@ def from_light(
 
     `stops` are surfaces of other bodies that none of it passes.
     """
+    placement = casters.placement
+    points = placement.outwards(grid.points) + placement.shift
+    all_normals, face_normals = placement.outwards(grid.normals), placement.outwards(grid.face_normals)
     if isinstance(light, PositionalLight):
-        towards = np.asarray(light.position) - grid.points
+        towards = np.asarray(light.position) - points
         distance = np.linalg.norm(towards, axis=1)
         direction = towards / np.maximum(distance, 1e-18)[:, None]
-        depth, gain = _spread(towards, grid)
+        depth, gain = _spread(towards, face_normals, grid.area)
     else:
-        direction = np.broadcast_to(-np.asarray(light.direction), grid.points.shape)
-        distance = np.full(len(grid.points), np.inf)
-        depth, gain = np.zeros(len(grid.points)), np.ones(len(grid.points))
-    cosine = (direction * grid.normals).sum(axis=1)
-    lit = np.flatnonzero((cosine > 0.0) & ((direction * grid.face_normals).sum(axis=1) > 0.0))
-    start = grid.points[lit] + BEFORE * grid.cells.step * grid.face_normals[lit]
+        direction = np.broadcast_to(-np.asarray(light.direction), points.shape)
+        distance = np.full(len(points), np.inf)
+        depth, gain = np.zeros(len(points)), np.ones(len(points))
+    cosine = (direction * all_normals).sum(axis=1)
+    lit = np.flatnonzero((cosine > 0.0) & ((direction * face_normals).sum(axis=1) > 0.0))
+    start = points[lit] + BEFORE * grid.cells.step * face_normals[lit]
     nearest = np.minimum(*casters.nearest(start, direction[lit]))
     if stops is not None:
         nearest = np.minimum(nearest, stops.nearest(start, direction[lit])[1])
     free = nearest >= distance[lit]
     lit, start = lit[free], start[free]
-    towards, normals = direction[lit], grid.normals[lit]
-    sunk = depth[lit, None] * grid.face_normals[lit]
+    towards, normals = direction[lit], all_normals[lit]
+    sunk = depth[lit, None] * face_normals[lit]
     if depth[lit].any():
         towards = distance[lit, None] * towards + sunk
         towards /= np.linalg.norm(towards, axis=1)[:, None]
     reflected = optics.fresnel_dielectric(np.maximum((towards * normals).sum(axis=1), 0.0), ior)[:, None]
     # What a rough interface loses, of any light as of uniform light.
     relative = interface.entering / diffuse_interface(ior).entering
-    flux = np.asarray(light.irradiance_on(grid.points[lit] - sunk, normals), np.float64) * gain[lit, None]
+    flux = np.asarray(light.irradiance_on(points[lit] - sunk, normals), np.float64) * gain[lit, None]
     if dimming:
         flux = flux * light_passed(dimming, start, towards, distance[lit])
-    refracted = refracted_direction(-towards, normals, np.full(len(lit), ior))
+    refracted = placement.inwards(refracted_direction(-towards, normals, np.full(len(lit), ior)))
     return EnteringRays(lit, refracted, (1.0 - reflected) * relative * flux, reflected * flux)
 
 
-def _spread(towards: Array, grid: BodyGrid) -> tuple[Array, Array]:
+def _spread(towards: Array, face_normals: Array, area: float) -> tuple[Array, Array]:
     """Depth below its place at which each sample sees a light that is very near, and the gain of its light, (s,) each.
 
     A light that is nearer to the surface than its samples are to each other shines on a spot between them. On a plane
@@ -375,9 +425,9 @@ def _spread(towards: Array, grid: BodyGrid) -> tuple[Array, Array]:
     from samples that lie deeper, the spot is as wide as they are apart, and has the light of the narrow one within
     `_REACH`.
     """
-    width = _WIDTH * np.sqrt(grid.area / np.pi)
-    height = (towards * grid.face_normals).sum(axis=1)
-    across = np.linalg.norm(towards - height[:, None] * grid.face_normals, axis=1)
+    width = _WIDTH * np.sqrt(area / np.pi)
+    height = (towards * face_normals).sum(axis=1)
+    across = np.linalg.norm(towards - height[:, None] * face_normals, axis=1)
     near = (height > 0.0) & (height < width) & (across < _REACH * width)
     within = 1.0 - height / np.hypot(height, _REACH * width)
     gain = within / (1.0 - 1.0 / np.hypot(1.0, _REACH))

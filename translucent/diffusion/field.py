@@ -2,40 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 from scipy.ndimage import map_coordinates
-from scipy.spatial import cKDTree
 
-from translucent.arrays import Array, Floats, Integers
+from translucent.arrays import Array
 from translucent.diffusion.entering import (
-    BEFORE,
-    Occluders,
-    Sky,
+    Placement,
     dimming_bodies,
     environment_parts,
     flux_of,
-    from_itself,
     from_light,
     nearest_parts,
     sky_light,
-    sky_of,
-    sky_paths,
-    transfer,
 )
 from translucent.diffusion.first_events import EnteringRays, joined_rays
-from translucent.diffusion.grid import BodyGrid, Densities, body_grid, densities
+from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.lit_body import LitBody
 from translucent.diffusion.photons import EnteringPhotons
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_cosine, emergent_fluxes
 from translucent.formulas.diffusion import emergent_radiance, in_scattered_shares
-from translucent.geometry.mesh import Mesh
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight
@@ -44,15 +36,9 @@ from translucent.scene.scene import Object, Scene
 #: Values (x, y, z, 3) in cells.
 Volume = npt.NDArray[np.float32]
 
-#: Cells by which values at the surface are spread beyond the cells that it crosses.
-SPREAD = 3
-
 #: Share by which light that has entered just now can darken the rest, at most: where the two do not fit together, as
 #: beside the edge of a shadow.
 FRESH = 0.8
-
-#: Samples of a surface for each one at which paths through other bodies are found.
-SAMPLES_FOR_PATH = 4
 
 #: Least fraction of the paths through a body on which light counts as scattered: thinner parts hardly scatter.
 LEAST_SCATTERED = 0.02
@@ -63,7 +49,7 @@ _WHOLE = 1.0 - 1e-9
 
 @dataclass(frozen=True, eq=False)
 class DiffusionField:
-    """Light of a body at its surface, on a grid of cells in world coordinates.
+    """Light of a body at its surface, on a grid of cells that turns with the body.
 
     Attributes
     ----------
@@ -73,6 +59,8 @@ class DiffusionField:
         Fraction of the paths through the body, from its surface, on which light is scattered; 1 deep inside.
     low : (3,) float64
         Corner of the grid in metres.
+    turn : (3, 3) float64
+        Axes of the grid, in its columns.
     step : float
         Side of a cell in metres.
     albedo : (3,) float64
@@ -97,6 +85,7 @@ class DiffusionField:
     entering: Volume
     scattered: Volume
     low: Array
+    turn: Array
     step: float
     albedo: Array
     conductance: float
@@ -135,7 +124,7 @@ class DiffusionField:
         return self._emergent(*self.volumes, points, cosine)
 
     def _emergent(self, fluences: Volume, fluxes: Volume, points: Array, cosine: Array) -> Array:
-        place = ((points - self.low) / self.step - 0.5).T
+        place = ((points - self.low) @ self.turn / self.step - 0.5).T
         fluence, entering = (
             np.stack([map_coordinates(values[..., i], place, order=1, mode="nearest") for i in range(3)], axis=1)
             for values in (fluences, fluxes)
@@ -152,156 +141,6 @@ class DiffusionField:
             return np.asarray(np.maximum(scaled, 0.0) / (4.0 * np.pi * self.ior**2))
 
 
-@dataclass(frozen=True, eq=False)
-class Entrance:
-    """Transfer from radiance outside to flux that enters a body through its interface.
-
-    Attributes
-    ----------
-    visible : (s, k) float32
-        For each radiance over the solid angle of a direction, see `transfer`; 0 where the sky is hidden.
-    itself : (s, s) csr_array
-        For the flux that leaves each sample, see `from_itself`.
-    """
-
-    visible: npt.NDArray[np.float32]
-    itself: sparse.csr_array
-
-
-@dataclass(frozen=True, eq=False)
-class Spreading:
-    """Means of samples' values in the cells where they lie, spread to cells around. Cells farther inside have others.
-
-    Attributes
-    ----------
-    means : (c, s) csr_array
-        Of the samples in each of the cells that have some.
-    rings : list of csr_array
-        Cells next to those that are known so far, each time: means of the known ones among the 26 around.
-    cells : (n,) int64
-        Places in the flat grid, of the cells that have samples and of each ring.
-    deep, numbers : (m,), (m,) int64
-        Places of the other cells in the system, and their numbers.
-    shape : tuple of 3 int
-    """
-
-    means: sparse.csr_array
-    rings: list[sparse.csr_array]
-    cells: Integers
-    deep: Integers
-    numbers: Integers
-    shape: tuple[int, ...]
-
-    @classmethod
-    def of(cls, grid: BodyGrid) -> Spreading:
-        """Spread over a grid."""
-        shape = grid.number.shape
-        place = np.floor((grid.points - grid.cells.low) / grid.cells.step).astype(int)
-        at = np.ravel_multi_index(tuple(np.clip(place, 0, np.array(shape) - 1).T), shape)
-        cells, row, count = np.unique(at, return_inverse=True, return_counts=True)
-        means = sparse.csr_array((1.0 / count[row], (row, np.arange(len(at)))), (len(cells), len(at)), np.float32)
-        # The grid gets a border, in which nothing is known.
-        wide = tuple(side + 2 for side in shape)
-        numbered = np.full(wide, -2)
-        numbered[1:-1, 1:-1, 1:-1] = -1
-        flat, inner = numbered.ravel(), np.flatnonzero(numbered == -1)
-        x, y, z = np.indices((3, 3, 3)).reshape(3, -1) - 1
-        around = (x * wide[1] + y) * wide[2] + z
-        known, rings = inner[cells], []
-        last, flat[known] = known, np.arange(len(known))
-        for _ in range(SPREAD):
-            near = np.zeros(len(flat), bool)
-            near[last[:, None] + around] = True
-            last = np.flatnonzero(near & (flat == -1))
-            column = flat[last[:, None] + around]
-            each = (column >= 0).sum(axis=1)
-            size, starts = (len(last), len(known)), np.concatenate([[0], np.cumsum(each)])
-            weights = np.repeat(1.0 / each, each).astype(np.float32)
-            rings.append(sparse.csr_array((weights, column[column >= 0], starts), size))
-            flat[last] = len(known) + np.arange(len(last))
-            known = np.concatenate([known, last])
-        number = grid.number.ravel()
-        deep = np.flatnonzero((flat[inner] < 0) & (number >= 0))
-        place = np.zeros(len(flat), np.int64)
-        place[inner] = np.arange(len(inner))
-        return cls(means, rings, place[known], deep, number[deep], shape)
-
-    def volume(self, values: Floats, deep: Floats) -> Floats:
-        """(x, y, z, n) float32: values (s, n) of the samples, spread, and `deep` (cells, n) farther inside."""
-        filled = self.means @ values
-        for ring in self.rings:
-            filled = np.concatenate([filled, ring @ filled])
-        volume = np.zeros((int(np.prod(self.shape)), values.shape[1]), np.float32)
-        volume[self.cells], volume[self.deep] = filled, deep[self.numbers]
-        return volume.reshape(*self.shape, -1)
-
-
-@dataclass(frozen=True, eq=False)
-class LitBody:
-    """Geometry and densities of a body in which light diffuses, for any medium and lights.
-
-    Attributes
-    ----------
-    grid : BodyGrid
-    casters : Casters
-    sky : Sky
-    """
-
-    grid: BodyGrid
-    casters: Occluders
-    sky: Sky
-    _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
-    _sky_paths: dict[tuple[Mesh, bytes], sparse.csr_array] = field(default_factory=dict)
-
-    @cached_property
-    def spreading(self) -> Spreading:
-        """From the samples of its surface to the cells around it."""
-        return Spreading.of(self.grid)
-
-    @cached_property
-    def densities(self) -> Densities:
-        """Densities of the body."""
-        return densities(self.casters.body, self.grid)
-
-    def sky_paths(self, others: Sequence[Object]) -> list[sparse.csr_array]:
-        """Metres in each of other bodies on paths to the sky, see `sky_paths`; the last ones are cached."""
-        places = [(body.mesh, body.matrix.tobytes()) for body in others]
-        found = {
-            place: self._sky_paths[place] if place in self._sky_paths else self._paths(body)
-            for place, body in zip(places, others, strict=True)
-        }
-        self._sky_paths.clear()
-        self._sky_paths.update(found)
-        return [found[place] for place in places]
-
-    def _paths(self, body: Object) -> sparse.csr_array:
-        """Metres in another body, of paths from a part of the samples; all samples take those of the nearest one."""
-        points, part = self.grid.points, slice(None, None, SAMPLES_FOR_PATH)
-        start = points[part] + BEFORE * self.grid.cells.step * self.grid.face_normals[part]
-        nearest = cKDTree(points[part]).query(points)[1]
-        # Next to an edge samples face other directions: each takes every direction that its group of samples sees.
-        groups = sparse.csr_array((np.ones(len(points)), (nearest, np.arange(len(points)))), (len(start), len(points)))
-        metres = sky_paths(body, start, self.sky.directions, groups @ self.sky.visible.astype(np.float64) > 0.0)
-        return sparse.csr_array(metres[nearest])
-
-    def entrance(self, ior: float, roughness: float) -> Entrance:
-        """Transfer through an interface with this index and roughness; the last one is cached."""
-        if (ior, roughness) not in self._entrances:
-            solid_angles = nearest_parts(self.sky.directions)[1]
-            transferred = transfer(self.sky, solid_angles, ior, diffuse_interface(ior, roughness))
-            itself = from_itself(self.sky, transferred, solid_angles)
-            self._entrances.clear()
-            self._entrances[ior, roughness] = Entrance((transferred * self.sky.visible).astype(np.float32), itself)
-        return self._entrances[ior, roughness]
-
-
-def lit_body(body: Object, opaque: RayCaster | None, step: float) -> LitBody:
-    """Geometry of a body with cells of this side, shadowed by itself and by `opaque_surfaces`."""
-    grid = body_grid(body, step)
-    casters = Occluders(body, opaque)
-    return LitBody(grid, casters, sky_of(grid, casters))
-
-
 class DiffusingBody:
     """Solver of the subsurface light of one body and medium, for any lights.
 
@@ -311,19 +150,28 @@ class DiffusingBody:
     medium : Medium
     roughness : float
         Of its surface.
+    system : BodySystem, optional
+        Of its shape, medium and roughness, where it is known.
     corrected, warm_starts : bool
         See `BodySystem`.
     """
 
     @np.errstate(under="ignore")
     def __init__(
-        self, lit: LitBody, medium: Medium, roughness: float, *, corrected: bool = True, warm_starts: bool = False
+        self,
+        lit: LitBody,
+        medium: Medium,
+        roughness: float,
+        system: BodySystem | None = None,
+        *,
+        corrected: bool = True,
+        warm_starts: bool = False,
     ) -> None:
         self._lit, self._medium, self._roughness = lit, medium, roughness
         self._interface = diffuse_interface(medium.ior, roughness)
         self._entrance = lit.entrance(medium.ior, roughness)
-        self._system = BodySystem(
-            lit.grid, medium, roughness, lit.densities, corrected=corrected, warm_starts=warm_starts
+        self._system = system or BodySystem(
+            lit.grid, medium, roughness, lit.shape.densities, corrected=corrected, warm_starts=warm_starts
         )
 
     @np.errstate(under="ignore")
@@ -336,19 +184,20 @@ class DiffusingBody:
         straight through these.
         """
         dimming = dimming_bodies(scene, body)
-        grid = self._lit.grid
-        entering, bright = self._from_sky(environment_parts(scene.environment, self._lit.sky.directions), dimming)
+        grid, placement = self._lit.grid, self._lit.placement
+        parts = environment_parts(scene.environment, self._lit.shape.sky.directions, placement.turn)
+        entering, bright = self._from_sky(parts, dimming)
         rays = [bright]
         inside = np.zeros((grid.count, 3))
         for light in scene.lights:
-            if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
+            if isinstance(light, PositionalLight) and (cell := _cell_at(grid, placement, light.position)) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
                 rays.append(
                     from_light(grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops)
                 )
         if photons is not None:
-            entering = entering + flux_of(photons, grid)
+            entering = entering + flux_of(photons, grid, placement)
         found = self._system.solved(entering, self._entrance.itself, inside, rays)
         return _field(self._lit, self._medium, self._roughness, found)
 
@@ -360,13 +209,13 @@ class DiffusingBody:
         """
         if not parts.any():
             return np.zeros((len(self._lit.grid.points), 3)), joined_rays([])
-        visible, sky, ior = self._entrance.visible, self._lit.sky, self._medium.ior
-        means = parts / nearest_parts(sky.directions)[1][:, None]
-        radiances = [np.broadcast_to(channel.astype(np.float32), visible.shape) for channel in means.T]
+        received, directions, ior = self._entrance.received, self._lit.shape.sky.directions, self._medium.ior
+        means = parts / nearest_parts(directions)[1][:, None]
+        radiances = [np.broadcast_to(channel.astype(np.float32), received.shape) for channel in means.T]
         absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
         paths = self._lit.sky_paths(absorbing)
         for channel in range(3) if absorbing else ():
-            depth = sparse.csr_array(visible.shape)
+            depth = sparse.csr_array(received.shape)
             for body, metres in zip(absorbing, paths, strict=True):
                 assert body.medium is not None
                 depth = depth + metres * float(np.asarray(body.medium.absorption)[channel])
@@ -374,11 +223,12 @@ class DiffusingBody:
             radiances[channel] = radiances[channel].copy()
             radiances[channel][lost.row, lost.col] *= optics.transmittance(lost.data)
         mirrored = (1.0 - diffuse_interface(ior).entering) / self._interface.entering
-        return sky_light(sky, visible, radiances, self._lit.grid.normals, ior, mirrored)
+        return sky_light(directions, received, radiances, self._lit.grid.normals, ior, mirrored)
 
 
-def _cell_at(grid: BodyGrid, point: Array) -> int:
-    """Number of the cell at a point, -1 outside the body; in cells that are cut, the nearest sample decides."""
+def _cell_at(grid: BodyGrid, placement: Placement, position: npt.ArrayLike) -> int:
+    """Number of the cell at a position, -1 outside the body; in cells that are cut, the nearest sample decides."""
+    point = placement.inwards(np.asarray(position) - placement.shift)
     place = np.floor((point - grid.cells.low) / grid.cells.step).astype(int)
     if (place < 0).any() or (place >= grid.number.shape).any():
         return -1
@@ -398,16 +248,17 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     scattered = np.maximum(found.scattered, LEAST_SCATTERED)
     values = np.concatenate([found.fluence, albedo * found.entering, scattered], axis=1)
     deep = np.concatenate([found.inside, np.zeros_like(found.inside), np.ones_like(found.inside)], axis=1)
-    volume = lit.spreading.volume(values.astype(np.float32), deep.astype(np.float32))
+    volume = lit.shape.spreading.volume(values.astype(np.float32), deep.astype(np.float32))
     cosine = emergent_cosine(float(albedo.mean()), medium.ior)
     ahead = np.asarray(medium.scattering) * max(medium.anisotropy, 0.0)
     # Of diffuse light, four times the volume over the area.
-    chord = 2.0 * lit.casters.body.mean_thickness * float(np.average(lit.densities.cells, weights=grid.volumes))
+    chord = 2.0 * lit.casters.body.mean_thickness * float(np.average(lit.shape.densities.cells, weights=grid.volumes))
     return DiffusionField(
         fluence=np.ascontiguousarray(volume[..., :3]),
         entering=np.ascontiguousarray(volume[..., 3:6]),
         scattered=np.where(volume[..., 6:] > 0.0, volume[..., 6:], np.float32(1.0)),
-        low=grid.cells.low,
+        low=lit.placement.outwards(grid.cells.low) + lit.placement.shift,
+        turn=lit.placement.turn,
         step=grid.cells.step,
         albedo=albedo,
         conductance=interface.conductance,

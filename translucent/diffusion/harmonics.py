@@ -18,7 +18,8 @@ from scipy.ndimage import map_coordinates
 
 from translucent.arrays import Array, Floats
 from translucent.diffusion.entering import MAP_HEIGHT
-from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
+from translucent.diffusion.field import DiffusingBody, DiffusionField
+from translucent.diffusion.lit_body import lit_body
 from translucent.errors import InputError
 from translucent.formulas.spherical_harmonics import BAND_0, COUNT, real_harmonics
 from translucent.planning.scattering import Diffusion
@@ -39,8 +40,8 @@ class Transfer:
     ----------
     values : (x, y, z, 9, 3) float32
         See `at`.
-    low : (3,) float64
-        Corner of the grid in metres.
+    low, turn : (3,), (3, 3) float64
+        Corner of the grid in metres, and its axes, in columns.
     step : float
         Side of a cell in metres.
     cells : int
@@ -49,22 +50,23 @@ class Transfer:
 
     values: Floats
     low: Array
+    turn: Array
     step: float
     cells: int
 
     def at(self, points: Array) -> Array:
         """(k, 9, 3): mean subsurface radiance of points (k, 3) of the surface for a unit of each harmonic."""
         flat = self.values.reshape(*self.values.shape[:3], -1)
-        return _read(flat, self.low, self.step, points).reshape(-1, COUNT, 3)
+        return _read(flat, self, points).reshape(-1, COUNT, 3)
 
 
 def exit_radiance(field: DiffusionField, points: Array) -> Array:
     """(k, 3): mean radiance, flux over pi, that the diffused light of a body has outside at points (k, 3)."""
-    return field.exit_share / np.pi * _read(field.fluence, field.low, field.step, points)
+    return field.exit_share / np.pi * _read(field.fluence, field, points)
 
 
-def _read(volume: Floats, low: Array, step: float, points: Array) -> Array:
-    place = ((points - low) / step - 0.5).T
+def _read(volume: Floats, grid: Transfer | DiffusionField, points: Array) -> Array:
+    place = ((points - grid.low) @ grid.turn / grid.step - 0.5).T
     channels = [
         map_coordinates(volume[..., i], place, np.float64, order=1, mode="nearest") for i in range(volume.shape[-1])
     ]
@@ -115,7 +117,7 @@ class LitAlone:
         for i in range(1, COUNT):
             values[..., i, :] = self.field(_harmonic(i)).fluence - UNIFORM * uniform.fluence
         values *= uniform.exit_share / np.pi
-        return Transfer(values, uniform.low, uniform.step, uniform.cells)
+        return Transfer(values, uniform.low, uniform.turn, uniform.step, uniform.cells)
 
 
 def _harmonic(index: int) -> Environment:

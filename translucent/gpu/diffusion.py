@@ -69,7 +69,9 @@ class DiffusedTexture:
             number: {
                 "diffuses": 1.0,
                 "grid_low": field.low - center,
-                "cells_per_metre": 1.0 / field.step,
+                "grid_x": field.turn[:, 0] / field.step,
+                "grid_y": field.turn[:, 1] / field.step,
+                "grid_z": field.turn[:, 2] / field.step,
                 "grid_size": field.fluence.shape[:3],
                 "first_layer": self.first_layers[number],
                 "albedo": field.albedo,

@@ -401,13 +401,15 @@ OBJECT_ROW = PackedTable(
         ("grid_low", "f4", (3,)),  # corner of the grid of its diffused light, from the center of the media
         ("diffuses", "f4", ()),  # 1 where light diffuses in it
         ("grid_size", "f4", (3,)),  # cells along each axis
-        ("cells_per_metre", "f4", ()),
-        ("albedo", "f4", (3,)),
         ("first_layer", "f4", ()),  # of the grid in the texture of all grids
-        ("emergent_fluxes", "f4", (4,)),
-        ("conductance", "f4", ()),
+        ("grid_x", "f4", (3,)),  # its axes, in cells per metre
         ("exit_share", "f4", ()),
+        ("grid_y", "f4", (3,)),
         ("mean_cosine", "f4", ()),
+        ("grid_z", "f4", (3,)),
+        ("conductance", "f4", ()),
+        ("albedo", "f4", (3,)),
+        ("emergent_fluxes", "f4", (4,)),
         ("ahead", "f4", (3,)),  # fraction of its extinction by light that is scattered ahead
         ("in_scattered_far", "f4", (3,)),  # fraction of that light which leaves where a ray does,
         ("in_scattered_near", "f4", (3,)),  # and on the other side

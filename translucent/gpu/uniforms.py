@@ -175,7 +175,9 @@ _UNPLACED: Fields = dict.fromkeys(("local_x", "local_y", "local_z", "first_node"
 _NO_DIFFUSION: Fields = {
     "diffuses": 0.0,
     "grid_low": 0.0,
-    "cells_per_metre": 0.0,
+    "grid_x": 0.0,
+    "grid_y": 0.0,
+    "grid_z": 0.0,
     "grid_size": 1.0,
     "first_layer": 0.0,
     "albedo": 0.0,
