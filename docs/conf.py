@@ -26,9 +26,9 @@ extensions = [
     "myst_parser",
     "sphinx_gallery.gen_gallery",
     "mathml",
-    "method_reference",
-    "shadow_reference",
+    "measurements",
     "preset_reference",
+    "live_scene",
 ]
 templates_path = ["_templates"]
 exclude_patterns = ["_ext", "_templates", "generated/*.md"]
@@ -47,7 +47,7 @@ add_module_names = False
 
 html_theme = "furo"
 html_static_path = ["_static"]
-html_css_files = ["math.css"]
+html_css_files = ["math.css", "pages.css"]
 html_title = f"translucent {VERSION}"
 html_math_renderer = "mathml"
 html_show_sphinx = False

@@ -1,4 +1,4 @@
-"""Picture of caustics in media of docs/methods.md: ``python tools/caustics_picture.py [OUT.png]``."""
+"""Picture of caustics in media of docs/measurements/shadows.md: ``python tools/caustics_picture.py [OUT.png]``."""
 
 from __future__ import annotations
 

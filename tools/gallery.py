@@ -1,13 +1,23 @@
-"""Make the pictures of docs/gallery/ and their overview from the examples: ``python tools/gallery.py [NAME...]``."""
+"""
+Make the pictures of docs/gallery/ and their overview from the examples, and those of docs/pictures/ from the commands
+that the pages show: ``python tools/gallery.py [NAME...]``.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import runpy
+import shlex
+import tempfile
 from pathlib import Path
 
 import click
+import trimesh
 from PIL import Image
+
+from translucent.assets import mesh_path
+from translucent.cli import main as translucent
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "gallery"
@@ -16,15 +26,55 @@ FOLDER = ROOT / "docs" / "gallery"
 OVERVIEW = ("wine", "jade", "soap", "bears", "amber", "candle")
 TILE = (320, 240)
 
+#: A picture of docs/pictures/ that a page shows.
+SHOWN = re.compile(r"\(\.\./pictures/(\w+)\.jpg\)")
+
+#: Of a picture on a page.
+SMALL = ["--size", "480x320", "--samples", "8"]
+
+
+def commands(page: str) -> dict[str, str]:
+    """The commands of a page that draw its pictures, by the name of the picture."""
+    lines = [line.removeprefix("$ translucent ") for line in page.splitlines() if line.startswith("$ translucent ")]
+    return {name: line for name in SHOWN.findall(page) for line in lines if f" -o {name}.png " in f"{line} "}
+
+
+def pages() -> dict[str, str]:
+    """All commands that draw pictures of pages."""
+    found = {}
+    for page in sorted((ROOT / "docs" / "guides").glob("*.md")):
+        found.update(commands(page.read_text(encoding="utf-8")))
+    return found
+
+
+def draw(name: str, command: str) -> None:
+    """Run a command of a page, and keep its picture."""
+    folder = ROOT / "docs" / "pictures"
+    folder.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        os.chdir(scratch)
+        bear = trimesh.load_mesh(mesh_path("bear"))
+        bear.apply_scale(1000.0)  # a file in millimetres, as the pages have it
+        bear.export("model.stl")
+        if translucent([*shlex.split(command), *SMALL]) != 0:
+            raise click.ClickException(f"{name}: {command} failed")
+        with Image.open(f"{name}.png") as picture:
+            picture.convert("RGB").save(folder / f"{name}.jpg", quality=88, optimize=True)
+        os.chdir(ROOT)
+
 
 @click.command(help=__doc__)
-@click.argument("names", nargs=-1, type=click.Choice((*OVERVIEW, "bubble")))
+@click.argument("names", nargs=-1, type=click.Choice((*OVERVIEW, "bubble", *pages())))
 def main(names: tuple[str, ...]) -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
-    os.chdir(FOLDER)
-    for name in names or OVERVIEW:
+    shown = pages()
+    for name in names or (*OVERVIEW, *shown):
         print(f"{name}: ", end="", flush=True)
-        runpy.run_path(str(ROOT / "examples" / f"{name}.py"))
+        if name in shown:
+            draw(name, shown[name])
+        else:
+            os.chdir(FOLDER)
+            runpy.run_path(str(ROOT / "examples" / f"{name}.py"))
     write_overview()
 
 

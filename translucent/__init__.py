@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for checkers and editors: the same names as in the table below
     from translucent import bench as bench
     from translucent import reference as reference
+    from translucent.bake.attach import attach as attach
     from translucent.bake.audit.check import check_materials as check_materials
     from translucent.bake.audit.check import fix_materials as fix_materials
     from translucent.bake.audit.rules import MaterialCheck as MaterialCheck
@@ -112,10 +113,12 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.scene.stages import staged as staged
     from translucent.scene.surface import Surface as Surface
     from translucent.scene.texture import Texture as Texture
+    from translucent.showing import show as show
     from translucent.tiles import render_tiles as render_tiles
 
 #: Modules of the public names. Each is imported when it is first asked for: SciPy and OpenGL take their time.
 _NAMES = {
+    "bake.attach": "attach",
     "bake.audit.check": "check_materials fix_materials",
     "bake.audit.rules": "MaterialCheck MaterialFinding",
     "bake.bake": "bake_thickness bake_vertex_thickness",
@@ -164,6 +167,7 @@ _NAMES = {
     "scene.stages": "staged",
     "scene.surface": "Surface",
     "scene.texture": "Texture",
+    "showing": "show",
     "tiles": "render_tiles",
 }
 _MODULE_OF = {name: f"translucent.{module}" for module, names in _NAMES.items() for name in names.split()}

@@ -27,10 +27,14 @@ T = TypeVar("T")
 
 
 class _Test(NamedTuple):
-    """Test of a type: what is wrong with a value (nothing if it is right), and what to give."""
+    """Test of a type: what is wrong with a value (nothing if it is right), what to give, and what makes one of others.
+
+    A class converts objects of other libraries by its method `_adopted`, which returns None for what it does not know.
+    """
 
     wrong: Callable[[Any], str]
     give: str
+    adopted: Callable[[Any], Any] | None = None
 
 
 def checked(thing: T) -> T:
@@ -53,18 +57,33 @@ def _checked(function: Any, title: str, module: str, but: tuple[str, ...] = ()) 
     annotations = {one.name: one.annotation for one in signature(function).parameters.values() if one.name not in but}
     names, tests = tuple(signature(function).parameters), dict[str, _Test | None]()
 
+    def test_of(name: str) -> _Test | None:
+        if name not in tests:
+            tests[name] = _test_of(annotations.get(name), vars(sys.modules[module]))
+        return tests[name]
+
     def refusal(args: tuple[Any, ...], kwargs: dict[str, Any]) -> InputError | None:
         for name, value in (*zip(names, args, strict=False), *kwargs.items()):
-            if name not in tests:
-                tests[name] = _test_of(annotations.get(name), vars(sys.modules[module]))
-            test = tests[name]
+            test = test_of(name)
             if test is not None and (found := test.wrong(value)):
                 return InputError(f"{title} {name} {brief(value)}", found, f"give {test.give}")
         return None
 
+    def converted(name: str, value: Any) -> Any:
+        test = test_of(name)
+        if test is None or test.adopted is None or not test.wrong(value):
+            return value
+        made = test.adopted(value)
+        return value if made is None else made
+
     @wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
         refused = refusal(args, kwargs)
+        if refused is not None:
+            known = zip(names, args, strict=False)
+            args = (*(converted(name, value) for name, value in known), *args[len(names) :])
+            kwargs = {name: converted(name, value) for name, value in kwargs.items()}
+            refused = refusal(args, kwargs)
         if refused is None:
             return function(*args, **kwargs)
         if function.__name__ == "__init__" or names[0] == "cls":
@@ -88,6 +107,12 @@ def brief(value: object) -> str:
         return repr(value) if isinstance(value, type) else reprlib.repr(value)
     except Exception:  # noqa: BLE001 - a class of others, or a whole number of thousands of digits
         return f"of type {type(value).__name__}"
+
+
+def require_path(what: str, value: object, give: str) -> None:
+    """Raise `InputError` for a value that names no file."""
+    if found := _path(value):
+        raise InputError(f"{what} {brief(value)}", found, f"give {give}")
 
 
 def vectors(what: str, value: npt.ArrayLike, width: int = 3, give: str = "points") -> npt.NDArray[np.float64]:
@@ -132,7 +157,8 @@ def _any_of(kinds: Sequence[Any]) -> _Test | None:
         reasons = [test.wrong(value) for test in known]
         return "" if "" in reasons else reasons[0]
 
-    return _Test(wrong, " or ".join(dict.fromkeys(test.give for test in known)))
+    adopted = next((test.adopted for test in known if test.adopted), None)
+    return _Test(wrong, " or ".join(dict.fromkeys(test.give for test in known)), adopted)
 
 
 def _test(kind: Any) -> _Test | None:
@@ -159,7 +185,7 @@ def _test(kind: Any) -> _Test | None:
 
 
 def _instance(kind: type, give: str) -> _Test:
-    return _Test(lambda value: "" if isinstance(value, kind) else _type(value), give)
+    return _Test(lambda value: "" if isinstance(value, kind) else _type(value), give, getattr(kind, "_adopted", None))
 
 
 def _sequence(kinds: tuple[Any, ...], many: bool) -> _Test:

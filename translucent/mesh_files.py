@@ -16,10 +16,11 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from translucent.arguments import checked
+from translucent.arguments import checked_but, require_path
 from translucent.errors import InputError
 from translucent.files.paths import require_file
 from translucent.files.reading import open_file, require_memory, require_room, shown, size_text
+from translucent.geometry.foreign import foreign_name, foreign_parts, unit_of
 from translucent.geometry.mesh import PER_TRIANGLE, Mesh, Triangles, adopted, joined, mended
 from translucent.gltf.load import read_whole
 from translucent.model_size import scale_to
@@ -62,24 +63,25 @@ _SCENES_OF_PROGRAMS = (
 )
 
 
-@checked
+@checked_but("path")
 def load_mesh(
-    path: str | Path,
+    path: Any,
     unit: str | None = None,
     *,
     allow_outside: bool = False,
     height: float | None = None,
     longest: float | None = None,
 ) -> Mesh:
-    """Read a triangle mesh from a file, weld it and wind it consistently.
+    """Read a triangle mesh from a file, or take one of another library, weld it and wind it consistently.
 
     Parameters
     ----------
-    path : path
-        What trimesh reads: obj, stl, ply, glb, gltf, off and more. The parts of a scene become one mesh.
+    path : path, trimesh.Trimesh, trimesh.Scene, pyvista.PolyData or any object with vertices and faces
+        Of files what trimesh reads: obj, stl, ply, glb, gltf, off and more. The parts of a scene become one mesh, where
+        its transforms place them.
     unit : str, optional
-        Unit of the file's coordinates, or a length such as ``25mm``. Default: m. glTF is in metres by definition;
-        another unit rescales it.
+        Unit of the coordinates, or a length such as ``25mm``. Default: that of the object where it has one, as
+        ``mesh.units`` of trimesh, or else m. glTF is in metres by definition; another unit rescales it.
     allow_outside : bool
         Whether the buffers of a .gltf file may lie outside its folder: only for files that you trust.
     height, longest : float, optional
@@ -90,24 +92,32 @@ def load_mesh(
     Mesh
         In metres. Vertices within 1e-6 of the diagonal are one (with equal uv: seams stay); faces are wound alike per
         part, and closed parts outwards. `repairs` says what was done; a changed winding is also a `TranslucentWarning`.
-        Of a file that names no unit, `assumed_unit` says which one was assumed.
+        Of a file or object that names no unit, `assumed_unit` says which one was assumed.
 
     Raises
     ------
     InputError
         If the file is missing, unreadable, has no faces, has coordinates that are not finite, or would take more memory
-        than is free; if more than one of unit, height and longest is given.
+        than is free; if more than one of unit, height and longest is given; if faces of an object are no triangles, or
+        its unit is not known.
     """
-    path = Path(path)
     stated = [name for name, value in (("unit", unit), ("height", height), ("longest", longest)) if value is not None]
     if len(stated) > 1:
         raise InputError(f"load_mesh {stated[0]}", f"{stated[1]} is given, too", "give one of them")
-    scale = metres_per_unit(unit or "m")
-    vertices, faces, uv = _read(path, allow_outside)
-    assumed = "" if stated or path.suffix[1:].lower() in _GLTF else "m"
+    parts = None if isinstance(path, str | Path) else foreign_parts(path)
+    if parts is not None:
+        name = foreign_name(path)
+        (scale, assumed), (vertices, faces, uv) = unit_of(path, unit), joined(parts, f"mesh {name!r}")
+    else:
+        require_path("load_mesh path", path, "a path, or an object with vertices and faces")
+        path = Path(path)
+        name, scale = path.name, metres_per_unit(unit or "m")
+        assumed = "" if path.suffix[1:].lower() in _GLTF else "m"
+        vertices, faces, uv = _read(path, allow_outside)
     if height is not None or longest is not None:
-        scale = scale_to(adopted(vertices, faces, uv, path.name).bounds, height, longest, path.name)
-    raw = adopted(vertices if scale == 1 else vertices * scale, faces, uv, path.name, assumed_unit=assumed)
+        scale = scale_to(adopted(vertices, faces, uv, name).bounds, height, longest, name)
+    assumed = "" if stated else assumed
+    raw = adopted(vertices if scale == 1 else vertices * scale, faces, uv, name, assumed_unit=assumed)
     raw.require_finite()
     return mended(raw)
 
@@ -170,8 +180,7 @@ def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
             return [_triangles(one["vertices"], one["faces"], one.get("visual")) for one in listed]
         stream.seek(0)
     scene = trimesh.load_scene(stream, file_type=kind, resolver=_NoLinks(), process=False, **known)
-    parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
-    return [_triangles(part.vertices, part.faces, part.visual) for part in parts]
+    return foreign_parts(scene) or []
 
 
 def _is_plain(content: dict[str, Any]) -> bool:

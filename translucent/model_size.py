@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Protocol
+from typing import Literal, Protocol
 
 from translucent.arrays import Array
 from translucent.errors import InputError
@@ -20,6 +20,16 @@ HARDLY_METRES = 20.0
 FIGURINE = 0.12
 
 #: Names of units in sentences.
+
+Way = Literal["option", "argument", "field"]
+
+#: Texts that set a unit, and a size.
+_WAYS: dict[Way, tuple[str, str]] = {
+    "option": ("--unit {}", "--{0} {2:g}cm"),
+    "argument": ("unit='{}'", "{0}={1:g}"),
+    "field": ("File > Unit of the file > {}", "set the height under Look to {2:g} cm"),
+}
+
 _ADJECTIVES = {"height": "tall", "longest": "long"}
 _NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches"}
 
@@ -37,7 +47,7 @@ class _Model(Protocol):
     def assumed_unit(self) -> str: ...
 
 
-def size_note(mesh: _Model, assumed_unit: str | None = None, *, python: bool = False) -> str:
+def size_note(mesh: _Model, assumed_unit: str | None = None, *, way: Way = "option") -> str:
     """Sentence on the size of a mesh whose file names no unit, with what sets another; empty where it is known.
 
     Parameters
@@ -45,8 +55,8 @@ def size_note(mesh: _Model, assumed_unit: str | None = None, *, python: bool = F
     mesh : Mesh
     assumed_unit : str, optional
         Default: that of the mesh.
-    python : bool
-        What sets it are arguments of `load_mesh`, and else options.
+    way : {"option", "argument", "field"}
+        What sets another size: options, arguments of `load_mesh`, or fields of the window.
     """
     assumed = mesh.assumed_unit if assumed_unit is None else assumed_unit
     if not assumed:
@@ -57,12 +67,12 @@ def size_note(mesh: _Model, assumed_unit: str | None = None, *, python: bool = F
     if (likely := likely_unit(longest / metres, Path(mesh.name).suffix)) is not None:
         unit, why = likely
         factor = METRES_PER_UNIT[unit] / metres
-        stated = f"unit={unit!r}" if python else f"--unit {unit}"
+        stated = _WAYS[way][0].format(unit)
         return f"{taken}; {why}: {stated} makes it {tall(factor * mesh.bounds)}"
     if USUAL[0] <= longest <= USUAL[1]:
         return taken
     name = side_of(mesh.bounds)[0]
-    stated = f"{name}={FIGURINE:g}" if python else f"--{name} {100 * FIGURINE:g}cm"
+    stated = _WAYS[way][1].format(name, FIGURINE, 100 * FIGURINE)
     return f"{taken}; for a figurine {stated}"
 
 

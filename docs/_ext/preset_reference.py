@@ -1,12 +1,13 @@
-"""Mean colors of media on the ball against path-traced truth, as tables for the page on media."""
+"""Mean colors of media on the ball against path-traced truth, as tables for the page on named media."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sphinx.application import Sphinx
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 #: Largest deviation of a channel that passes, of our pictures and of those of Blender.
 MOST, MOST_BLENDER = 0.1, 0.05
@@ -36,7 +37,7 @@ def rows(measured: dict[str, Any], what: str = "drawn", most: float = MOST) -> l
 
 
 def write_tables(app: Sphinx) -> None:
-    """Write ``generated/presets.md`` and ``generated/blender.md``, which ``media.md`` includes."""
+    """Write ``generated/presets.md`` and ``generated/blender.md``, which ``measurements/media.md`` includes."""
     source = Path(app.srcdir)
     folder = source / "generated"
     folder.mkdir(exist_ok=True)

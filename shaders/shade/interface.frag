@@ -6,7 +6,7 @@
 #include <View>
 #include <Body>
 #include "lib/ray.glsl"
-#include "shade/highlight.glsl"
+#include "shade/normal_variance.glsl"
 #include "shade/surface_textures.glsl"
 
 #if OPAQUE

@@ -1,5 +1,6 @@
 // The surface of an opaque object at a fragment, with its textures. Needs <constants>.
 
+#include "shade/normal_variance.glsl"
 #include "shade/surface_textures.glsl"
 
 uniform vec4 opaque_parameters;     // metallic, roughness, ior, alpha below which there is a hole

@@ -1,5 +1,6 @@
 // Radiance at the ends of rays: of the environment, or of an opaque object. Needs <View>, <Surfaces>, <ObjectRow>,
-// shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl, opaque_objects.glsl and footprint.glsl.
+// shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl, opaque_objects.glsl, textured_hit.glsl
+// and footprint.glsl.
 
 vec3 environment_radiance(vec3 point, vec3 direction, bool reflected, float blur) {
 #if MICROFACETS
@@ -12,28 +13,35 @@ vec3 environment_radiance(vec3 point, vec3 direction, bool reflected, float blur
 #endif
 }
 
-// A ray that has left the scene, or ended at an opaque object: its radiance is found for all rays of a group together, apart from
-// following them.
+// The end of a ray that has left the scene, or has hit an opaque object.
 struct EscapedRay {
     int object;        // that is opaque; AIR for the environment
+    int triangle;      // -1: unknown
+    vec2 weights;      // of its second and third corner
+    float width;       // metres of the object over which its textures are averaged
     vec3 normal;       // of the object
     vec3 origin;
     vec3 point;        // of the object
     vec3 direction;
-    vec3 throughput;
     bool reflected;
     float blur;
     Ellipse ellipse;
 };
 
+// Metres across a pixel, at a distance from the eye.
+float pixel_metres(float away) {
+    return 2.0 * length(surface_up.xyz) * (surface_right.w == 1.0 ? away : 1.0) / frame_size.y;
+}
+
 #if OPAQUE
+uniform int picture_first;  // 1: the picture has light of opaque objects that rays do not find
+
 // How much the axial depth of a surface may differ between the centers of neighboring pixels.
 float depth_within_pixel(vec3 point, vec3 normal) {
     vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
-    float spread = surface_right.w == 1.0 ? dot(from_eye, ray_forward.xyz) : 1.0;
     vec3 view = surface_right.w == 1.0 ? normalize(from_eye) : ray_forward.xyz;
     float facing = abs(dot(view, normal));
-    return 2.0 * length(surface_up.xyz) * spread / frame_size.y * sqrt(1.0 - min(facing * facing, 1.0)) / max(facing, 1e-3);
+    return pixel_metres(dot(from_eye, ray_forward.xyz)) * sqrt(1.0 - min(facing * facing, 1.0)) / max(facing, 1e-3);
 }
 
 // Opaque objects as the picture shows them: with their textures, and blurred behind rough interfaces. False where it does not.
@@ -74,7 +82,10 @@ vec3 escaped_radiance(EscapedRay end) {
         return environment_radiance(end.origin, end.direction, end.reflected, end.blur);
     }
 #if OPAQUE
-    if (opaque_in_picture(end, light)) { return light; }
+    bool has_textures = picture_first == 0 && end.triangle >= 0 && end.blur == 0.0 && reads_all_textures(end.object);
+    if (!has_textures && opaque_in_picture(end, light)) { return light; }
 #endif
-    return opaque_light(traced_body(end.object), end.normal, end.direction, end.point);
+    ObjectRow body = traced_body(end.object);
+    if (end.triangle >= 0) { body = body_at(end.object, end.triangle, end.weights, end.width); }
+    return opaque_light(body, end.normal, end.direction, end.point);
 }

@@ -8,9 +8,8 @@ uniform float blurred_fraction;         // of the variance of microfacets, that 
 // Random numbers for the microfacet at an interface of a path: an additive recurrence in four dimensions over the samples of
 // a pixel (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), two for every other interface, from a
 // random start for each pixel and path (Jarzynski & Olano 2020, "Hash functions for GPU rendering").
-vec2 microfacet_numbers(int depth, int branch_code) {
-    uvec2 at = uvec2(gl_FragCoord.xy + beyond.xy);
-    uint state = (at.x * 1664525u + at.y * 22695477u + uint(depth / 2) * 2654435761u + uint(branch_code) * 40503u) * 747796405u + 2891336453u;
+vec2 microfacet_numbers(uvec2 pixel, int depth, uint branch_code) {
+    uint state = (pixel.x * 1664525u + pixel.y * 22695477u + uint(depth / 2) * 2654435761u + branch_code * 40503u) * 747796405u + 2891336453u;
     state = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
     state = (state >> 22u) ^ state;
     vec2 step = depth % 2 == 0 ? vec2(0.8566749, 0.7338919) : vec2(0.6287067, 0.5385973);
@@ -25,11 +24,11 @@ struct Facet {
 };
 
 // Turns an interaction to a random microfacet, where some of its roughness is sampled. alpha: squared roughness of what is left.
-Facet take_facet(inout Interaction at, inout float alpha, int depth, int branch_code) {
+Facet take_facet(inout Interaction at, inout float alpha, uvec2 pixel, int depth, uint branch_code) {
 #if ROUGH
     if (at.roughness > 0.0 && blurred_fraction < 1.0) {
         Facet facet = Facet(at.normal, alpha);
-        at.normal = microfacet_normal(at.normal, at.direction, sqrt(1.0 - blurred_fraction) * alpha, microfacet_numbers(depth, branch_code));
+        at.normal = microfacet_normal(at.normal, at.direction, sqrt(1.0 - blurred_fraction) * alpha, microfacet_numbers(pixel, depth, branch_code));
         at.roughness = 0.0;
         alpha *= sqrt(blurred_fraction);
         return facet;

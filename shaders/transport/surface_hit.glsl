@@ -94,18 +94,20 @@ void pass_absorber(ObjectRow wall, float cosine, inout vec3 emitted, inout vec3 
     throughput *= transmittance(wall.extinction * through);
 }
 
+const int UNKNOWN = -2;  // object of a hit that is still to be found
+
 // The hit for `surface_hit` to begin with, between two distances on a ray: of several objects it is looked for there, in the loop
 // that finds what lies in the same place, so that compilers have one search less to inline.
 Hit first_hit(vec3 origin, vec3 direction, float start, float end) {
 #if ONE_OBJECT
     return nearest_hit(origin, direction, start, end, uvec4(0u));
 #else
-    return Hit(end, -1, -1, vec2(0.0));
+    return Hit(end, UNKNOWN, -1, vec2(0.0));
 #endif
 }
 
-// All surfaces where a ray has hit the first. A thin wall that lies on the interface of a solid only absorbs. first: the hit, or
-// that of `first_hit` from `start` on, which it is then found for; of no object where there is none.
+// All surfaces where a ray has hit the first. A thin wall that lies on the interface of a solid only absorbs. first: the hit, of
+// whatever has found it, or that of `first_hit`, which is then found from `start` on; of no object where there is none.
 SurfaceHit surface_hit(vec3 origin, vec3 direction, uvec4 interior, float start, inout Hit first, int before, int channel, inout bool sound) {
     SurfaceHit found = SurfaceHit(AIR, false, 0, vec2(0.0), vec3(0.0), vec3(0.0), interior, 0.0, vec3(1.0), vec3(0.0));
     Hit hit = first;
@@ -114,7 +116,7 @@ SurfaceHit surface_hit(vec3 origin, vec3 direction, uvec4 interior, float start,
     uvec4 done = uvec4(0u);
     for (int surface = 0; surface < INTERIOR_SIZE; ++surface) {
 #if !ONE_OBJECT
-        if (hit.object < 0) { hit = nearest_hit(origin, direction, start, end, done); }
+        if (hit.object == UNKNOWN) { hit = nearest_hit(origin, direction, start, end, done); }
         if (surface == 0) { first = hit; }
 #endif
         if (hit.object < 0) { break; }
@@ -163,7 +165,7 @@ SurfaceHit surface_hit(vec3 origin, vec3 direction, uvec4 interior, float start,
             end = hit.path + within;
         }
         done = entered_interior(done, hit.object);
-        hit.object = -1;
+        hit.object = UNKNOWN;
 #endif
     }
     return found;

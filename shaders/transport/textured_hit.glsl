@@ -11,6 +11,8 @@ const int ROUGHNESS_AT_HIT = 4;
 const int TRANSMISSION_AT_HIT = 7;
 const int EMISSIVE_AT_HIT = 10;
 
+const float WIDEST = 2.8;    // texels of a mipmap under what is averaged: bilinear values are averages over some two
+
 uvec4 table_texel(int index) {
     return texelFetch(hierarchy_triangles, hierarchy_texel(index), 0);
 }
@@ -41,7 +43,7 @@ vec4 texture_at_hit(int record, vec2 uv, float width) {
     at.x = (repeats & 1) != 0 ? fract(at.x) : clamp(at.x, 0.0, 1.0);
     at.y = (repeats & 2) != 0 ? fract(at.y) : clamp(at.y, 0.0, 1.0);
     float texels = width * sqrt(abs(right.x * up.y - right.y * up.x) * float(size.x) * float(size.y));
-    for (; texels > 1.41 && size != ivec2(1); texels *= 0.5) {
+    for (; texels > WIDEST && size != ivec2(1); texels *= 0.5) {
         first += (size.x * size.y + 1) >> 1;
         size = max(size >> 1, ivec2(1));
     }
@@ -53,6 +55,15 @@ vec4 texture_at_hit(int record, vec2 uv, float width) {
     return mix(upper, lower, part.y);
 }
 #endif
+
+// Whether rays show an object with all that its textures say; with normal maps, occlusion and holes only the rasterizer does.
+bool reads_all_textures(int object) {
+#if TEXTURED
+    return table_texel(surface_table + SURFACE_RECORD * object).y == 1u;
+#else
+    return false;
+#endif
+}
 
 // width: metres on the surface over which textures are averaged.
 ObjectRow body_at(int object, int triangle, vec2 weights, float width) {

@@ -143,3 +143,13 @@ def test_the_size_of_a_model_is_said_and_may_be_requested(run: Run, tmp_path: Pa
     assert refused.err == "error: --unit mm; --height is given, too; give one of them: each scales the model\n"
     wax = run("explain", model, "--preset", "wax").out
     assert "'cow.obj': opaque at this size, as plastic" in wax
+
+
+def test_a_color_is_that_of_a_solid_unless_it_is_asked_for_without_an_interface(run: Run) -> None:
+    color = ("--color", "#ace5c9", "--distance", "25cm")
+    passes = [step["name"] for step in strict_json(run("explain", "bear", *color, "--json").out)["plan"]["passes"]]
+    assert "traced_interfaces" in passes
+    fog = strict_json(run("explain", "bear", *color, "--ior", "1", "--json").out)["plan"]
+    assert fog["interfaces"] is None
+    clear = run("explain", "bear", "--color", "white", "--distance", "1cm")
+    assert clear.err.startswith("note: --color white takes no light away, so that it is clear glass; for white wax or")

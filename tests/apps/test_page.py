@@ -20,6 +20,7 @@ from PIL import Image
 
 import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
+from tests.textured import TEXTURED
 from translucent.gpu.recording.frames import FrameRecorder
 from translucent.page.payload import MAGIC, Container
 from translucent.page.plans import TEXTURE_UNITS, plan_page, simplified, triangles
@@ -183,6 +184,16 @@ def test_many_triangles_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     kinds = [note.kind for note in planned.notes]
     assert NoteKind.MANY_TRIANGLES in kinds
     assert triangles(planned.scene) == 320
+
+
+def test_pages_say_that_rays_read_no_textures_there(tmp_path: Path) -> None:
+    scene = TEXTURED["painted cube in glass"]
+    planned = plan_page(scene)
+    assert not planned.plan.textured
+    assert [note.kind for note in planned.notes].count(NoteKind.TEXTURES) == 1
+    page = tmp_path / "cube.html"
+    tl.write_page(scene, page, size=(40, 30))
+    assert "texture_at_hit" not in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("overlap", ["add", "priority"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import itertools
 import re
 import shlex
 from collections.abc import Callable
@@ -21,9 +22,13 @@ from translucent.cli import cli, main
 from translucent.planning.methods import METHODS
 
 ROOT = Path(__file__).resolve().parents[2]
+#: Made by the build of the site.
+MADE = ("docs/generated/", "docs/gallery_of_examples/")
+
 PAGES = {
-    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
-    for path in (ROOT / "README.md", *sorted(ROOT.glob("docs/*.md")), *sorted(ROOT.glob("docs/tutorials/*.md")))
+    name: path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md")))
+    if not (name := path.relative_to(ROOT).as_posix()).startswith(MADE)
 }
 SNIPPETS = {
     page: found for page, text in PAGES.items() if (found := re.findall(r"```python\n(.*?)```", text, re.DOTALL))
@@ -158,13 +163,12 @@ def test_commands_run(command: str, tmp_path: Path, in_tmp_path: Path) -> None:
     assert main([*arguments, *small, *few]) == 0
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])
-def test_all_verbs_are_shown(page: str) -> None:
-    assert {command.split()[0] for command in commands(PAGES[page])} == set(cli.commands)
+def test_all_verbs_are_shown() -> None:
+    assert {command.split()[0] for command in commands(PAGES["docs/commands.md"])} == set(cli.commands)
 
 
 def test_all_methods_are_in_the_table() -> None:
-    rows = re.findall(r"^\| `(\w+)\(\w*\)` \|", PAGES["README.md"], re.MULTILINE)
+    rows = re.findall(r"^\| `(\w+)\(\w*\)` \|", PAGES["docs/methods.md"], re.MULTILINE)
     assert sorted(rows) == sorted(method.__name__ for method in METHODS.values())
 
 
@@ -173,11 +177,46 @@ def test_all_public_names_are_in_the_reference() -> None:
     assert listed | {method.__name__ for method in METHODS.values()} == set(tl.__all__)
 
 
+def headings(page: str) -> list[tuple[int, str]]:
+    """Level and anchor of each heading, as MyST and code hosts make them."""
+    text = re.sub(r"(?ms)^ *```.*?^ *```", "", PAGES[page])
+    found = re.findall(r"(?m)^(#+) (.*)$", text)
+    return [(len(level), re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")) for level, title in found]
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(page: str) -> None:
-    for target in re.findall(r"\]\(([^)#\s]+)\)", PAGES[page]):
-        if "://" not in target and not target.startswith("gallery_of_examples/"):
-            assert ((ROOT / page).parent / target).exists(), target
+    for target in re.findall(r"\]\(([^)\s]+)\)", PAGES[page]):
+        path, _, anchor = target.partition("#")
+        if "://" in target or path.startswith("gallery_of_examples/"):
+            continue
+        file = ((ROOT / page).parent / path).resolve() if path else ROOT / page
+        assert file.exists(), target
+        if anchor:
+            assert anchor in [name for _, name in headings(file.relative_to(ROOT).as_posix())], target
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_headings_are_nested(page: str) -> None:
+    levels = [level for level, _ in headings(page)]
+    assert levels[:1] in ([1], [])  # the changelog is included
+    assert levels.count(1) <= 1
+    assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
+
+
+def test_all_pages_are_in_the_contents() -> None:
+    trees = re.findall(r"```\{toctree\}\n(.*?)```", PAGES["docs/index.md"], re.DOTALL)
+    listed = [f"docs/{name}.md" for tree in trees for name in re.findall(r"(?m)^([\w/-]+)$", tree)]
+    assert len(listed) == len(set(listed))
+    assert set(listed) - {"docs/gallery_of_examples/index.md"} == set(PAGES) - {"README.md", "docs/index.md"}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_pictures_have_a_text_and_a_command(page: str) -> None:
+    for text, target in re.findall(r"!\[([^\]]*)\]\(([^)\s]+)\)", PAGES[page]):
+        assert len(text.split()) >= 3, target
+        if "pictures/" in target:  # tools/gallery.py runs it
+            assert any(f"-o {Path(target).stem}.png" in command for command in commands(PAGES[page])), target
 
 
 @pytest.mark.usefixtures("one_scene", "small")

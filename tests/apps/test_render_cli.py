@@ -220,7 +220,8 @@ class TestRendering:
 
     def test_render_writes_the_exact_thickness_and_color(self, run: Run, cube: Path, tmp_path: Path) -> None:
         output = tmp_path / "cube.npz"
-        medium = ("--color", "linear(0.25,0.5,1)", "--distance", "0.5m", "--background", "linear(1,0.5,0.25)")
+        medium = ("--color", "linear(0.25,0.5,1)", "--distance", "0.5m", "--ior", "1")
+        medium += ("--background", "linear(1,0.5,0.25)")
         result = run("render", cube, "-o", output, *self.VIEW, *medium)
         assert (result.code, result.err) == (0, "")
         assert f"{output}: 9x5, " in result.out

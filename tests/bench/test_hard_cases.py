@@ -19,7 +19,7 @@ def test_there_is_one_of_each() -> None:
 
 
 def test_the_page_on_the_report_names_the_first_and_the_last() -> None:
-    page = (Path(__file__).resolve().parents[2] / "docs" / "report.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[2] / "docs" / "report-errors.md").read_text(encoding="utf-8")
     assert f"{ALL[0].name} to {ALL[-1].name} are inputs" in page
 
 

@@ -76,9 +76,11 @@ def test_the_table_is_that_of_the_scene_that_is_drawn(renderer: tl.Renderer, rng
     moved[0, 3] = 0.1
     with renderer.gpu.context.current() as gl:
         cache = HierarchyCache(gl)
-        first = cache.of(scene)
-        assert cache.of(replace(scene, objects=(GRAY, replace(scene.objects[1], transform=moved)))) is first
-        assert cache.of(changed) is not first
+        first = cache.of(scene, textured=True)
+        assert (
+            cache.of(replace(scene, objects=(GRAY, replace(scene.objects[1], transform=moved))), textured=True) is first
+        )
+        assert cache.of(changed, textured=True) is not first
         cache.release()
     pictures = [renderer.render(each, (4, 4), tl.PathTraced(2), samples=1).radiance for each in (scene, changed, scene)]
     assert np.abs(pictures[0] - pictures[1]).max() > 0.01

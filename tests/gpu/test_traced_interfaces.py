@@ -14,6 +14,7 @@ import pytest
 
 import translucent as tl
 from tests import references
+from tests.textured import TEXTURED
 from translucent.assets import mesh_path
 from translucent.bench.shapes import joined
 from translucent.geometry.solids import Box, Sphere, Torus
@@ -155,6 +156,25 @@ def test_one_body_is_that_of_the_reference(thorough: tl.Renderer, name: str) -> 
     print(f"{name}: median {np.median(off):.1e}, p90 {np.quantile(off, 0.9):.1e}, max {off.max():.1e}")
     assert np.median(off) < 2e-4
     assert np.quantile(off, 0.8 if name in {"knot", "squeezed torus"} else 0.9) < 3e-3
+
+
+@pytest.mark.parametrize("name", [name for name in TEXTURED if "rough" not in name])
+def test_textures_at_all_hits_are_those_of_the_reference(thorough: tl.Renderer, name: str) -> None:
+    off = differences(thorough, TEXTURED[name])
+    print(f"{name}: median {np.median(off):.1e}, p90 {np.quantile(off, 0.9):.1e}, max {off.max():.1e}")
+    assert np.median(off) < 2e-4
+    assert np.quantile(off, 0.9) < 3e-3
+
+
+def test_what_only_the_picture_has_stays_in_it(renderer: tl.Renderer) -> None:
+    """Objects with holes, normal maps or occlusion show through glass as the picture has them."""
+    scene = TEXTURED["painted pane before a painted cube"]
+    pane, cube = scene.objects
+    assert cube.surface is not None
+    occluded = dataclasses.replace(cube.surface, occlusion_texture=tl.Texture(np.zeros((1, 1, 3))))
+    dark = dataclasses.replace(scene, objects=(pane, dataclasses.replace(cube, surface=occluded)))
+    bright, less = (renderer.render(one, SIZE, samples=1, interfaces=DEEP).radiance for one in (scene, dark))
+    assert (bright - less).max() > 0.1
 
 
 def test_absorption_of_a_thin_slab_misses_nothing_at_its_surfaces(thorough: tl.Renderer) -> None:

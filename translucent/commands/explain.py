@@ -11,7 +11,7 @@ import click
 from translucent.commands.console import echo
 from translucent.commands.model import SceneRequest, is_scene_file, medium_lines, read_scene
 from translucent.commands.options import (
-    AnyMediumOptions,
+    BodyOptions,
     ChoiceOptions,
     FileOptions,
     common_options,
@@ -39,7 +39,7 @@ class _ExplainedChoices(ChoiceOptions):
 class ExplainOptions:
     """Options of ``translucent explain``."""
 
-    medium: AnyMediumOptions = group(AnyMediumOptions)
+    medium: BodyOptions = group(BodyOptions)
     file: FileOptions = group(FileOptions)
     stage: str | None = stage_option()
     choices: _ExplainedChoices = group(_ExplainedChoices, without=("thickness", "adaptive"))
@@ -57,6 +57,8 @@ def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
 
     requested = SceneRequest(
         medium=given.medium.read(),
+        keeps_ior=given.medium.keeps_ior,
+        ior=given.medium.ior,
         file=given.file,
         environment_shadows=given.choices.environment_shadows,
         roughness=given.medium.surface_roughness(),

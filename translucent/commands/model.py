@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
+from translucent.commands.console import echo
 from translucent.commands.options import (
     DEFAULT_FOV,
     DEFAULT_UP,
-    AnyMediumOptions,
+    BodyOptions,
     CameraOptions,
     FileOptions,
     collected,
@@ -47,11 +48,14 @@ _OBJECT = "--object"
 
 @dataclass(frozen=True)
 class NamedMedium:
-    """Medium of the objects of a name, and the roughness of their surfaces, if any is requested."""
+    """Medium of the objects of a name, the roughness of their surfaces, if any is requested, and whether they keep the
+    index of refraction that their file states.
+    """
 
     name: str
     medium: Medium
     roughness: float | None
+    keeps_ior: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,10 @@ class SceneRequest:
     ----------
     medium : Medium, optional
         In all translucent objects; None: those of the file.
+    keeps_ior : bool
+        Objects of a file keep the index of refraction that it states.
+    ior : float, optional
+        Index of refraction of the media, in place of their own.
     camera, file : CameraOptions, FileOptions
     size : (width, height)
         Of the picture that the scene is framed for.
@@ -79,6 +87,8 @@ class SceneRequest:
     """
 
     medium: Medium | None = None
+    keeps_ior: bool = False
+    ior: float | None = None
     camera: CameraOptions = field(default_factory=CameraOptions)
     file: FileOptions = field(default_factory=FileOptions)
     size: tuple[int, int] = (1280, 720)
@@ -100,7 +110,7 @@ def is_scene_file(model: str) -> bool:
 
 def read_scene(model: str, requested: SceneRequest) -> Scene:
     """The scene of a glTF file, or one mesh on show, as it is requested."""
-    from translucent.scene.showcase import framing, objects_named, with_roughness
+    from translucent.scene.showcase import framing, objects_named, with_ior, with_roughness
     from translucent.scene.stages import staged, upright
 
     options, (stage, turn) = requested.camera, _turned(requested.stage)
@@ -110,9 +120,12 @@ def read_scene(model: str, requested: SceneRequest) -> Scene:
         )
     scene, chosen = (_file_scene if is_scene_file(model) else _mesh_scene)(model, requested, stage)
     named = {id(item) for one in requested.media for item in objects_named(scene, one.name)}
-    scene = with_roughness(scene, requested.roughness, [item for item in scene.objects if id(item) not in named])
+    others = [item for item in scene.objects if id(item) not in named]
+    scene = with_ior(with_roughness(scene, requested.roughness, others), requested.ior, others)
     for one in requested.media:
         scene = with_roughness(scene, one.roughness, objects_named(scene, one.name))
+    for line in _textured_roughness(scene, requested):
+        echo(line, err=True)
     if options.defining:
         scene = dataclasses.replace(scene, camera=_defined_camera(scene, options, requested.size, chosen))
     if chosen is not None:
@@ -123,6 +136,26 @@ def read_scene(model: str, requested: SceneRequest) -> Scene:
         scene = staged(scene, chosen, requested.environment, turn)
     count = requested.environment_shadows
     return scene if count is None else dataclasses.replace(scene, environment_shadows=count)
+
+
+def _textured_roughness(scene: Scene, requested: SceneRequest) -> list[str]:
+    """Note on what wins over the roughness of a preset, or of an option: the texture of a file, times that."""
+    from translucent.scene.scene import object_names
+
+    values = {requested.roughness, *(one.roughness for one in requested.media)} - {None, 1.0}
+    textured = [
+        item
+        for item in scene.objects
+        if item.medium is not None
+        and item.surface is not None
+        and item.surface.roughness_texture is not None
+        and item.surface.roughness in values
+    ]
+    factors = " or ".join(
+        f"{value:g}" for value in sorted({item.surface.roughness for item in textured if item.surface})
+    )
+    names = f"note: {object_names(textured)}: roughness is the file's texture"
+    return [f"{names} times {factors}, which is requested; --roughness 1 shows the texture alone"] if textured else []
 
 
 def _turned(stage: str | None) -> tuple[str | None, float]:
@@ -167,7 +200,7 @@ def _file_scene(model: str, requested: SceneRequest, stage: str | None) -> tuple
         draft_extensions=requested.file.draft_extensions,
     )
     if requested.medium is not None:
-        scene = filled(scene, requested.medium)
+        scene = filled(scene, requested.medium, keeps_ior=requested.keeps_ior)
     scene = _with_media(scene, requested.media)
     bare = not (scene.has_camera or scene.lights or has_ground(scene)) and requested.environment is None
     chosen = stage_named(stage or (DEFAULT_STAGE if bare and scene.bodies else NO_STAGE))
@@ -181,7 +214,7 @@ def _with_media(scene: AnyScene, media: Sequence[NamedMedium]) -> AnyScene:
     from translucent.scene.showcase import filled, objects_named
 
     for one in media:
-        scene = filled(scene, one.medium, objects_named(scene, one.name))
+        scene = filled(scene, one.medium, objects_named(scene, one.name), keeps_ior=one.keeps_ior)
     return scene
 
 
@@ -321,7 +354,7 @@ def medium_lines(scene: Scene, reach: Callable[[Object], float] | None = None) -
 
 
 @dataclass(frozen=True, kw_only=True)
-class _ObjectOptions(AnyMediumOptions):
+class _ObjectOptions(BodyOptions):
     """The options that may stand behind an --object."""
 
     roughness: float | None = roughness_option()
@@ -357,7 +390,7 @@ def read_objects(names: Sequence[str]) -> list[NamedMedium]:
         if (medium := given.read()) is None:
             do = "add --preset NAME, or --color C and --distance D, behind it"
             raise InputError(f"{_OBJECT} {name!r}", "no medium is named for it", do)
-        found.append(NamedMedium(name, medium, given.surface_roughness(given.roughness)))
+        found.append(NamedMedium(name, medium, given.surface_roughness(given.roughness), given.keeps_ior))
     return found
 
 

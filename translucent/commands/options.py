@@ -274,6 +274,36 @@ class AnyMediumOptions(MediumOptions):
         return scattering_medium(color, parse_length(length), ior=SCATTERING_IOR)
 
 
+@dataclass(frozen=True, kw_only=True)
+class BodyOptions(AnyMediumOptions):
+    """Options that choose what bodies are made of: a medium, and the interface around it."""
+
+    ior: float | None = option(
+        type=click.FloatRange(1.0, 100.0),
+        metavar="N",
+        help="Index of refraction; 1: light goes straight on, as in fog. Default: the preset's, the file's, "
+        f"{SCATTERING_IOR:g} of --scattering-color, or 1.5, that of glass.",
+    )
+
+    def read(self, *, shows_scattering: bool = True) -> Medium | None:
+        """Medium that is chosen, if any; a color at a distance is that of a solid."""
+        from translucent.scene.showcase import SOLID_IOR
+
+        medium = super().read(shows_scattering=shows_scattering)
+        if medium is None:
+            return None
+        if self.color is not None and not medium.extinction.any():
+            do = "for white wax or milk: --preset wax, or --scattering-color white --mean-free-path 2mm"
+            echo(f"note: --color {self.color} takes no light away, so that it is clear glass; {do}", err=True)
+        ior = self.ior or (SOLID_IOR if self.color is not None else medium.ior)
+        return medium if ior == medium.ior else dataclasses.replace(medium, ior=ior)
+
+    @property
+    def keeps_ior(self) -> bool:
+        """True if objects whose file states an index of refraction keep it: of a color alone, none is known."""
+        return self.color is not None and self.ior is None
+
+
 def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
     """Clamp channels of a color that are too dark, with a warning if there were any."""
     from translucent.media.colors import parse_color

@@ -30,7 +30,7 @@ from translucent.commands.model import (
     size_lines,
 )
 from translucent.commands.options import (
-    AnyMediumOptions,
+    BodyOptions,
     CameraOptions,
     ChoiceOptions,
     FileOptions,
@@ -94,7 +94,7 @@ class RenderOptions:
     """Options of ``translucent render``."""
 
     output: Path = option(names=("-o", "--output"), required=True, help="A .png, .exr or .npz file; see --turntable.")
-    medium: AnyMediumOptions = group(AnyMediumOptions)
+    medium: BodyOptions = group(BodyOptions)
     object_names: tuple[str, ...] = option(
         (),
         names=("--object",),
@@ -167,6 +167,8 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     refuse_overwriting(given.output, model, given.look.environment, given.look.background)
     requested = SceneRequest(
         medium=given.medium.read(),
+        keeps_ior=given.medium.keeps_ior,
+        ior=given.medium.ior,
         camera=given.camera,
         file=given.file,
         size=pixels,

@@ -21,7 +21,7 @@ from translucent.commands.model import (
     size_lines,
 )
 from translucent.commands.options import (
-    AnyMediumOptions,
+    BodyOptions,
     CameraOptions,
     ChoiceOptions,
     FileOptions,
@@ -140,7 +140,7 @@ class PageOptions:
     """Options of ``translucent page``."""
 
     output: Path = option(names=("-o", "--output"), required=True, help="An .html file.")
-    medium: AnyMediumOptions = group(AnyMediumOptions)
+    medium: BodyOptions = group(BodyOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
     size: str = option("1280x800", metavar="WxH", help="Of the poster, and of what the view frames.")
     camera: CameraOptions = group(CameraOptions)
@@ -179,6 +179,8 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
     picture = _read_poster(given.poster)
     requested = SceneRequest(
         medium=given.medium.read(),
+        keeps_ior=given.medium.keeps_ior,
+        ior=given.medium.ior,
         camera=given.camera,
         file=given.file,
         size=pixels,

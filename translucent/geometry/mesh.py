@@ -15,6 +15,7 @@ from translucent.arguments import checked, vectors
 from translucent.arrays import Array, Frozen
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.diagnosis import Diagnosis, diagnose
+from translucent.geometry.foreign import foreign_name, foreign_parts, unit_of
 from translucent.geometry.grouping import CHUNK, equal_rows, extent, use_mask
 from translucent.geometry.repair import WELD_EDGE_FRACTION, WELD_TOLERANCE, all_apart, orient, weld
 from translucent.geometry.winding import winding_number
@@ -123,9 +124,14 @@ class Mesh(Frozen):
         array.setflags(write=False)
         object.__setattr__(self, field, array)
 
+    @classmethod
+    def _adopted(cls, thing: Any) -> Mesh | None:
+        """Mesh of one of another library, for `checked`: all public functions that take a mesh take these, too."""
+        return mesh_of(thing)
+
     def __repr__(self) -> str:
         about = f"{len(self.vertices)} vertices, {len(self.faces)} faces"
-        return f"Mesh({self.name!r}, {about}{f'; {size}' if (size := size_note(self, python=True)) else ''})"
+        return f"Mesh({self.name!r}, {about}{f'; {size}' if (size := size_note(self, way='argument')) else ''})"
 
     @cached_property
     def diagnosis(self) -> Diagnosis:
@@ -266,6 +272,17 @@ def adopted(vertices: Array, faces: npt.NDArray[np.int32], uv: Array | None, nam
     mesh.__dict__.update(vertices=vertices, faces=faces, **given)
     mesh._settle(copy=False)
     return mesh
+
+
+def mesh_of(thing: object, unit: str | None = None) -> Mesh | None:
+    """Mesh of one of another library, welded and wound; None if the object is none. See `translucent.load_mesh`."""
+    if (parts := foreign_parts(thing)) is None:
+        return None
+    name, (metres, assumed) = foreign_name(thing), unit_of(thing, unit)
+    vertices, faces, uv = joined(parts, f"mesh {name!r}")
+    raw = adopted(vertices * metres, faces, uv, name, assumed_unit=assumed)
+    raw.require_finite()
+    return mended(raw)
 
 
 def mended(raw: Mesh) -> Mesh:

@@ -159,7 +159,19 @@ def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
         raise InputError(requested, "it is empty", "copy or export the file again")
     if not binary:
         _require_short(requested, size)
-    data, chunks = _split(requested, read_bytes(path, requested)) if binary else (read_bytes(path, requested), b"")
+    return gltf_of(path, read_bytes(path, requested), allow_outside)
+
+
+def gltf_of(path: Path, content: bytes, allow_outside: bool = False) -> GltfFile:
+    """Parse the content of a .gltf or .glb file; the path is what messages call it, and where its links begin.
+
+    Raises
+    ------
+    InputError
+        If it is cut short, or its JSON is broken.
+    """
+    requested = f"glTF {str(path)!r}"
+    data, chunks = _split(requested, content) if content.startswith(MAGIC) else (content, b"")
     try:
         text = data.decode("utf-8-sig")
         del data  # half of the memory

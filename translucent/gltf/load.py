@@ -6,16 +6,18 @@ import warnings
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from translucent.arguments import checked_but
+from translucent.arguments import checked_but, require_path
 from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
 from translucent.files.reading import require_room
+from translucent.geometry.foreign import foreign_name, is_scene, unit_of
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh, Triangles, joined
 from translucent.gltf.accessors import Accessors, raw_mesh
-from translucent.gltf.file import COMPRESSIONS, GltfFile, LeftOut, label, read_gltf
+from translucent.gltf.file import COMPRESSIONS, GltfFile, LeftOut, gltf_of, label, read_gltf
 from translucent.gltf.lights import LIGHTS, scene_camera, scene_lights
 from translucent.gltf.materials import (
     CLEARCOAT,
@@ -77,10 +79,10 @@ class GltfScene(Scene):
     variants: tuple[str, ...] = ()
 
 
-@checked_but("camera", "size")
+@checked_but("path", "camera", "size")
 def load_scene(
-    path: str | Path,
-    unit: str = "m",
+    path: Any,
+    unit: str | None = None,
     camera: int | None = 0,
     size: tuple[int, int] = (1, 1),
     *,
@@ -93,11 +95,11 @@ def load_scene(
 
     Parameters
     ----------
-    path : path
-        A glTF 2.0 file. Its default scene is read, or else its first.
-    unit : str
+    path : path or trimesh.Scene
+        A glTF 2.0 file. Its default scene is read, or else its first. A scene of trimesh is what it exports as .glb.
+    unit : str, optional
         Unit of the file's lengths. glTF is in metres by definition; another unit rescales the whole, attenuation
-        distances and lights included, so that it looks the same.
+        distances and lights included, so that it looks the same. Default: metres, and for a scene of trimesh its units.
     camera : int or None
         Which of the cameras that nodes place, counted from 0. None frames all objects, and so does 0 in a file without
         cameras.
@@ -128,8 +130,10 @@ def load_scene(
         If the file is missing, broken, no glTF, compressed or without triangles; if a value in it is wrong, or the
         transform of a light or of the camera is singular; if there is no such camera, variant or animation.
     """
-    metres = metres_per_unit(unit)
-    file = _read(path, allow_outside)
+    if is_scene(path):
+        metres, file = unit_of(path, unit)[0], _exported(path)
+    else:
+        metres, file = metres_per_unit("m" if unit is None else unit), _read(path, allow_outside)
     left_out = LeftOut()
     check_extensions(file, left_out, DRAFTS.values() if draft_extensions else ())
     if time is not None:
@@ -152,7 +156,15 @@ def load_scene(
     return GltfScene(objects, view, lights, environment, left_out=lost, has_camera=own is not None, variants=variants)
 
 
-def _read(path: str | Path, allow_outside: bool) -> GltfFile:
+def _exported(scene: Any) -> GltfFile:
+    """The .glb that a scene of trimesh exports."""
+    if scene.is_empty:
+        raise InputError(f"scene {foreign_name(scene)!r}", "it has no geometry", "add some: scene.add_geometry(mesh)")
+    return gltf_of(Path(foreign_name(scene)), scene.export(file_type="glb"))
+
+
+def _read(path: Any, allow_outside: bool) -> GltfFile:
+    require_path("load_scene path", path, "a .glb or .gltf file, or a scene of trimesh")
     if Path(path).suffix.lower() not in SUFFIXES:
         raise InputError(
             f"scene {str(path)!r}",

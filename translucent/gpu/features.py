@@ -146,6 +146,11 @@ class FrameFeatures:
         return self.plan.has(PassName.PATH_TRACE)
 
     @property
+    def textured(self) -> bool:
+        """True if rays read textures of surfaces wherever they hit one."""
+        return self.plan.textured
+
+    @property
     def has_caustics(self) -> bool:
         """True if photons light opaque objects."""
         return self.plan.has(PassName.CAUSTICS)

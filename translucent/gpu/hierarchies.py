@@ -296,9 +296,10 @@ class HierarchyCache:
         self._held: SceneHierarchies | None = None
         self._key: tuple[object, ...] = ()
 
-    def of(self, scene: Scene) -> SceneHierarchies:
-        """The hierarchies of a scene."""
-        meshes, surfaces = tuple(dict.fromkeys(body.mesh for body in scene.objects)), surface_key(scene)
+    def of(self, scene: Scene, *, textured: bool = False) -> SceneHierarchies:
+        """The hierarchies of a scene, with the table of its textures if these are to be read."""
+        meshes = tuple(dict.fromkeys(body.mesh for body in scene.objects))
+        surfaces = surface_key(scene) if textured else ()
         if self._held is None or self._key != (meshes, len(scene.objects), surfaces):
             self.release()
             self._held = SceneHierarchies(self._gl, meshes, len(scene.objects), scene if surfaces else None)

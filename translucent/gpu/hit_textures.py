@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.geometry.mesh import Mesh
-from translucent.planning.surface_textures import halvings, textures_at_hits, varies_at_hits
+from translucent.planning.surface_textures import halvings, has_more, textures_at_hits, varies_at_hits
 from translucent.scene.scene import Scene
 from translucent.scene.texture import Texture
 
@@ -29,7 +29,7 @@ _ONE = 65535
 def surface_key(scene: Scene) -> tuple[object, ...]:
     """What the table of a scene depends on."""
     objects = enumerate(scene.objects)
-    return tuple((i, body.mesh, *textures_at_hits(body)) for i, body in objects if varies_at_hits(body))
+    return tuple((i, body.mesh, has_more(body), *textures_at_hits(body)) for i, body in objects if varies_at_hits(body))
 
 
 def surface_table(
@@ -65,7 +65,7 @@ def surface_table(
             continue
         if body.mesh not in corners:
             corners[body.mesh] = place(_corners(body.mesh, faces(body.mesh)))
-        record[0, :2] = (corners[body.mesh] - 3 * first_triangle(body.mesh)) % (1 << 32), 1
+        record[0, :2] = (corners[body.mesh] - 3 * first_triangle(body.mesh)) % (1 << 32), 2 if has_more(body) else 1
         for number, texture in enumerate(textures_at_hits(body)):
             if texture is None:
                 continue

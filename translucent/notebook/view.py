@@ -47,7 +47,7 @@ def scene_bundle(scene: Scene) -> Bundle:
 
 
 def _bundle(scene: Scene) -> Bundle:
-    sizes = dict.fromkeys(size_note(item.mesh, python=True) for item in scene.shown)
+    sizes = dict.fromkeys(size_note(item.mesh, way="argument") for item in scene.shown)
     lines = [repr(scene), *_contents(scene), *filter(None, sizes), _view(scene)]
     if why := _takes_long(scene):
         lines.append(f"Not drawn here, since {why}: renderer.render(scene, size) does.")

@@ -212,7 +212,7 @@ def _planned(scene: Scene, request: RenderRequest, units: int) -> RenderPlan:
     if method is not None and method.needs_storage:
         found = "its passes write to buffers, which WebGL2 has none of"
         raise InputError(f"a page with {method}", found, "use SignedDepth, or DepthPeeling for ordered intervals")
-    machine = Capabilities(shader_storage=False, texture_units=units)
+    machine = Capabilities(shader_storage=False, texture_units=units, textured_rays=False)
     chosen = plan_scene(scene, request, machine)
     if isinstance(peeling := chosen.method, DepthPeeling) and peeling.max_layers > MOST_LAYERS:
         # What the planner says why it took it stays.

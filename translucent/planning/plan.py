@@ -69,7 +69,7 @@ from translucent.planning.rendered import Treatment, darkened, occluder_scene, o
 from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Scattering, SingleScattering, Treatments, choose_treatments, rendered_scene
 from translucent.planning.shadow_maps import ShadowMaps, shadow_passes, shadows_left_out
-from translucent.planning.surface_textures import unread_at_hits
+from translucent.planning.surface_textures import reduced_at_hits, textured_at_hits, unread_at_hits, untextured_rays
 from translucent.scene.lights import SPREADS, PositionalLight, SphereLight, SpotLight, without_spheres
 from translucent.scene.scene import Object, Scene, check_scene, object_names
 
@@ -151,6 +151,7 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
     found = replace(found, request=request, unmodelled=unmodelled, remarks=remarks(scene))
     if request.caustics is not None:
         found = _with_caustics(found, scene, request.caustics, machine)
+    found = _with_textures(found, machine)
     return found if found.traced else _with_shadows(found, scene, machine)
 
 
@@ -382,7 +383,6 @@ def _traced(
     limits = (*(chosen.limits(scene) if sheets else open_limits(scene)), *mesh_limits(scene, chosen))
     unmodelled = unmodelled_effects(scene, scattering=machine.scattering and scatters(scene), interfaces=followed)
     unmodelled = with_ambient(unmodelled) if ambient else unmodelled
-    unmodelled = (*unmodelled, *unread_at_hits(scene)) if followed else unmodelled
     return RenderPlan(scene, chosen, passes, True, limits, unmodelled, interfaces=followed, traced=True)
 
 
@@ -405,6 +405,19 @@ def _with_caustics(found: RenderPlan, scene: Scene, caustics: Caustics, machine:
         caustics=caustics,
         opaque_to_shadows=opaque_to_shadows(scene),
     )
+
+
+def _with_textures(found: RenderPlan, machine: Capabilities) -> RenderPlan:
+    """The plan with textures of surfaces at every hit of a ray, and notes on what rays do not read of them."""
+    scene, followed = found.scene, found.has(PassName.TRACED, PassName.PATH_TRACE)
+    on_cpu = found.traced and found.interfaces is not None
+    textured = textured_at_hits(scene) and (followed or found.has(PassName.CAUSTICS))
+    notes = unread_at_hits(scene) if followed or on_cpu else []
+    if textured and not machine.textured_rays:
+        notes = untextured_rays(scene)
+    elif textured and followed:
+        notes += reduced_at_hits(scene)
+    return replace(found, textured=textured and machine.textured_rays, unmodelled=(*found.unmodelled, *notes))
 
 
 def _with_shadows(found: RenderPlan, scene: Scene, machine: Capabilities) -> RenderPlan:

@@ -33,12 +33,15 @@ class Capabilities:
         Light that media scatter can be followed.
     texture_units : int
         Textures that one shader can read.
+    textured_rays : bool
+        Rays can read textures of surfaces wherever they hit one.
     """
 
     shader_storage: bool = True
     opengl: bool = True
     scattering: bool = True
     texture_units: int = 32
+    textured_rays: bool = True
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,8 @@ class RenderPlan:
         How shadows on opaque objects are found, if the plan has the pass.
     maps : tuple of MapPlan
         Then, of the maps of lights, and of the maps of the environment if they differ.
+    textured : bool
+        Rays and photons on the GPU read textures of surfaces wherever they hit one.
     request : RenderRequest
         What was requested.
     """
@@ -127,6 +132,7 @@ class RenderPlan:
     opaque_to_shadows: frozenset[int] = frozenset()
     shadows: ShadowMaps = field(default_factory=ShadowMaps)
     maps: tuple[MapPlan, ...] = ()
+    textured: bool = False
     request: RenderRequest = field(default_factory=RenderRequest, compare=False)
 
     @property

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from translucent.planning.passes import Note, NoteKind
 from translucent.scene.scene import Object, Scene, object_names
-from translucent.scene.surface import Surface
 from translucent.scene.texture import Falloff, Texture
 
 #: Texels of all textures together, without their mipmaps; more are halved. 8 bytes each.
@@ -36,10 +35,16 @@ def textured_at_hits(scene: Scene) -> bool:
 
 def unread_at_hits(scene: Scene) -> list[Note]:
     """Notes on what rays do not read of surfaces."""
-    bodies = [body for body in scene.objects if body.surface is not None and _has_more(body, body.surface)]
-    if not bodies:
+    if not (bodies := [body for body in scene.objects if has_more(body)]):
         return []
     text = f"normal maps, occlusion and holes by alpha: rays find {object_names(bodies)} without"
+    return [Note(NoteKind.TEXTURES, text)]
+
+
+def untextured_rays(scene: Scene) -> list[Note]:
+    """Notes on textures where rays have the values of a surface where a pixel shows it first, or without textures."""
+    names = object_names(body for body in scene.objects if varies_at_hits(body))
+    text = f"textures and vertex colors behind the first surface of a ray: {names} are even there"
     return [Note(NoteKind.TEXTURES, text)]
 
 
@@ -53,11 +58,12 @@ def reduced_at_hits(scene: Scene) -> list[Note]:
     return [Note(NoteKind.TEXTURES, text)]
 
 
-def _has_more(body: Object, surface: Surface) -> bool:
+def has_more(body: Object) -> bool:
     """True if a surface has normal maps, occlusion or holes, which rays do not read."""
+    if (surface := body.surface) is None or body.covers:
+        return False
     mapped = surface.normal_texture is not None or surface.occlusion_texture is not None
-    opaque_holes = body.medium is None and surface.alpha_cutoff > 0 and varies_at_hits(body)
-    return not body.covers and (mapped or body.has_holes or opaque_holes)
+    return mapped or body.has_holes or (body.medium is None and surface.alpha_cutoff > 0 and varies_at_hits(body))
 
 
 def halvings(scene: Scene) -> dict[Texture, int]:

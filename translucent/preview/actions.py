@@ -23,10 +23,13 @@ from translucent.preview.document import (
     checked,
     medium_fields,
     panned,
+    resized,
     triple_of,
     turned,
     zoomed,
 )
+from translucent.scene.showcase import SOLID_IOR
+from translucent.units import metres_per_unit
 
 #: Largest number of steps that can be undone.
 MAX_STEPS = 200
@@ -47,6 +50,13 @@ class Open:
 
     path: str
     unit: str = "m"
+
+
+@dataclass(frozen=True)
+class Resize:
+    """Scale the model by another unit of its coordinates, and the view with it."""
+
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -118,7 +128,7 @@ class Zoom:
     down: float = 0.0
 
 
-Action = SetField | Open | ChoosePreset | Assign | Hide | Adopt | Replace | SetOrbit | OrbitBy | Pan | Zoom
+Action = SetField | Open | Resize | ChoosePreset | Assign | Hide | Adopt | Replace | SetOrbit | OrbitBy | Pan | Zoom
 
 #: Fields with which a preset is none any more.
 _OF_PRESET = ("absorption", "scattering", "anisotropy", "phase", "emission")
@@ -142,6 +152,11 @@ def apply(document: Document, action: Action) -> Document:
             if Path(action.path).suffix.lower() in SUFFIXES or material.source == "file":
                 material = Material()
             return replace(model=model, material=material, orbit=None, assigned=(), hidden=())
+        case Resize():
+            model = dataclasses.replace(document.model, unit=checked("model.unit", action.unit, "m"))
+            factor = metres_per_unit(model.unit) / metres_per_unit(document.model.unit)
+            material = dataclasses.replace(document.material, thickness=factor * document.material.thickness)
+            return _viewed_alike(replace(model=model, material=material), document)
         case ChoosePreset():
             return replace(material=preset_material(document.material, action.name))
         case Assign():
@@ -170,10 +185,14 @@ def apply(document: Document, action: Action) -> Document:
 def _changed(document: Document, action: SetField) -> Document:
     section, _, name = action.field.partition(".")
     owner = getattr(document, section, None) if section in document.__dataclass_fields__ else None
-    if owner is None or name not in owner.__dataclass_fields__ or action.field == "model.path":
+    if owner is None or name not in owner.__dataclass_fields__ or section == "model":
         raise InputError(f"field {action.field!r}", "there is none to change", "use for example material.roughness")
     if isinstance(owner, Material):
-        return dataclasses.replace(document, material=changed_material(owner, name, action.value))
+        changed = changed_material(owner, name, action.value)
+        bare = Path(document.model.path).suffix.lower() not in SUFFIXES
+        if bare and owner.source == "file" and changed.source == "color":
+            changed = dataclasses.replace(changed, ior=max(owner.ior, SOLID_IOR))  # a solid, as of other verbs
+        return dataclasses.replace(document, material=changed)
     value = checked(action.field, action.value, getattr(owner, name))
     return dataclasses.replace(document, **{section: dataclasses.replace(owner, **{name: value})})
 
@@ -270,4 +289,11 @@ class History:
 
 
 def _with_view_of(present: Document, other: Document) -> Document:
-    return dataclasses.replace(other, orbit=present.orbit) if other.model == present.model else other
+    return _viewed_alike(other, present) if other.model.path == present.model.path else other
+
+
+def _viewed_alike(document: Document, other: Document) -> Document:
+    """Document with the view of another one of the same file, which may have another scale."""
+    factor = metres_per_unit(document.model.unit) / metres_per_unit(other.model.unit)
+    orbit = other.orbit if other.orbit is None or factor == 1.0 else resized(other.orbit, factor)
+    return dataclasses.replace(document, orbit=orbit)

@@ -28,7 +28,7 @@ from translucent.scene.scene import Object
 from translucent.scene.showcase import DEFAULT_COLOR, framing
 from translucent.scene.stages import NO_STAGE, STAGES, farthest_vertices
 from translucent.scene.surface import MAX_DISPERSION, MAX_FILM, Surface
-from translucent.units import METRES_PER_UNIT, metres_per_unit
+from translucent.units import metres_per_unit
 
 Triple = tuple[float, float, float]
 Source = Literal["file", "color", "preset", "coefficients"]
@@ -77,10 +77,12 @@ def one_of(default: str, words: Iterable[str]) -> Any:
 
 @dataclass(frozen=True)
 class Model:
-    """Model: a file, or one of the toolkit's own meshes by name, with the unit of its coordinates."""
+    """Model: a file, or one of the toolkit's own meshes by name, with the unit of its coordinates, as ``mm`` or
+    ``25mm``, which is its scale, too.
+    """
 
     path: str = "goblet"
-    unit: str = one_of("m", METRES_PER_UNIT)
+    unit: str = "m"
 
 
 @dataclass(frozen=True)
@@ -221,6 +223,8 @@ class Display:
         Path trace the picture while the view is still.
     caustics : bool
         Add the light of photons from the lights to the picture while the view is still.
+    ruler : bool
+        Draw a ruler on the ground, and a coin or a hand beside it.
     unit : str
         In which lengths are shown.
     """
@@ -235,6 +239,7 @@ class Display:
     antialias: bool = True
     converge: bool = False
     caustics: bool = False
+    ruler: bool = False
     unit: str = one_of("mm", SHOWN_UNITS)
 
     @property
@@ -330,6 +335,8 @@ def checked(name: str, value: Any, like: Any) -> Any:
     if isinstance(like, str):
         if not isinstance(value, str) or (range_.words and value not in range_.words):
             raise InputError(f"{name} = {value!r}", "not one of its words", f"use {', '.join(range_.words) or 'text'}")
+        if name == "model.unit":
+            metres_per_unit(value)
         return value
     if isinstance(like, tuple):
         if not isinstance(value, tuple | list) or len(value) != 3:
@@ -385,6 +392,13 @@ def panned(orbit: Orbit, right: float, down: float) -> Orbit:
     step = height_at_target(orbit) * (down * camera.up - right * camera.right)
     target = np.clip(np.asarray(orbit.target) + step, -MAX_COORDINATE, MAX_COORDINATE)
     return dataclasses.replace(orbit, target=tuple(target.tolist()))
+
+
+def resized(orbit: Orbit, factor: float) -> Orbit:
+    """Orbit that sees a model of so many times the size as before."""
+    target = np.clip(factor * np.asarray(orbit.target), -MAX_COORDINATE, MAX_COORDINATE)
+    distance = min(max(factor * orbit.distance, _NEAREST), _FARTHEST)
+    return dataclasses.replace(orbit, target=tuple(target.tolist()), distance=distance)
 
 
 def zoomed(orbit: Orbit, factor: float, at: tuple[float, float] = (0.0, 0.0)) -> Orbit:
@@ -493,6 +507,7 @@ display.converge = Path trace the picture while nothing changes (C): all light, 
 display.caustics = Photons carry light through interfaces onto opaque objects while nothing changes
     (P): --caustics of translucent render, more and more of them. The picture that moves has none, and neither
     has one that converges.
+display.ruler = A ruler before the model, on the ground, and a coin (24 mm) or a hand (18 cm) beside it.
 display.unit = Unit of the lengths in panels and scales.
 orbit.fov_y = Vertical angle of view in degrees (yfov of a glTF camera, there in radians). Typical: 20 to 50.
 orbit.orthographic = No perspective (O), as glTF's orthographic cameras: parallel rays, for technical views.

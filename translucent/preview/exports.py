@@ -40,6 +40,7 @@ from translucent.preview.worker import Pool, Urgency, report
 from translucent.renderer import Renderer
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene
+from translucent.scene.showcase import SOLID_IOR
 from translucent.scene.stages import NO_STAGE
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Texture
@@ -214,7 +215,10 @@ def command_line(recipe: Recipe) -> tuple[str, list[str]]:
     document, look, display = recipe.document, recipe.document.look, recipe.document.display
     model, orbit = recipe.loaded.model, recipe.orbit
     words = ["translucent", "render", model.path, "-o", recipe.output, "--size", f"{recipe.size[0]}x{recipe.size[1]}"]
-    words += ["--unit", model.unit] if model.unit != "m" else []
+    if model.unit != "m":
+        low, high = recipe.loaded.scene.shown_bounds
+        own = model.path in mesh_names() and not Path(model.path).exists()
+        words += ["--height", f"{high[1] - low[1]:.12g}m"] if own else ["--unit", model.unit]
     own = document.material == own_material(look, recipe.loaded)  # which translucent render gives the model by itself
     medium, left_out = ([], []) if own else _medium_options(document.material)
     words += medium
@@ -250,9 +254,11 @@ def _medium_options(material: Material) -> tuple[list[str], list[str]]:
     if material.source == "preset":
         found, words = preset(material.preset).medium, ["--preset", material.preset]
     else:
-        found = Medium.from_color(material.color, material.distance)
+        found = Medium.from_color(material.color, material.distance, ior=SOLID_IOR)
         words = ["--color", f"linear({_numbers(material.color)})", "--distance", f"{material.distance:.12g}m"]
-    fields = {"ior": "the index of refraction", "scattering": "scattering", "emission": "emission"}
+    if material.ior != found.ior:
+        words += ["--ior", f"{material.ior:.12g}"]
+    fields = {"scattering": "scattering", "emission": "emission"}
     left_out = [part for name, part in fields.items() if np.any(getattr(found, name) != getattr(requested, name))]
     return [*words, "--roughness", f"{material.roughness:g}"], left_out + material.unsaid
 

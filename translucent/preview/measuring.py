@@ -106,6 +106,11 @@ class Measurement:
     truth: npt.NDArray[np.uint8]
     scene: Scene | None = None
 
+    def scaled(self, factor: float) -> Measurement:
+        """The same of a model so many times as large, which is measured again when it is seen."""
+        seen = dataclasses.replace(self.seen, thickness=factor * self.seen.thickness, edges=factor * self.seen.edges)
+        return Measurement((), "the size has changed: it is measured anew", seen, self.truth)
+
 
 @dataclass(frozen=True, eq=False)
 class ReferencePicture:

@@ -47,14 +47,14 @@ from translucent.preview.worker import Pool, Urgency
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment, filtered
 from translucent.scene.environment_files import READERS
-from translucent.scene.lights import DirectionalLight
-from translucent.scene.scene import Object, Scene
+from translucent.scene.lights import DirectionalLight, PositionalLight, SphereLight
+from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.shadow_directions import shadow_directions
 from translucent.scene.showcase import (
     DEFAULT_COLOR,
     DEFAULT_REACH,
     LIGHT_TABLE,
-    STAGED_IOR,
+    SOLID_IOR,
     fillable,
     framing,
     named_environment,
@@ -72,6 +72,7 @@ from translucent.scene.stages import (
 )
 from translucent.scene.surface import Surface
 from translucent.scene.turntable import on_stage
+from translucent.units import metres_per_unit
 
 #: Bytes of a file from which on it is read by a worker process: while a picture is on show, and before. Whatever reads
 #: it holds the interpreter's lock now and then, which nobody sees in a window without a picture, and no process need
@@ -146,14 +147,56 @@ def load(model: Model, allow_outside: bool = False) -> Loaded:
     if Path(model.path).suffix.lower() in SUFFIXES:
         scene: Scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
     elif model.path in mesh_names() and not Path(model.path).exists():
-        scene = showcase(load_mesh(mesh_path(model.path)), stage="none")
+        scene = showcase(load_mesh(mesh_path(model.path), model.unit), stage="none")
     else:
-        scene = showcase(load_mesh(model.path, unit=model.unit, allow_outside=allow_outside), stage="none")
+        unit = None if model.unit == "m" else model.unit  # what is assumed is said
+        scene = showcase(load_mesh(model.path, unit, allow_outside=allow_outside), stage="none")
     for item in scene.objects:
         _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
         if item.has_interface or item.surface is not None:
             drawn_normals(item.mesh)
     return Loaded(model, scene, material_of(scene))
+
+
+def rescaled(loaded: Loaded, model: Model) -> Loaded:
+    """Loaded model by another unit of its coordinates: of its meshes, all that takes time is kept."""
+    factor = metres_per_unit(model.unit) / metres_per_unit(loaded.model.unit)
+    scene, scale = loaded.scene, np.diag([factor, factor, factor, 1.0])
+    media = {id(item.medium): _diluted(item.medium, factor) for item in scene.objects if item.medium is not None}
+    objects = [
+        dataclasses.replace(
+            item,
+            transform=scale @ item.matrix,
+            medium=media.get(id(item.medium)),
+            sheet_thickness=None if item.sheet_thickness is None else factor * item.sheet_thickness,
+        )
+        for item in scene.objects
+    ]
+    pose = scene.camera.pose.copy()
+    pose[:3, 3] *= factor
+    height = None if scene.camera.height is None else factor * scene.camera.height
+    camera = dataclasses.replace(scene.camera, pose=pose, height=height)
+    lights = [_farther(light, factor) for light in scene.lights]
+    scene = dataclasses.replace(scene, objects=objects, camera=camera, lights=lights)
+    return Loaded(model, scene, material_of(scene))
+
+
+def _diluted(medium: Medium, factor: float) -> Medium:
+    """Medium that looks the same in a body so many times as large."""
+    absorption, scattering, emission = (
+        np.asarray(one) / factor for one in (medium.absorption, medium.scattering, medium.emission)
+    )
+    return dataclasses.replace(medium, absorption=absorption, scattering=scattering, emission=emission)
+
+
+def _farther(light: Light, factor: float) -> Light:
+    """Light that falls alike on objects so many times as large."""
+    if not isinstance(light, PositionalLight):
+        return light
+    position, intensity = factor * np.asarray(light.position), factor**2 * np.asarray(light.intensity)
+    if isinstance(light, SphereLight):
+        return dataclasses.replace(light, position=position, intensity=intensity, radius=factor * light.radius)
+    return dataclasses.replace(light, position=position, intensity=intensity)
 
 
 @dataclass
@@ -230,7 +273,7 @@ def own_material(look: Look, loaded: Loaded) -> Material:
     """Material that a model comes with: a bare mesh on a stage has an interface, as ``translucent render`` gives it."""
     if not loaded.bare or stage_name(look, loaded) == NO_STAGE:
         return loaded.material
-    return dataclasses.replace(loaded.material, ior=STAGED_IOR)
+    return dataclasses.replace(loaded.material, ior=SOLID_IOR)
 
 
 def tone_of(look: Look, scene: Scene) -> str:

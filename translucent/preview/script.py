@@ -1,8 +1,9 @@
 """Scripts: user actions as a list in TOML; for tests, pictures of the window and demonstrations.
 
-Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, value), ``open`` (model, unit), ``preset``
-(name), ``turn`` (right, up: degrees), ``pan`` (right, down: heights of the picture), ``zoom`` (factor, right, down),
-``undo``, ``redo``, ``frame``. Of the library: ``library`` (search), ``drop`` (preset, x, y: fractions of the
+Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, value), ``open`` (model, unit), ``resize``
+(height, as 12cm), ``preset`` (name), ``turn`` (right, up: degrees), ``pan`` (right, down: heights of the picture),
+``zoom`` (factor, right, down), ``undo``, ``redo``, ``frame``.
+Of the library: ``library`` (search), ``drop`` (preset, x, y: fractions of the
 viewport), ``save_preset`` (name), ``environments`` (folder). Of files: ``ask`` (kind: as of ``save``), in our own
 browser, and ``answer`` (file). Of the keyboard: ``key`` (name, such as escape or ctrl+z), ``type`` (text). Of
 objects: ``pick`` (x, y: fractions of the viewport), ``object`` (number; -1: none), ``hide``, ``isolate`` (number). Of
@@ -25,6 +26,7 @@ from translucent.errors import InputError
 from translucent.preview.actions import OrbitBy, Pan, Zoom
 from translucent.preview.document import Model
 from translucent.preview.session import read_toml
+from translucent.units import parse_length
 
 if TYPE_CHECKING:
     from translucent.preview.window_state import WindowState
@@ -43,6 +45,7 @@ FRAMES = 2
 VERBS: dict[str, Callable[..., object]] = {
     "change": lambda state, field=str, value=object: state.change(field, value, step=True),
     "open": lambda state, model=str, unit="m": state.work.open(Model(model, unit)),
+    "resize": lambda state, height=str: state.work.resize(parse_length(height)),
     "preset": lambda state, name=str: state.choose_preset(name),
     "turn": lambda state, right=0.0, up=0.0: state.work.do(OrbitBy(right, up)),
     "pan": lambda state, right=0.0, down=0.0: state.work.do(Pan(right, down)),

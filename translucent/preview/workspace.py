@@ -14,8 +14,9 @@ from typing import Any, Literal
 
 from translucent.errors import RenderError, TranslucentError
 from translucent.files.paths import remove_partial
+from translucent.model_size import scale_to, size_note
 from translucent.planning.methods import Method
-from translucent.preview.actions import Action, Adopt, History, Open, Replace, SetOrbit
+from translucent.preview.actions import Action, Adopt, History, Open, Replace, Resize, SetOrbit
 from translucent.preview.document import Display, Document, Model, framed
 from translucent.preview.exports import Bake, bake_map, check_export
 from translucent.preview.library import Library, ThumbnailCache
@@ -39,6 +40,7 @@ from translucent.preview.scenes import (
     method_of,
     own_material,
     prepare,
+    rescaled,
     scene_of,
     stage_name,
 )
@@ -47,6 +49,7 @@ from translucent.preview.tasks import Lane, Task, problem
 from translucent.preview.worker import Pool, Urgency
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import fillable
+from translucent.units import metres_per_unit
 
 #: Largest number of messages that the window keeps.
 MAX_MESSAGES = 50
@@ -173,6 +176,16 @@ class Workspace:
             self.refuse(error)
         else:
             self.tell("info", done)
+
+    def resize(self, height: float) -> None:
+        """Scale the model to a height in metres."""
+        if self.loaded is None:
+            return None
+        try:
+            factor = scale_to(self.loaded.scene.shown_bounds, height, None, Path(self.loaded.model.path).name)
+        except TranslucentError as error:
+            return self.refuse(error)
+        return self.do(Resize(f"{factor * metres_per_unit(self.loaded.model.unit)!r}m"))
 
     def frame(self, number: int | None = None) -> None:
         """Frame the whole model, or one of its objects, from the side of the camera."""
@@ -374,6 +387,11 @@ class Workspace:
             if loaded.model == model:
                 self._keep(loaded)
                 return self._complete()
+        if (last := self.loaded) is not None and last.model.path == model.path:
+            factor = metres_per_unit(model.unit) / metres_per_unit(last.model.unit)
+            self._keep(rescaled(last, model))
+            self.measured = self.measured and self.measured.scaled(factor)
+            return self._complete()
         if self.lanes["load"].task is None and not self.lanes["load"].failed(model):
             self._load(model)
         return None
@@ -387,6 +405,8 @@ class Workspace:
 
         def take(loaded: Loaded) -> None:
             self._keep(loaded)
+            for note in filter(None, dict.fromkeys(size_note(item.mesh, way="field") for item in loaded.scene.objects)):
+                self.tell("info", f"{Path(model.path).name}: {note}")
             self._set(self.history if action is None else self.history.done(action))
             if action is not None and os.path.exists(model.path):
                 self.recent = put_first(str(Path(model.path).resolve()), self.recent)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from functools import cached_property
 from importlib import import_module
 from typing import Any, Literal, get_args
@@ -18,6 +18,8 @@ from translucent.geometry.mesh import MAX_COORDINATE, Mesh
 from translucent.media.colors import ColorLike, reflectance
 from translucent.media.density import Density
 from translucent.media.medium import MAX_EMISSION, Medium
+from translucent.media.preset import Preset
+from translucent.media.presets import preset
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment, parse_radiance
 from translucent.scene.lights import Light as Light
@@ -63,6 +65,8 @@ class Object(Frozen):
     shadow_catcher : bool
         Whether an opaque object is a ground for the others, of any size. Rendered with ``transparent``, no more is
         seen of it than the shadows on it, over what the frame is put over.
+    material : Preset or str, optional
+        A preset, or its name, for medium and surface together: ``tl.Object(mesh, material="wax")``.
     """
 
     mesh: Mesh
@@ -74,8 +78,11 @@ class Object(Frozen):
     density: Density | None = None
     surface: Surface | None = None
     shadow_catcher: bool = False
+    material: InitVar[Preset | str | None] = field(default=None, kw_only=True)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, material: Any) -> None:
+        if material is not None:
+            self._make_of(material)
         _require_type("mesh of an object", self.mesh, Mesh, "use tl.load_mesh or tl.Mesh")
         if self.medium is not None:
             _require_type("medium of an object", self.medium, Medium, "use tl.Medium")
@@ -111,6 +118,19 @@ class Object(Frozen):
             raise InputError(f"shadow_catcher {self.mesh.name!r}", "a medium fills it", "give it no medium")
         if self.surface is not None:
             self._check_surface(self.surface)
+
+    def _make_of(self, material: Any) -> None:
+        """Take medium and surface of a preset."""
+        requested = f"material of {self.mesh.name!r}"
+        if self.medium is not None or self.surface is not None:
+            found = f"a {'medium' if self.medium is not None else 'surface'} is given, too"
+            raise InputError(requested, found, "give the material, or medium and surface")
+        if not isinstance(material, Preset | str):
+            do = 'give a preset or its name, such as "wax"; of a color, tl.showcase(mesh, color, distance)'
+            raise InputError(requested, f"{type(material).__name__}", do)
+        made = preset(material) if isinstance(material, str) else material
+        object.__setattr__(self, "medium", made.medium)
+        object.__setattr__(self, "surface", Surface(roughness=made.roughness) if made.roughness else None)
 
     def _check_surface(self, surface: Surface) -> None:
         _require_type("surface of an object", surface, Surface, "use tl.Surface")

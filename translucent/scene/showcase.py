@@ -10,11 +10,14 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arguments import checked
+from translucent.arguments import brief, checked
 from translucent.errors import InputError, close_names, did_you_mean
 from translucent.geometry.grouping import extent
 from translucent.geometry.mesh import Mesh
+from translucent.media.colors import ColorLike, parse_color
 from translucent.media.medium import Medium
+from translucent.media.preset import Preset
+from translucent.media.presets import presets
 from translucent.scene.camera import FRAMED_FROM, Camera, framing_directions
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Light, Object, Scene
@@ -35,8 +38,9 @@ from translucent.scene.surface import Surface
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
 DEFAULT_REACH = 0.15
 
-#: Index of refraction of the default medium where there is something to mirror, and without a stage 1.
-STAGED_IOR = 1.5
+#: Index of refraction of solids of which a color is known alone, that of glass; and of the default medium on a stage,
+#: where there is something to mirror. Without a stage it is 1.
+SOLID_IOR = 1.5
 
 #: The default environment: white above and light gray below.
 LIGHT_TABLE = Environment.gradient((0.55, 0.56, 0.58), (1.15, 1.15, 1.15))
@@ -56,23 +60,27 @@ AnyScene = TypeVar("AnyScene", bound=Scene)
 @checked
 def showcase(
     mesh: Mesh,
-    medium: Medium | None = None,
-    size: tuple[int, int] = (1280, 720),
+    medium: Medium | Preset | ColorLike | None = None,
+    size: tuple[int, int] | float = (1280, 720),
     camera: Camera | None = None,
     environment: Environment | None = None,
     lights: Sequence[Light] = (),
     stage: str | None = None,
+    *,
+    distance: float | None = None,
 ) -> Scene:
     """Scene that shows one mesh well, with defaults for everything else.
 
     Parameters
     ----------
     mesh : Mesh
-    medium : Medium, optional
-        Default: jade green on the mean path through the mesh, or after 15 % of its diagonal where that is more,
-        whatever its size; on a stage, with the ior of glass.
-    size : (width, height)
-        Size of the picture in pixels, which the framing and the stage depend on.
+    medium : Medium, Preset, str or array_like (3,), optional
+        A medium, polished; a preset, or its name, with its medium and surface; or a color, of a solid with the ior of
+        glass, at a `distance`: ``showcase(mesh, "wax")``, ``showcase(mesh, "#ace5c9", 0.25)``. Default: jade green on
+        the mean path through the mesh, or after 15 % of its diagonal where that is more, whatever its size; on a stage,
+        with the ior of glass.
+    size : (width, height), or float
+        Size of the picture in pixels, which the framing and the stage depend on. After a color: the `distance`.
     camera : Camera, optional
         Default: from the front right and above, the whole mesh in view.
     environment : Environment, optional
@@ -83,18 +91,45 @@ def showcase(
     stage : str, optional
         One of `translucent.scene.stages.STAGES`, or ``none``: what the mesh stands on and before. +Y is up. The
         ground is the last of the objects. Default: ``studio``, or none with an environment or lights of your own.
+    distance : float, optional
+        In metres, after which white light has the color.
 
     Raises
     ------
     InputError
-        If there is no such stage.
+        If there is no such stage or preset, or a color without a distance.
     """
+    if isinstance(size, int | float):
+        distance, size = size, (1280, 720)
     lights = tuple(lights)
     own = environment is not None or len(lights) > 0
     chosen = stage_named(stage or (NO_STAGE if own else DEFAULT_STAGE))
-    model = Object(mesh, medium=medium or default_medium(mesh, chosen))
+    model = _body(mesh, medium, distance, chosen)
     scene = Scene([model], camera or framing([model], size, stage=chosen), lights, environment or LIGHT_TABLE)
     return scene if chosen is None else staged(scene, chosen, environment)
+
+
+def _body(
+    mesh: Mesh, medium: Medium | Preset | ColorLike | None, distance: float | None, stage: Stage | None
+) -> Object:
+    """Object of a medium, of a preset, or of a color at a distance; by default of a medium that suits the mesh."""
+    if medium is None or isinstance(medium, Medium | Preset):
+        if distance is not None:
+            what = "no medium" if medium is None else f"a {type(medium).__name__}"
+            raise InputError(f"showcase distance {distance!r}", f"{what}, and no color", "give a color, or no distance")
+        if isinstance(medium, Preset):
+            return Object(mesh, material=medium)
+        return Object(mesh, medium=medium or default_medium(mesh, stage))
+    if distance is not None:
+        return Object(mesh, medium=Medium.from_color(medium, distance, ior=SOLID_IOR))
+    try:
+        color = parse_color(medium)
+    except InputError:
+        color = None
+    if isinstance(medium, str) and (color is None or medium in presets()):
+        return Object(mesh, material=medium)
+    do = f"give the metres after which white light has it: showcase(mesh, {brief(medium)}, 0.02)"
+    raise InputError(f"showcase medium {brief(medium)}", "a color without a distance", do)
 
 
 def default_medium(mesh: Mesh, stage: Stage | None) -> Medium:
@@ -106,7 +141,7 @@ def default_medium(mesh: Mesh, stage: Stage | None) -> Medium:
     if mesh.diagnosis.sound:
         # The mean chord of rays through a body is 4 V / S (Cauchy): twice its mean thickness.
         reach = max(reach, 2.0 * Object(mesh, medium=Medium()).mean_thickness)
-    return Medium.from_color(DEFAULT_COLOR, reach, ior=1.0 if stage is None else STAGED_IOR)
+    return Medium.from_color(DEFAULT_COLOR, reach, ior=1.0 if stage is None else SOLID_IOR)
 
 
 def named_environment(name: str, rotation: float = 0.0) -> Environment:
@@ -176,18 +211,39 @@ def with_roughness(scene: AnyScene, roughness: float | None, among: Sequence[Obj
     return dataclasses.replace(scene, objects=[surfaced(item) for item in scene.objects])
 
 
-def filled(scene: AnyScene, medium: Medium, among: Sequence[Object] | None = None) -> AnyScene:
+def with_ior(scene: AnyScene, ior: float | None, among: Sequence[Object] | None = None) -> AnyScene:
+    """Scene with this index of refraction in all media, or in those of some objects; the scene itself for None."""
+    if ior is None:
+        return scene
+    chosen = set(map(id, scene.objects if among is None else among))
+    media = {id(item.medium): dataclasses.replace(item.medium, ior=ior) for item in scene.objects if item.medium}
+    objects = [
+        dataclasses.replace(item, medium=media[id(item.medium)])
+        if item.medium is not None and not item.covers and id(item) in chosen
+        else item
+        for item in scene.objects
+    ]
+    return dataclasses.replace(scene, objects=objects)
+
+
+def filled(
+    scene: AnyScene, medium: Medium, among: Sequence[Object] | None = None, *, keeps_ior: bool = False
+) -> AnyScene:
     """Scene with this medium in some objects; or in all translucent ones, or in all objects if none is translucent.
 
-    Thin sheets become bodies: they had no inside that a medium could fill.
+    Thin sheets become bodies: they had no inside that a medium could fill. With `keeps_ior`, objects keep the index of
+    refraction that they have.
     """
+    media: dict[float, Medium] = {medium.ior: medium}
     chosen = set(map(id, fillable(scene) if among is None else among))
 
     def fill(item: Object) -> Object:
         surface = item.surface
         if surface is not None and surface.opacity is not None:
             surface = dataclasses.replace(surface, opacity=None)
-        return dataclasses.replace(item, medium=medium, sheet_thickness=None, surface=surface)
+        ior = item.medium.ior if keeps_ior and item.medium is not None and not item.covers else medium.ior
+        filling = media.setdefault(ior, dataclasses.replace(medium, ior=ior))
+        return dataclasses.replace(item, medium=filling, sheet_thickness=None, surface=surface)
 
     return dataclasses.replace(scene, objects=[fill(item) if id(item) in chosen else item for item in scene.objects])
 

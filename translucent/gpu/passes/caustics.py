@@ -20,7 +20,6 @@ from translucent.gpu.targets import add_up
 from translucent.gpu.uniforms import media_center
 from translucent.planning.caustics import PhotonAim, photon_aims
 from translucent.planning.passes import PassSpec
-from translucent.planning.surface_textures import textured_at_hits
 
 _LANDED = ("landed_point", "landed_power", "landed_normal")
 _RECEIVED = ("photon_irradiance", "opaque_axial_depth", "receiver_normal")
@@ -106,7 +105,7 @@ class CausticsPass:
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         program = self._photons.program(
             **ray_switches(scene),
-            TEXTURED=textured_at_hits(scene),
+            TEXTURED=job.features.textured,
             EMISSION=False,
             FROM_EYE=False,
             LIGHTS=False,

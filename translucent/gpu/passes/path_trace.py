@@ -20,7 +20,6 @@ from translucent.gpu.passes.variants import Variants, background_switches, coat_
 from translucent.gpu.shaders import set_uniform, set_used
 from translucent.gpu.targets import add_up
 from translucent.planning.passes import PassSpec
-from translucent.planning.surface_textures import textured_at_hits
 
 _STATE = ("path_origin", "path_direction", "path_light", "path_interior", "path_counts", "path_mean", "path_spread")
 _COUNTS = _STATE.index("path_counts")
@@ -226,7 +225,7 @@ class PathTracer:
         return self._trace.program(
             FROM_EYE=job.placed.starts_inside,
             **ray_switches(scene),
-            TEXTURED=textured_at_hits(scene),
+            TEXTURED=job.features.textured,
             SCATTER=any(medium.scatters for medium in media),
             EMISSION=any(medium.emits for medium in media),
             LIGHTS=bool(scene.lights),

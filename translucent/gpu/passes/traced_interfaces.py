@@ -101,6 +101,8 @@ class TracedInterfacesPass:
             "most_interfaces": depth,
             "sample_number": job.sample,
             "blurred_fraction": blurred_fraction(job.samples),
+            "sample_width": job.samples**-0.5,
+            "picture_first": int(_shows_more(job)),
             **scene_values,
             **_ground(job.scene),
             **_footprint(job),
@@ -156,8 +158,10 @@ class TracedInterfacesPass:
         rough = any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces)
         return self._variants.program(
             FORKS=job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
+            DEEP=job.plan.interfaces is not None and job.plan.interfaces.tree[0] > 16,
             FROM_EYE=job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
             **ray_switches(scene),
+            TEXTURED=job.features.textured,
             EMISSION=job.features.emits and not job.features.scatters,
             LAYERED=any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
             DIFFUSED=job.diffused_light is not None,
@@ -193,6 +197,12 @@ class TracedInterfacesPass:
         resources.shadows.use(self._variants.units)
 
 
+def _shows_more(job: FrameJob) -> bool:
+    """True if the picture has photons or shadows on opaque objects that rays do not look up."""
+    shadows = interface_shadow_switches(job)["SHADOW_MAPS"]
+    return job.features.has_caustics or (job.features.has_shadow_maps and not shadows)
+
+
 def _footprint(job: FrameJob) -> dict[str, float]:
     """Width of a sample in pixels, for footprints of rays in a picture of all directions."""
     return {"pixel_step": FOOTPRINT_STEP * job.samples**-0.5} if job.scene.environment.kind == "image" else {}
@@ -225,7 +235,7 @@ def blurred_fraction(samples: int) -> float:
 def traced_scene(job: FrameJob, stack: ExitStack) -> tuple[dict[str, moderngl.Texture], dict[str, Any]]:
     """Textures by which rays find what they hit in the scene of a job, and loose uniforms; released with the stack."""
     scene, center = job.scene, media_center(job.scene)
-    hierarchies = job.resources.hierarchies.of(scene)
+    hierarchies = job.resources.hierarchies.of(scene, textured=job.features.textured)
     placements, frame = hierarchies.place(scene, center)
     table = job.object_table(placements)
     stack.callback(table.release)

@@ -10,7 +10,6 @@ from translucent.errors import InputError
 from translucent.planning.bodies import indices, open_bodies
 from translucent.planning.methods.base import Method, check_count
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
-from translucent.planning.surface_textures import reduced_at_hits, unread_at_hits
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Largest number of paths of each pixel.
@@ -97,7 +96,6 @@ class PathTraced(Method):
         if rough := [body for body, one in surfaces if one.clearcoat > 0.0 and one.clearcoat_roughness > 0.0]:
             text = f"roughness of clear coats: {object_names(rough)} have polished ones"
             notes.append(Note(NoteKind.COATS, text))
-        notes += unread_at_hits(scene) + reduced_at_hits(scene)
         if emitting := [body for body, surface in surfaces if surface.glows]:
             notes.append(Note(NoteKind.GLOW, f"light of surfaces that emit: {object_names(emitting)}"))
         if scene.opaque:

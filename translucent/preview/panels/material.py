@@ -45,6 +45,9 @@ def material_panel(state: WindowState) -> None:
     """Draw the material panel."""
     material = state.material
     _source(state, material)
+    plan = state.view.plans[0]
+    for remark in plan.remarks if plan is not None else ():
+        ui.wrapped(remark, ui.WARNING)
     imgui.separator_text("Volume")
     if ui.begin_rows("volume"):
         _color(state, material)

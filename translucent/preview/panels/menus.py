@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, hello_imgui, imgui
 
 from translucent.assets import mesh_names
 from translucent.errors import shortened
-from translucent.preview.actions import Hide
+from translucent.preview.actions import Hide, Resize
 from translucent.preview.document import Model
 from translucent.preview.library import model_key
 from translucent.preview.panels import widgets as ui
@@ -78,7 +78,7 @@ def _file(state: WindowState) -> None:
     if imgui.begin_menu("Unit of the file"):
         for word in METRES_PER_UNIT:
             if imgui.menu_item(word, "", word == unit, True)[0] and word != unit:
-                state.work.open(Model(path, word))
+                state.work.do(Resize(word))
         imgui.end_menu()
     imgui.separator()
     menu_item("Open session ...", lambda: state.ask_file("open session"))

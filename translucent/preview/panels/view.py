@@ -8,6 +8,7 @@ from typing import get_args
 
 from imgui_bundle import imgui
 
+from translucent.errors import InputError
 from translucent.formulas.tone import TONES
 from translucent.planning.flags import Flags
 from translucent.planning.render_plan import RenderPlan
@@ -19,6 +20,7 @@ from translucent.preview.measuring import MOST_TRIANGLES, measurable
 from translucent.preview.panels import widgets as ui
 from translucent.preview.quality import StepTiming
 from translucent.preview.window_state import WindowState
+from translucent.units import parse_length, short_length
 
 #: Width of the card of an environment in ems.
 CARD = 8.0
@@ -31,7 +33,12 @@ COLORS = {"info": ui.FAINT, "warning": ui.WARNING, "error": ui.ERROR}
 
 
 def look_panel(state: WindowState) -> None:
-    """Draw the look panel: camera, stage, environment, light and exposure."""
+    """Draw the look panel: size of the model, camera, stage, environment, light and exposure."""
+    imgui.separator_text("Size")
+    if ui.begin_rows("size"):
+        _height(state)
+        ui.check(state, "ruler on the ground", "display.ruler")
+        imgui.end_table()
     imgui.separator_text("Camera")
     orbit = state.work.document.orbit
     if orbit is not None and ui.begin_rows("camera"):
@@ -63,6 +70,23 @@ def look_panel(state: WindowState) -> None:
         ui.slider(state, "exposure", "look.exposure", -6.0, 6.0, "%.2f stops")
         ui.choice(state, "tone curve", "look.tone", (AUTO, *TONES))
         imgui.end_table()
+
+
+def _height(state: WindowState) -> None:
+    """Field for the height of the model, with a unit."""
+    ui.row("height", "Height of the model, with its unit: 12cm. Press Enter. Media keep their own lengths.")
+    loaded = state.work.loaded
+    if loaded is None:
+        return ui.wrapped("no model yet", ui.FAINT)
+    low, high = loaded.scene.shown_bounds
+    now = short_length(float(high[1] - low[1]))
+    if (text := ui.text_field(state, "height", "12cm", now)) is not None:
+        try:
+            state.work.resize(parse_length(text))
+        except InputError as error:
+            state.work.refuse(error)
+        state.texts["height"] = ""
+    return None
 
 
 def _environment(state: WindowState, label: str, name: str, empty: str) -> None:

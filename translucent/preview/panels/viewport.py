@@ -17,13 +17,23 @@ from translucent.preview.panels.widgets import accepts_preset, begin_drag, em, p
 from translucent.preview.viewport_renderer import thickest, worst
 from translucent.preview.window_state import ProbedPixel, WindowState, pixel_at
 from translucent.scene.camera import Camera
-from translucent.units import metres_per_unit
+from translucent.units import metres_per_unit, short_length
 
 #: Degrees of orbit for the width of the viewport, and factor of a step of the wheel.
 DEGREES, WHEEL = 270.0, 1.15
 
 #: sRGB colors of the largest differences, as in ``present/compare.frag``.
 THINNER, THICKER = (0.13, 0.40, 0.80), (0.80, 0.15, 0.18)
+
+#: Diameter of a coin of one euro, rounded, in metres; and the width of a model from which on a hand is beside it.
+COIN, HAND_FROM = 0.024, 0.25
+
+#: Outline of a hand, from the wrist around the thumb, in centimetres: right of its middle, and up from the wrist.
+HAND = (
+    (-3, 0), (-3.4, 3), (-5.4, 5.4), (-7, 8.4), (-6.2, 9.2), (-4, 7), (-3.6, 10), (-3.8, 15.5), (-2.8, 16), (-2, 10.8),
+    (-1.2, 17.6), (0, 18), (0.4, 10.8), (1.6, 16.6), (2.6, 16.4), (2.4, 10.2), (3.8, 13.8), (4.7, 13.4), (3.9, 8.4),
+    (3.6, 4), (3, 0),
+)  # fmt: skip
 
 #: Pixels of a side below which nothing is drawn.
 SMALLEST = 32
@@ -59,6 +69,7 @@ def viewport_panel(state: WindowState) -> None:
     _selected(state, over, corner, room)
     _split(state, over, corner, room)
     _scale(state, over, corner, room)
+    _ruler(state, over, corner, room)
     _inset(state, over, corner, room)
     _probe(state, over, corner, room)
     _status(state, over, corner, room)
@@ -122,7 +133,12 @@ def _selected(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: 
 def on_screen(camera: Camera, bounds: Array, size: tuple[float, float]) -> Array | None:
     """Places (8, 2) of a box's corners in a picture, right and down in pixels; None if one is behind the camera."""
     corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    local = (corners - camera.eye) @ np.stack([camera.right, camera.up, camera.forward], axis=1)
+    return places_on_screen(camera, corners, size)
+
+
+def places_on_screen(camera: Camera, points: Array, size: tuple[float, float]) -> Array | None:
+    """Places (n, 2) of points (n, 3) in a picture, right and down in pixels; None if one is behind the camera."""
+    local = (points - camera.eye) @ np.stack([camera.right, camera.up, camera.forward], axis=1)
     half = np.array(camera.half_extent((max(int(size[0]), 1), max(int(size[1]), 1))))
     if camera.fov_y is not None:
         if local[:, 2].min() <= 0.0:
@@ -189,6 +205,59 @@ def error_color(fraction: float) -> tuple[float, float, float]:
     mixed = math.sqrt(min(abs(fraction), 1.0))
     red, green, blue = (0.95 + mixed * (channel - 0.95) for channel in end)
     return red, green, blue
+
+
+def _ruler(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    """Draw a ruler before the model, on the ground, and a coin or a hand beside it."""
+    orbit, loaded = state.work.document.orbit, state.work.loaded
+    if not state.get("display.ruler") or orbit is None or loaded is None:
+        return
+    low, high = loaded.scene.shown_bounds
+    camera, wide = camera_of(orbit), float(high[0] - low[0])
+    step, count = ruler(wide)
+    y, z = low[1], high[2]
+    ends = low[0] + step * np.arange(count + 1)
+    marks_on = np.stack([ends, np.full(count + 1, y), np.full(count + 1, z)], axis=1)
+    inner = marks_on - (0.0, 0.0, 0.05 * wide)
+    _drawn_lines(over, camera, corner, room, np.stack([marks_on[[0, -1]], *np.stack([marks_on, inner], axis=1)]))
+    places = places_on_screen(camera, marks_on, (room.x, room.y))
+    if places is not None:
+        at = ImVec2(corner.x + places[-1, 0] + em(0.4), corner.y + places[-1, 1])
+        _label(over, at, f"{short_length(step * count)}, {short_length(step)} apart")
+    name, outline = reference_outline(wide)
+    around = outline + (high[0] + 0.1 * wide - outline[:, 0].min(), y, 0.5 * (low[2] + high[2]))
+    _drawn_lines(over, camera, corner, room, np.stack([around, np.roll(around, -1, axis=0)], axis=1))
+    places = places_on_screen(camera, around, (room.x, room.y))
+    if places is not None:
+        _label(over, ImVec2(corner.x + places[:, 0].min(), corner.y + places[:, 1].max() + em(0.3)), name)
+
+
+def _drawn_lines(over: imgui.ImDrawList, camera: Camera, corner: ImVec2, room: ImVec2, ends: Array) -> None:
+    """Draw lines (n, 2, 3) of the world, in white on black."""
+    places = places_on_screen(camera, ends.reshape(-1, 3), (room.x, room.y))
+    if places is None:
+        return
+    for color, wide in ((BLACK, 0.25), (WHITE, 0.1)):
+        for (x0, y0), (x1, y1) in places.reshape(-1, 2, 2).tolist():
+            begin, end = ImVec2(corner.x + x0, corner.y + y0), ImVec2(corner.x + x1, corner.y + y1)
+            over.add_line(begin, end, color, em(wide))
+
+
+def ruler(wide: float) -> tuple[float, int]:
+    """Distance of the marks of a ruler for a model so wide, in metres, and their number: steps of 1, 2 or 5."""
+    least = max(wide, 1e-9) / 10.0
+    power = 10.0 ** math.floor(math.log10(least))
+    step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least * (1 - 1e-9))
+    return step, max(round(wide / step), 1)
+
+
+def reference_outline(wide: float) -> tuple[str, Array]:
+    """Name and outline (n, 3) on the ground of a thing of known size: a coin, or for models past it a hand."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 33)[:-1]
+    if wide < HAND_FROM:
+        return "coin, 24 mm", 0.5 * COIN * np.stack([np.cos(turn), 0.0 * turn, np.sin(turn)], axis=1)
+    x, y = (0.01 * np.array(HAND)).T
+    return "hand, 18 cm", np.stack([x, 0.0 * x, -y], axis=1)
 
 
 def _scale(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:

@@ -1,0 +1,44 @@
+"""The live scene of the front page, written by ``translucent.write_page``; a picture where no viewer is built."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import translucent as tl
+from translucent.assets import mesh_path, web_path
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+PICTURE = """<!doctype html>
+<title>translucent</title>
+<style>body {{ margin: 0 }} img {{ width: 100%; height: 100vh; object-fit: contain }}</style>
+<img src="{file}" alt="Gummy bears in three colors">
+"""
+
+
+def write_scene(path: Path) -> None:
+    """Write a bear of green glass on the stage as a page of its own."""
+    glass = tl.Medium.from_color("#5fbf8f", distance=0.006, ior=1.5)
+    tl.write_page(tl.showcase(tl.load_mesh(mesh_path("bear")), glass, size=(960, 600)), path, size=(960, 600))
+
+
+def write_live(app: Sphinx, exception: Exception | None) -> None:
+    """Write ``live.html`` beside the front page, which shows it in a frame."""
+    if exception or app.builder.name != "html":
+        return
+    path = Path(app.outdir) / "live.html"
+    try:
+        web_path("page.js")
+    except tl.InputError:  # built by npm, which is not on every machine
+        picture = Path(app.srcdir) / "gallery" / "bears.png"
+        (path.parent / "live.png").write_bytes(picture.read_bytes())
+        path.write_text(PICTURE.format(file="live.png"), encoding="utf-8")
+        return
+    write_scene(path)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.connect("build-finished", write_live)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

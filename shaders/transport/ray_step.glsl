@@ -1,0 +1,388 @@
+// One step of a ray in the tree of traced interfaces: from where it starts to the surface that it hits, and the interaction there.
+// Adds the light of what ends, and leaves the ray of the stronger branch and that of the weaker one. Who includes it finds the
+// hits and follows the rays: nothing here depends on the order, nor on the pixel but by arguments. What is absorbed and emitted
+// on each segment is exact. Radiance is basic radiance, L / n^2. ROUGH: some body is.
+
+#include "lib/color.glsl"
+#include "lib/optics.glsl"
+#include "lib/ray.glsl"
+#include "shade/background.glsl"
+#include "shade/environment_light.glsl"
+#include "shade/environment_beyond.glsl"
+#include "shade/interface_light.glsl"
+#include "shade/diffused_light.glsl"
+#include "shade/opaque_light.glsl"
+#include "transport/hierarchy.glsl"
+#include "transport/interior_list.glsl"
+#include "transport/surface_hit.glsl"
+#include "transport/textured_hit.glsl"
+#include "transport/interaction.glsl"
+#include "transport/light_passed.glsl"
+#include "transport/footprint.glsl"
+#include "transport/opaque_objects.glsl"
+
+uniform int adaptive;              // 1: with the square of luminance, and opaque objects as the mean of all samples shows them
+
+#include "transport/escaped_rays.glsl"
+#include "transport/facets.glsl"
+
+uniform int most_interfaces;
+uniform int all_closed;            // 1: no solid has holes: what seems to leave through one passes an edge by rounding
+uniform float faintest_throughput; // throughput, its three channels together, below which rays are not followed
+
+const int MOST_INTERACTIONS = 1024; // in the tree of a pixel
+const uint MOST_PASSED = 511u;     // surfaces without an effect, one after the other
+
+struct Ray {
+    vec3 origin;
+    float skipped;      // metres of its segment that lie before its origin: from the surface, which it must not hit again
+    vec3 direction;
+    float blur;         // squared alpha of a mirror with the same blur
+    vec3 throughput;    // fraction of the light at its end that reaches the eye
+    uint state;         // see packed_state
+    uint branch_code;   // which of its interfaces it was reflected at, a bit each
+    uvec4 interior;
+    vec3 outwards;      // normal of the body where it starts inside one
+    Footprint footprint;
+};
+
+// The first interface of a pixel, as the rasterizer has found it.
+struct PrimaryHit {
+    int object;
+    vec3 point;
+    vec3 normal;
+    float roughness;
+    float transmission;
+    vec3 color;
+    float unoccluded;   // fraction of the light of the environment that reaches it
+    uvec2 pixel;        // in all of the picture, for random numbers
+};
+
+// Branches that go on behind a step.
+const int NONE = 0;
+const int ONE = 1;      // the ray alone
+const int BOTH = 2;     // and the weaker one
+
+vec3 traced_radiance = vec3(0.0);
+float traced_lost = 0.0;  // fraction of the light whose ray went through a hole, or is in more bodies than its list holds
+
+// depth: interfaces behind a ray; forks: how often it may go on as the weaker branch; reflected: it sees the environment as a light;
+// interactions: that it and all its branches may have. The highest bits count surfaces that it has passed since.
+uint packed_state(int depth, int forks, bool reflected, int interactions) {
+    return uint(depth | forks << 7 | (reflected ? 1 : 0) << 10 | interactions << 11);
+}
+
+int depth_of(Ray ray) { return int(ray.state & 127u); }
+int forks_of(Ray ray) { return int(ray.state >> 7 & 7u); }
+bool is_reflected(Ray ray) { return (ray.state >> 10 & 1u) != 0u; }
+int interactions_of(Ray ray) { return int(ray.state >> 11 & 4095u); }
+
+float strength(vec3 throughput) {
+    return dot(throughput, vec3(1.0));
+}
+
+void lose(Ray ray) {
+    traced_lost += strength(ray.throughput) / 3.0;
+}
+
+// Adds the light at the end of a ray.
+void escape(Ray ray, EscapedRay end) {
+    traced_radiance += ray.throughput * escaped_radiance(end);
+}
+
+EscapedRay escaped_ray(Ray ray, int object, vec3 normal, vec3 point) {
+    return EscapedRay(object, -1, vec2(0.0), 0.0, normal, ray.origin, point, ray.direction, is_reflected(ray), ray.blur, ellipse_of(ray.footprint));
+}
+
+#if OPAQUE
+uniform int ground_object;   // number of the object that is the ground, or -1
+uniform vec4 ground_plane;   // unit normal upwards, and metres along it from the center of the media
+#endif
+
+// Ends a ray that is not followed on: it sees the environment, or the ground before it.
+void terminate(Ray ray) {
+    EscapedRay end = escaped_ray(ray, AIR, vec3(0.0), ray.origin);
+#if OPAQUE
+    float falling = -dot(ground_plane.xyz, ray.direction), height = dot(ground_plane.xyz, ray.origin) - ground_plane.w;
+    if (ground_object >= 0 && falling > 1e-3 && height > 0.0) {
+        end.object = ground_object;
+        end.normal = ground_plane.xyz;
+        end.point += height / falling * ray.direction;
+    }
+#endif
+    escape(ray, end);
+}
+
+// Whether light that is scattered in a body leaves it as from a layer.
+bool is_layer(int body) {
+#if LAYERED
+    return body != AIR && object_table_row(body).scatters_much > 0.5;
+#else
+    return false;
+#endif
+}
+
+// Adds what media emit and scatter towards the eye along a segment, and attenuates its ray; returns the transmittance.
+vec3 through_media(inout Ray ray, int effective, Hit hit) {
+    if (ray.interior.x == 0u) { return vec3(1.0); }
+    if (hit.object < 0) { lose(ray); }  // it has left through a hole
+    Medium medium = medium_in(ray.interior, effective);
+    float path = min(hit.path + ray.skipped, 1e3 * surface_reach);
+#if EMISSION
+    traced_radiance += ray.throughput * emitted_radiance(medium.emission, medium.extinction, path);
+#endif
+    vec3 passed = transmittance(medium.extinction * path);
+    if (is_layer(effective)) {
+        Surface layer = surface_of(vec4(float(effective), 0.0, 1.0, 0.0));
+        traced_radiance += ray.throughput * layer_exitance(layer, ray.origin, ray.outwards, path, passed);
+    }
+    if (effective != AIR) {
+        float cosine = clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0);
+        traced_radiance += ray.throughput * subsurface_exitance(effective, ray.origin, cosine, medium.extinction * path);
+        traced_radiance += ray.throughput * ahead_in_scattered(effective, ray.direction, medium.extinction * path);
+    }
+    ray.throughput *= passed;
+    return passed;
+}
+
+// Lets a ray go on behind surfaces that do nothing to light.
+int pass_on(inout Ray ray, vec3 point, vec3 face_normal, uvec4 interior, vec3 normal) {
+    ray.origin = origin_beside(point, face_normal, ray.direction, ray.skipped);
+    ray.interior = interior;
+    ray.outwards = normal;
+    if (ray.state >> 23 == MOST_PASSED) {
+        lose(ray);
+        return NONE;
+    }
+    ray.state += 1u << 23;
+    return ONE;
+}
+
+// Before the first interface a ray is in no body; it started a little before what the rasterizer has found.
+bool starts_within(Ray ray, ObjectRow body, bool outside) {
+#if FROM_EYE
+    return false;
+#else
+    return depth_of(ray) == 0 && int(body.type) == TYPE_SOLID && !outside && ray.interior.x == 0u;
+#endif
+}
+
+#if TEXTURED
+uniform float sample_width;  // of a sample, in pixels
+
+// Metres of a surface that a sample sees, as if its ray had gone straight.
+float width_at_hit(vec3 point, float facing) {
+    float away = length(point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz);
+    return sample_width * pixel_metres(away) * inversesqrt(max(facing, 0.05));
+}
+#else
+float width_at_hit(vec3 point, float facing) { return 0.0; }
+#endif
+
+// Material of the first interface as the rasterizer has it.
+void take_material(inout Interaction at, PrimaryHit primary) {
+    at.roughness = primary.roughness;
+    at.transmission = primary.transmission;
+    at.color = primary.color;
+}
+
+// A clear coat: takes its part of the lobes and of what is emitted below, and reflects it as the interface below does, or adds
+// what a rougher one sees. normal: of the surface; polished: the interface below is.
+void add_coat(Ray ray, Interaction at, ObjectRow body, vec3 normal, bool polished, float unoccluded, inout Lobes lobes, inout vec3 emitted) {
+#if CLEAR_COAT
+    if (body.clearcoat == 0.0 || !(at.outside || at.thin_walled)) { return; }
+    float coat = coat_reflectance(vec2(body.clearcoat, body.clearcoat_roughness), clamp(-dot(normal, at.direction), 0.0, 1.0));
+    lobes = below_coat(lobes, coat);
+    emitted *= 1.0 - coat;
+    if (polished && body.clearcoat_roughness == 0.0) {
+        lobes.reflection += coat;
+    } else {
+        float alpha = body.clearcoat_roughness * body.clearcoat_roughness;
+        vec3 direction = kept_on_side(reflected_direction(at.direction, normal), at.face_normal);
+        traced_radiance += unoccluded * coat * ray.throughput * environment_radiance(at.point, direction, true, ray.blur + alpha * alpha);
+    }
+#endif
+}
+
+// Radiance of the diffuse base, for the fraction of the light that comes to it.
+void add_base(Ray ray, vec3 arriving, Interaction at, PrimaryHit primary) {
+#if DIFFUSE_BASE
+    if (at.transmission == 1.0) { return; }
+    Surface surface = surface_of(vec4(float(at.object), at.roughness, at.transmission, 0.0));
+    surface.color = at.color;
+    surface.unoccluded = at.object == primary.object ? primary.unoccluded : 1.0;
+    traced_radiance += ray.throughput * arriving * (1.0 - at.transmission) * base_radiance(surface, at.point, at.normal);
+#endif
+}
+
+// Whether the weaker of two branches goes on: then it has one fork less, and a part of the interactions. The mirror image at the
+// first interface is free.
+bool forks_on(inout Ray stronger, inout Ray weaker) {
+#if FORKS > 0
+    int depth = depth_of(weaker), forks = forks_of(weaker), left = interactions_of(weaker), ahead = most_interfaces - depth;
+    bool is_free = depth == 1;
+    // One for each interface ahead of the mirror image, which may not fork.
+    int part = is_free ? min(ahead, left / 2) : left / 4;
+    if (is_free && !is_reflected(weaker)) { part = left - part; }
+    if (part == 0 || (forks == 0 && !is_free) || strength(weaker.throughput) <= faintest_throughput) { return false; }
+    stronger.state -= uint(part) << 11;
+    weaker.state = packed_state(depth, is_free ? forks : forks - 1, is_reflected(weaker), part);
+    return true;
+#else
+    return false;
+#endif
+}
+
+// Goes on with the stronger of two branches, and with the weaker one or ends it; returns which go on. again: what another
+// path through the body leaves of light that is reflected back into it; total: reflection; last: of the interfaces.
+int branch(inout Ray ray, out Ray weaker, Ray back, Ray on, vec3 again, bool total, bool last) {
+    bool on_stronger = strength(on.throughput) >= strength(back.throughput);
+    Ray arrival = ray;
+    weaker = back;
+    ray = on;
+    if (!on_stronger) {
+        weaker = on;
+        ray = back;
+    }
+    if (!last && forks_on(ray, weaker)) { return BOTH; }
+    if (strength(weaker.throughput) > 0.0) {
+        if (on_stronger) { weaker.throughput *= again; }
+        terminate(weaker);
+    }
+    if (!last && strength(ray.throughput) >= faintest_throughput) { return ONE; }
+    // What is reflected totally is looked up as if it left straight on: reflected on, it would most often leave there, too.
+    if (!on_stronger) { ray.throughput *= again; }
+    if (total) {
+        ray.direction = arrival.direction;
+        ray.state = arrival.state;
+    }
+    terminate(ray);
+    return NONE;
+}
+
+// The interaction of a ray with an interface; returns which branches go on. again, last: as for `branch`.
+int interact(inout Ray ray, out Ray weaker, Interaction at, ObjectRow body, Hit hit, SurfaceHit surface, PrimaryHit primary, float unoccluded,
+    vec3 again, bool last) {
+    int depth = depth_of(ray) + 1, interactions = interactions_of(ray) - 1;
+    bool polished = at.roughness == 0.0;
+    float alpha = at.roughness * at.roughness;
+    Facet facet = take_facet(at, alpha, primary.pixel, depth - 1, ray.branch_code);
+    float bare = interface_reflectance(cosine_of(at), at.ior, at.roughness);
+    vec3 emitted, refracted = refracted_at(at);
+    Lobes lobes = interface_lobes(at, body, bare, emitted);
+    mask_lobes(lobes, facet, at, refracted);
+    add_coat(ray, at, body, facet.surface_normal, polished, unoccluded, lobes, emitted);
+    traced_radiance += ray.throughput * emitted;
+    add_base(ray, lobes.transmission, at, primary);
+    lobes.transmission *= passing_base(at);
+    float ior_inside = max(at.ior, 1.0 / at.ior);
+    Ray back = ray, on = ray;
+    split_footprint(ray.footprint, hit, at, back.footprint, on.footprint);
+    back.direction = reflected_at(at);
+    back.origin = origin_beside(at.point, at.face_normal, back.direction, back.skipped);
+    back.throughput = unoccluded * ray.throughput * lobes.reflection;
+    back.state = packed_state(depth, depth == 1 ? 0 : forks_of(ray), true, interactions);
+    back.blur += alpha * alpha * (at.outside ? 1.0 : ior_inside * ior_inside);
+    back.branch_code = ray.branch_code * 2u + 1u;
+    back.outwards = -at.normal;
+    on.direction = refracted;
+    on.origin = origin_beside(ray.origin + surface.path * ray.direction, at.face_normal, on.direction, on.skipped);
+    on.throughput = ray.throughput * lobes.transmission;
+    on.state = packed_state(depth, forks_of(ray), is_reflected(ray), interactions);
+    on.interior = surface.interior;
+    on.blur += alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0);
+    on.branch_code = ray.branch_code * 2u;
+    on.outwards = at.normal;
+    return branch(ray, weaker, back, on, again, bare == 1.0, last);
+}
+
+// Lets a ray interact with the surface that it hits, and returns which branches go on. hit: the nearest one, or that of `first_hit`;
+// where nothing is hit as far as its path, which is not NOTHING, the ray stays as it is.
+int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int channel) {
+    int before = effective_medium(ray.interior);
+    bool sound = true;
+    SurfaceHit surface = surface_hit(ray.origin, ray.direction, ray.interior, 0.0, hit, before, channel, sound);
+    if (hit.object < 0 && hit.path < NOTHING) { return ONE; }
+    if (hit.object < 0 && all_closed == 1) {
+        ray.interior = uvec4(0u);
+        before = AIR;
+    }
+    vec3 passed = through_media(ray, before, hit);
+    if (hit.object < 0) {
+        escape(ray, escaped_ray(ray, AIR, vec3(0.0), ray.origin));
+        return NONE;
+    }
+    vec3 point = ray.origin + hit.path * ray.direction;
+    advance(ray.footprint, hit.path);
+    float width = width_at_hit(point, abs(dot(surface.face_normal, ray.direction)));
+    ObjectRow body = body_at(surface.object, surface.triangle, surface.weights, width);
+    int type = int(body.type);
+    if (starts_within(ray, body, surface.outside)) { return pass_on(ray, point, surface.face_normal, ray.interior, ray.outwards); }
+    if (!sound && (all_closed == 0 || is_full(ray.interior))) { lose(ray); }
+    bool first = depth_of(ray) == 0 && surface.object == primary.object && distance(point, primary.point) < 1e-3 * surface_reach;
+    vec3 normal = facing_normal(first ? primary.normal : surface.smooth_normal, ray.direction);
+    traced_radiance += ray.throughput * surface.emitted;
+    ray.throughput *= surface.transmittance;
+    if (type == TYPE_OPAQUE && (surface.outside || body.one_sided == 0.0)) {
+        // It is in an open body, and whether rightly so, what is behind the opaque object would decide.
+        if (all_closed == 0 && is_in_open_body(ray.interior)) { lose(ray); }
+        EscapedRay end = escaped_ray(ray, surface.object, normal, point);
+        end.triangle = surface.triangle;
+        end.weights = surface.weights;
+        end.width = width;
+        escape(ray, end);
+        return NONE;
+    }
+    int after = effective_medium(surface.interior);
+    if (type != TYPE_THIN_WALL && !alters_light(before, after, channel)) {
+        return pass_on(ray, ray.origin + surface.path * ray.direction, surface.face_normal, surface.interior, normal);
+    }
+    Interaction at = interaction_at(surface, body, point, ray.direction, normal, before, after, channel);
+    // Where rays cannot read textures, all of an object is as where it is first hit.
+    if (first || (TEXTURED == 0 && surface.object == primary.object)) { take_material(at, primary); }
+    // Light that scatters inside leaves all the same as from a layer.
+    vec3 again = surface.outside || is_layer(before) ? vec3(1.0) : passed;
+    bool last = depth_of(ray) + 1 >= most_interfaces || interactions_of(ray) <= 1;
+    return interact(ray, weaker, at, body, hit, surface, primary, first ? primary.unoccluded : 1.0, again, last);
+}
+
+// The first ray of a pixel, which starts a little before what the rasterizer has found, and how far it looks for that. front,
+// parameters, tint: of the first interface. pixel: to the right and down; its sample may be aside of its center.
+void begin(vec2 pixel, uvec2 number, vec3 direction, vec4 front, vec4 parameters, vec4 tint, bool starts_inside, out Ray ray,
+    out PrimaryHit primary, out float reach) {
+    int object = front.w < NOTHING ? int(parameters.x + 0.5) : AIR;
+    primary = PrimaryHit(object, point_at(pixel, front.w), front.xyz, parameters.y, parameters.z, tint.rgb, tint.a, number);
+    vec3 eye = point_at(pixel, surface_eye_axial_depth);
+    float margin = min(1e-3 * surface_reach, distance(primary.point, eye));
+    ray = Ray(primary.point - margin * direction, 0.0, direction, 0.0, vec3(1.0), packed_state(0, FORKS, false, MOST_INTERACTIONS), 0u,
+        uvec4(0u), -direction, footprint_of(pixel, front.w));
+    reach = margin + 1e-3 * surface_reach;
+#if FROM_EYE
+    // Something may lie before the first interface.
+    ray.origin = point_at(pixel, 0.0);
+    ray.footprint = footprint_of(pixel, starts_inside ? surface_eye_axial_depth : 0.0);
+    if (starts_inside) {
+        ray.skipped = 2.0 * SURFACE_OFFSET * surface_reach;
+        ray.origin = eye + ray.skipped * direction;
+        ray.interior = interior_at_eye(eye, direction, ray.skipped);
+    }
+    reach = NOTHING;
+#endif
+}
+
+// Light of the traced rays of a pixel with that of the lights in its first interface, where there is one. emitted: what media emit
+// along the straight ray; variance: of normals.
+vec3 with_lights(vec3 light, vec3 direction, PrimaryHit primary, vec3 emitted, float variance, bool starts_inside) {
+    vec3 entering = vec3(1.0);
+    if (primary.object != AIR && !starts_inside) {
+        Surface surface = surface_of(vec4(float(primary.object), primary.roughness, primary.transmission, variance));
+        float cosine = clamp(-dot(primary.normal, direction), 0.0, 1.0);
+        entering = vec3(1.0 - interface_reflectance(cosine, surface.ior, surface.roughness)) * surface.transmission * primary.color;
+        entering *= 1.0 - coat_reflectance(surface.clearcoat, cosine);
+        light += coated_highlights(primary.point, primary.normal, direction, surface, variance);
+    }
+#if !EMISSION
+    light += entering * emitted;
+#endif
+    return min(light, vec3(NOTHING));
+}
