@@ -57,6 +57,8 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.gltf.load import load_scene as load_scene
     from translucent.gltf.materials import read_materials as read_materials
     from translucent.gltf.write import write_medium as write_medium
+    from translucent.interop.mitsuba import to_mitsuba as to_mitsuba
+    from translucent.interop.mitsuba import write_mitsuba as write_mitsuba
     from translucent.materials import load_medium as load_medium
     from translucent.materials import text_block as text_block
     from translucent.media.albedo import scattering_medium as scattering_medium
@@ -138,6 +140,7 @@ _NAMES = {
     "gltf.load": "load_scene",
     "gltf.materials": "read_materials",
     "gltf.write": "write_medium",
+    "interop.mitsuba": "to_mitsuba write_mitsuba",
     "materials": "load_medium text_block",
     "media.albedo": "scattering_medium",
     "media.conversion": "DistanceMatch clamp_colors color_at_distance "

@@ -112,7 +112,7 @@ def _scene(thing: Any, material: Preset | Medium | None, unit: str | None) -> Sc
             scene = with_roughness(filled(scene, medium), roughness)
         bare = scene.bodies and not (scene.has_camera or scene.lights or has_ground(scene))
         return staged(scene, DEFAULT_STAGE) if bare else scene
-    return with_roughness(showcase(_mesh(thing, unit), medium, SIZE), roughness)
+    return showcase(_mesh(thing, unit), material, SIZE)
 
 
 def _mesh(thing: object, unit: str | None) -> Mesh:

@@ -93,7 +93,15 @@ FEW_SAMPLES = 1 << 18
 class RenderOptions:
     """Options of ``translucent render``."""
 
-    output: Path = option(names=("-o", "--output"), required=True, help="A .png, .exr or .npz file; see --turntable.")
+    output: Path = option(
+        names=("-o", "--output"), required=True, help="A .png, .exr or .npz file; see --turntable and --as."
+    )
+    system: str | None = option(
+        names=("--as",),
+        type=click.Choice(["mitsuba"]),
+        help="Write the scene for another renderer in place of a picture: an .xml file for Mitsuba 3, with --samples "
+        "paths of each pixel, and by default no stage.",
+    )
     medium: BodyOptions = group(BodyOptions)
     object_names: tuple[str, ...] = option(
         (),
@@ -163,7 +171,12 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     request = replace(given.choices.read(), samples=given.samples, transparent=given.transparent)
     pictures = Pictures(given, given.look.tone or "none", pixels)
     _check_together(given, request, pictures)
-    pictures.check()
+    if given.system is None:
+        pictures.check()
+    else:
+        from translucent.interop.mitsuba import check_output
+
+        check_output(given.output)
     refuse_overwriting(given.output, model, given.look.environment, given.look.background)
     requested = SceneRequest(
         medium=given.medium.read(),
@@ -175,7 +188,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
         environment=given.look.lighting(),
         environment_shadows=given.choices.environment_shadows,
         roughness=given.medium.surface_roughness(given.look.roughness),
-        stage=given.stage if given.opaque_with is None else NO_STAGE,
+        stage=NO_STAGE if given.opaque_with or (given.system and given.stage is None) else given.stage,
         media=read_objects(given.object_names),
         variant=given.variant,
         time=given.time,
@@ -184,6 +197,11 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     if given.look.tone is None and len(scene.shown) < len(scene.objects):
         pictures = Pictures(given, STAGED_TONE, pixels)
     require_translucent(model, scene)
+    if given.system is not None:
+        files = tl.write_mitsuba(scene, pixels, given.output, samples=given.samples)
+        names = [str(file) for file in files]
+        echo(json.dumps({"output": names[0], "files": names}) if as_json else "\n".join(names))
+        return
     if given.turntable is not None and given.camera.camera is None and given.camera.eye is None:
         scene = framed_all_around(scene, pixels)
     few = pixels[0] * pixels[1] * given.samples * (given.turntable or 1) <= FEW_SAMPLES
@@ -233,6 +251,21 @@ def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pict
     """Raise `InputError` if two options exclude each other."""
     from translucent.scene.stages import NO_STAGE
 
+    if given.system is not None:
+        chosen = {
+            "--method": request.method,
+            "--interfaces": request.interfaces,
+            "--scattering": request.scattering,
+            "--caustics": request.caustics,
+            "--opaque-with": given.opaque_with,
+            "--turntable": given.turntable,
+            "--aov": given.aov,
+            "--transparent": given.transparent or None,
+        }
+        if wrong := [name for name, value in chosen.items() if value is not None]:
+            found = f"--as {given.system}: paths of another renderer choose nothing of that kind"
+            raise InputError(wrong[0], found, "leave out one of the two")
+        return
     if given.transparent and given.opaque_with is None and given.output.suffix.lower() == ".mp4":
         raise InputError("--transparent", "a film, which holds no alpha", "leave out one of the two")
     if given.opaque_with is None:

@@ -1,0 +1,441 @@
+"""Scenes for Mitsuba 3, so that anybody can check a picture against an independent path tracer.
+
+What is written: closed bodies with a homogeneous medium behind a dielectric, rough dielectric or null interface; opaque
+diffuse objects; point, directional and sphere lights; constant environments, gradients and pictures of all directions;
+the camera; a film with a box filter; ``volpathmis`` without a limit of depth. Triangles carry the normals for shading
+that pictures have here, in the world. Vertices and pictures lie in files beside, since neither form has room for them.
+
+Conventions that differ, and what is done about them:
+
+- Rays of Mitsuba start about 1e-4 of a unit off a surface. So that it is small, the scene is scaled: its diagonal is
+  `DIAGONAL` units, coefficients are per unit, and intensities of points grow with the square.
+- Its cameras look along +Z with +X to the left.
+- Row i of h in its environment maps is at the angle pi i / (h - 1) from +Y, and the center of the picture is +Z. Rows
+  are at pi (i + 1/2) / h here, with -Z in the middle: rows are added, and between them lie the same straight lines.
+- A roughness r is its ``alpha`` r^2, GGX. Its rough dielectrics have no scattering among facets, and lose light that
+  ours keep: up to 2 % of a frosted ball with r = 0.2, and more beyond.
+- A sphere light is seen there, and hides what is behind it.
+
+Source: plugin documentation of Mitsuba 3.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from translucent.arguments import checked
+from translucent.arrays import Array
+from translucent.errors import InputError, RenderError
+from translucent.files.paths import OutputFiles, require_output
+from translucent.geometry.normals import corner_normals
+from translucent.planning.bodies import open_bodies, overlapping_pair
+from translucent.scene.camera import check_size
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight, SphereLight, SpotLight
+from translucent.scene.scene import Object, Scene, check_scene, object_names
+from translucent.scene.surface import Surface
+from translucent.signals import import_trimesh
+
+#: Diagonal of the scene in units of Mitsuba, to a power of ten.
+DIAGONAL = 1000.0
+
+#: Depths between which its cameras see, in its units.
+NEAR, FAR = 0.1, 1e6
+
+#: Paths of each pixel.
+SAMPLES = 256
+
+#: Depth from which on Mitsuba ends paths by chance: shorter ones are not much noisier for it.
+ROULETTE = 100
+
+#: Element of XML for each plugin.
+_ELEMENTS = {
+    "volpathmis": "integrator",
+    "perspective": "sensor",
+    "orthographic": "sensor",
+    "independent": "sampler",
+    "hdrfilm": "film",
+    "box": "rfilter",
+    "ply": "shape",
+    "sphere": "shape",
+    "null": "bsdf",
+    "dielectric": "bsdf",
+    "roughdielectric": "bsdf",
+    "twosided": "bsdf",
+    "diffuse": "bsdf",
+    "homogeneous": "medium",
+    "hg": "phase",
+    "point": "emitter",
+    "directional": "emitter",
+    "constant": "emitter",
+    "envmap": "emitter",
+    "area": "emitter",
+}
+
+#: Elements of XML for triples, which are points unless they are directions.
+_VECTORS = {"direction": "vector"}
+
+Described = dict[str, Any]
+
+
+@checked
+def to_mitsuba(
+    scene: Scene, size: tuple[int, int], folder: str | Path | None = None, *, samples: int = SAMPLES
+) -> dict[str, Any]:
+    """Describe a scene for ``mitsuba.load_dict``, to be rendered by Mitsuba 3 and compared with our pictures.
+
+    Parameters
+    ----------
+    scene : Scene
+    size : (width, height)
+        Of the picture, in pixels.
+    folder : path, optional
+        Where its meshes (.ply) and its environment (.pfm) are written. Default: a new folder for temporary files.
+    samples : int
+        Paths of each pixel.
+
+    Returns
+    -------
+    dict
+        With a transform of ``mitsuba.ScalarTransform4f``. Render it with an RGB variant, such as ``llvm_ad_rgb``.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba has no words for something in the scene; it names the object, and what to change.
+    RenderError
+        If Mitsuba is not installed, or no variant of it is set; `write_mitsuba` needs neither.
+    """
+    described, files = describe(scene, size, samples)
+    without = "or write a file, for which it need not be here: tl.write_mitsuba(scene, size, 'scene.xml')"
+    try:
+        mitsuba: Any = import_module("mitsuba")
+    except ImportError:
+        raise RenderError("to_mitsuba", "mitsuba is not installed", f"pip install mitsuba, {without}") from None
+    if mitsuba.variant() is None:
+        raise RenderError("to_mitsuba", "no variant of Mitsuba is set", "mitsuba.set_variant('llvm_ad_rgb')")
+    home = Path(tempfile.mkdtemp(prefix="translucent-mitsuba-") if folder is None else folder)
+    with OutputFiles() as written:
+        for name, write in files.items():
+            require_output(home / name, f"mitsuba file {str(home / name)!r}")
+            written.write(home / name, write)
+
+    def loaded(value: Any, key: str = "") -> Any:
+        if isinstance(value, dict):
+            return {name: loaded(one, name) for name, one in value.items()}
+        if key == "to_world":
+            return mitsuba.ScalarTransform4f(np.array(value))
+        return str((home / value).resolve()) if key == "filename" else value
+
+    result: dict[str, Any] = loaded(described)
+    return result
+
+
+@checked
+def write_mitsuba(scene: Scene, size: tuple[int, int], path: str | Path, *, samples: int = SAMPLES) -> tuple[Path, ...]:
+    """Write a scene as an .xml file that Mitsuba 3 loads: ``mitsuba scene.xml``, or ``mitsuba.load_file``.
+
+    Parameters
+    ----------
+    scene : Scene
+    size : (width, height)
+    path : path
+        An .xml file. Its meshes and its environment lie beside it, as ``scene.0.ply`` and ``scene.environment.pfm``.
+    samples : int
+        Paths of each pixel.
+
+    Returns
+    -------
+    tuple of Path
+        All files, the .xml first.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba has no words for something in the scene, or the path is no .xml file.
+    RenderError
+        If a file cannot be written.
+    """
+    path = Path(path)
+    check_output(path)
+    described, files = describe(scene, size, samples)
+    places = {name: path.with_name(f"{path.stem}.{name}") for name in files}
+    root = ElementTree.Element("scene", version="3.0.0")
+    for name, value in described.items():
+        if name != "type":
+            root.append(_element(value, None, {name: place.name for name, place in places.items()}))
+    ElementTree.indent(root)
+    with OutputFiles() as written:
+        for name, place in places.items():
+            written.write(place, files[name])
+        written.write(path, partial(ElementTree.ElementTree(root).write, encoding="utf-8", xml_declaration=True))
+    return (path, *places.values())
+
+
+def check_output(path: Path) -> None:
+    """Raise `InputError` before any work is done if no scene can be written to the path."""
+    if path.suffix.lower() != ".xml":
+        raise InputError(f"scene for Mitsuba {str(path)!r}", "not an .xml file", "name it for example scene.xml")
+    require_output(path, f"scene for Mitsuba {str(path)!r}")
+
+
+def _element(value: Described, name: str | None, files: Mapping[str, str]) -> ElementTree.Element:
+    """XML of a plugin, with what is within it."""
+    element = ElementTree.Element(_ELEMENTS[value["type"]], type=value["type"])
+    if name is not None:
+        element.set("name", name)
+    for key, one in value.items():
+        if key == "type":
+            continue
+        if key == "to_world":
+            transform = ElementTree.SubElement(element, "transform", name=key)
+            ElementTree.SubElement(transform, "matrix", value=" ".join(repr(v) for row in one for v in row))
+        elif isinstance(one, dict) and one["type"] == "rgb":
+            ElementTree.SubElement(element, "rgb", name=key, value=", ".join(map(repr, one["value"])))
+        elif isinstance(one, dict):
+            element.append(_element(one, "interior" if key == "interior" else None, files))
+        elif isinstance(one, list):
+            text = ", ".join(map(repr, one))
+            ElementTree.SubElement(element, _VECTORS.get(key, "point"), name=key, value=text)
+        else:
+            kind = {str: "string", int: "integer", float: "float"}[type(one)]
+            ElementTree.SubElement(element, kind, name=key, value=files.get(one, str(one)))
+    return element
+
+
+def describe(scene: Scene, size: tuple[int, int], samples: int = SAMPLES) -> tuple[Described, dict[str, Any]]:
+    """Describe a scene in plugins of Mitsuba, with lists as matrices; and its files, by name, with what writes them.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba has no words for something in it.
+    """
+    check_scene(scene)
+    size = check_size(size)
+    if samples < 1:
+        raise InputError(f"samples {samples}", "less than 1", "give for example 256")
+    for found, do in _beyond(scene):
+        raise InputError("a scene for Mitsuba", found, do)
+    scale = units_per_metre(scene)
+    described: Described = {
+        "type": "scene",
+        "integrator": {"type": "volpathmis", "max_depth": -1, "rr_depth": ROULETTE},
+        "sensor": {
+            **_camera(scene, size, scale),
+            "film": {
+                "type": "hdrfilm",
+                "width": size[0],
+                "height": size[1],
+                "pixel_format": "rgb",
+                "component_format": "float32",
+                "filter": {"type": "box"},
+            },
+            "sampler": {"type": "independent", "sample_count": samples},
+        },
+    }
+    files: dict[str, Any] = {}
+    for i, item in enumerate(scene.objects):
+        files[f"{i}.ply"] = partial(_write_mesh, item, scale)
+        described[f"object_{i}"] = {"type": "ply", "filename": f"{i}.ply", **_material(item, scale)}
+    for i, light in enumerate(scene.lights):
+        described[f"light_{i}"] = _light(light, scale)
+    described["environment"], pixels = _environment(scene.environment)
+    if pixels is not None:
+        files["environment.pfm"] = partial(_write_pfm, pixels)
+    return described, files
+
+
+def units_per_metre(scene: Scene) -> float:
+    """Units of Mitsuba in a metre: the power of ten that brings the diagonal of the scene next to `DIAGONAL`."""
+    return float(10.0 ** round(math.log10(DIAGONAL / scene.diagonal)))
+
+
+def _camera(scene: Scene, size: tuple[int, int], scale: float) -> Described:
+    camera, eye = scene.camera, scene.camera.eye
+    turned = np.column_stack([-camera.right, camera.up, camera.forward])
+    described: Described = {"type": "perspective", "fov_axis": "y", "fov": float(camera.fov_y or 0.0)}
+    if camera.fov_y is None:
+        described = {"type": "orthographic"}
+        turned[:, :2] *= scale * camera.half_extent(size)[0]  # the picture is 2 units wide there
+        # Here its rays are whole lines: there they begin before everything.
+        ahead = (scene.boxes.reshape(-1, 3) - eye) @ camera.forward
+        reach = np.linalg.norm(scene.boxes[:, 1] - scene.boxes[:, 0], axis=1).max()
+        eye = eye + min(float(ahead.min() - reach), 0.0) * camera.forward
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turned, scale * eye
+    return {**described, "near_clip": NEAR, "far_clip": FAR, "to_world": pose.tolist()}
+
+
+def _rgb(values: Any) -> Described:
+    return {"type": "rgb", "value": [float(value) for value in np.asarray(values, dtype=np.float64)]}
+
+
+def _material(item: Object, scale: float) -> Described:
+    """Interface, and medium behind it."""
+    if (medium := item.medium) is None:
+        diffuse = {"type": "diffuse", "reflectance": _rgb(item.base_color)}
+        one_sided = item.surface is not None and not item.surface.double_sided
+        return {"bsdf": diffuse if one_sided else {"type": "twosided", "bsdf": diffuse}}
+    roughness = 0.0 if item.surface is None else item.surface.roughness
+    bsdf: Described = {"type": "null"}
+    if medium.ior != 1.0:
+        bsdf = {"type": "dielectric", "int_ior": float(medium.ior), "ext_ior": 1.0}
+        if roughness:
+            bsdf |= {"type": "roughdielectric", "distribution": "ggx", "alpha": float(roughness) ** 2}
+    extinction = medium.extinction
+    if not (largest := float(extinction.max())):
+        return {"bsdf": bsdf}
+    albedo = np.asarray(medium.scattering) / np.where(extinction > 0, extinction, 1.0)
+    interior = {
+        "type": "homogeneous",
+        "albedo": _rgb(albedo),
+        "sigma_t": _rgb(extinction / largest),
+        "scale": largest / scale,
+        "phase": {"type": "hg", "g": float(medium.anisotropy)},
+    }
+    return {"bsdf": bsdf, "interior": interior}
+
+
+def _light(light: Any, scale: float) -> Described:
+    if isinstance(light, DirectionalLight):
+        direction = np.asarray(light.direction).tolist()
+        return {"type": "directional", "direction": direction, "irradiance": _rgb(light.irradiance)}
+    position = (scale * np.asarray(light.position)).tolist()
+    if isinstance(light, SphereLight):
+        # pi r^2 L in each direction
+        radiance = _rgb(np.asarray(light.intensity) / (math.pi * light.radius**2))
+        emitter = {"type": "area", "radiance": radiance}
+        return {"type": "sphere", "center": position, "radius": scale * light.radius, "emitter": emitter}
+    return {"type": "point", "position": position, "intensity": _rgb(scale**2 * np.asarray(light.intensity))}
+
+
+def _environment(environment: Environment) -> tuple[Described, Array | None]:
+    """Emitter, and the pixels (h, w, 3) of its picture, if it has one."""
+    if environment.kind == "constant":
+        return {"type": "constant", "radiance": _rgb(environment.first)}, None
+    pixels = np.asarray(environment.light_map.pixels, dtype=np.float32)
+    # Ours are at odd ones of 2 h + 1 rows; beyond the first and the last they are constant.
+    below = np.concatenate([pixels, pixels[-1:]])
+    rows = np.empty((2 * len(pixels) + 1, *pixels.shape[1:]), np.float32)
+    rows[1::2] = pixels
+    rows[0::2] = 0.5 * (below + np.concatenate([pixels[:1], pixels]))
+    turn = math.radians(180.0 + environment.rotation)
+    cosine, sine = math.cos(turn), math.sin(turn)
+    to_world = [[cosine, 0.0, sine, 0.0], [0.0, 1.0, 0.0, 0.0], [-sine, 0.0, cosine, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    described = {"type": "envmap", "filename": "environment.pfm", "scale": environment.scale, "to_world": to_world}
+    return described, rows
+
+
+def _write_mesh(item: Object, scale: float, path: Path) -> None:
+    """Write the triangles of an object in the world, each with its own corners and their normals, facing outwards."""
+    mesh, matrix = item.mesh, item.matrix
+    corners = scale * (mesh.vertices[mesh.faces] @ matrix[:3, :3].T + matrix[:3, 3])
+    normals = corner_normals(mesh) @ np.linalg.inv(matrix[:3, :3])
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
+    if mesh.diagnosis.inverted:
+        normals = -normals
+    if item.faces_inwards:
+        corners, normals = corners[:, ::-1], normals[:, ::-1]
+    faces = np.arange(3 * len(corners)).reshape(-1, 3)
+    soup = import_trimesh().Trimesh(corners.reshape(-1, 3), faces, vertex_normals=normals.reshape(-1, 3), process=False)
+    path.write_bytes(soup.export(file_type="ply", vertex_normal=True))
+
+
+def _write_pfm(pixels: Array, path: Path) -> None:
+    """Write linear radiance as a Portable Float Map: float32, the last row first."""
+    height, width = pixels.shape[:2]
+    path.write_bytes(f"PF\n{width} {height}\n-1.0\n".encode() + pixels[::-1].astype("<f4").tobytes())
+
+
+def _beyond(scene: Scene) -> Iterator[tuple[str, str]]:
+    """What Mitsuba cannot say, and what to do, the first things first."""
+    solids = [body for body in scene.bodies if body.sheet_thickness is None]
+    groups = (
+        (
+            [body for body in scene.bodies if body.density is not None],
+            "densities that vary, which are formulas here and grids of voxels there",
+            "give them one density, or take tl.reference.path_trace for a truth",
+        ),
+        (
+            [body for body in scene.bodies if body.sheet_thickness is not None],
+            "sheets, which have no inside to fill",
+            "model their thickness, or leave them out",
+        ),
+        (
+            [scene.objects[i] for i in open_bodies(scene)],
+            "bodies that are not closed, so that a ray does not know what it is in",
+            "close them",
+        ),
+        (
+            [body for body in scene.bodies if body.medium is not None and body.medium.emits],
+            "media that emit",
+            "leave the emission out",
+        ),
+        (
+            [body for body in scene.bodies if body.medium is not None and body.medium.phase is not None],
+            "phase functions other than Henyey and Greenstein's",
+            "give the medium an anisotropy in place of its phase",
+        ),
+    )
+    for items, found, do in groups:
+        if items:
+            yield f"{object_names(items)}: {found}", do
+    for item in scene.objects:
+        if said := _beyond_surface(item):
+            do = "take a ground of one color" if item.shadow_catcher else "leave it out of the surface"
+            more = ", or no stage" if item.shadow_catcher else ""
+            yield f"{item.mesh.name!r}: {said} of its surface", do + more
+    if (pair := overlapping_pair(solids)) is not None:
+        names = object_names([solids[i] for i in pair])
+        found = f"{names}: bodies that may overlap, for which it has neither sums nor priorities"
+        yield found, "move them apart, or give each interface one medium on each side by hand"
+    for light in scene.lights:
+        if not isinstance(light, (PointLight, DirectionalLight, SphereLight)):
+            kind = (
+                "spot lights, whose cones fall off otherwise" if isinstance(light, SpotLight) else type(light).__name__
+            )
+            yield kind, "use a tl.PointLight"
+    if np.asarray(scene.ambient).any():
+        yield "ambient radiance, which stands for light that its paths find", "leave ambient out"
+    if scene.environment.kind == "checkerboard":
+        yield "a checkerboard, which is fixed to the picture", "use tl.Environment.image or gradient"
+    if scene.environment.background is not None:
+        yield "an environment that is seen otherwise than it lights", "leave its background out"
+    if scene.camera.window is not None:
+        yield "a part of a larger picture", "take the camera of the whole picture"
+    if scene.camera.fov_y is not None and any(abs(body.winding_number(scene.camera.eye)) > 0.5 for body in solids):
+        yield "a camera inside of a body", "move it out"
+
+
+def _beyond_surface(item: Object) -> str:
+    """Properties of a surface for which Mitsuba's interfaces and diffuse surfaces have no words, listed."""
+    if (surface := item.surface) is None:
+        return "colors of vertices" if item.mesh.colors is not None else ""
+    default = Surface()
+    names = ["clearcoat", "iridescence"]
+    if item.medium is not None:
+        names += ["transmission", "dispersion"]
+    else:
+        names += ["diffuse_transmission", "metallic", "alpha_cutoff"]
+    found = [name for name in names if getattr(surface, name) != getattr(default, name)]
+    if item.medium is None and surface.ior != 1.0:
+        found.append("the coat of ior")
+    if item.medium is not None and not np.array_equal(surface.color, default.color):
+        found.append("color")
+    if surface.glows:
+        found.append("emissive")
+    if any(surface.textures):
+        found.append("textures")
+    if item.mesh.colors is not None:
+        found.append("colors of vertices")
+    return " and ".join(found)
