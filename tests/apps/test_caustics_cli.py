@@ -40,7 +40,7 @@ def test_photons_are_counted_in_the_plan(run: Run, model: Path, tmp_path: Path) 
     assert "5,000 photons from 1 light" in run("explain", model, "--caustics=5000").out
     assert "1,000,000 photons" in run("explain", model, "--caustics").out
     assert "requested" not in run("explain", model).out
-    done = run("render", model, "-o", tmp_path / "out.png", "--size", "16x12", "--samples", 1, "--caustics", 500)
+    done = run("render", model, "-o", tmp_path / "out.png", "--size", "16x12", "--samples", 1, "-v", "--caustics", 500)
     assert done.code == 0
     assert "caustics: requested: 500 photons" in done.out
 

@@ -146,7 +146,7 @@ def test_a_viewer_that_was_not_built_is_told_before_anything_is_rendered(
 
 
 def test_colors_are_told_at_the_distance_of_the_panel(run: Run, cube: Path, tmp_path: Path) -> None:
-    plain = ("-o", str(tmp_path / "cube.html"), "--poster", "none", "--stage", "none")
+    plain = ("-o", str(tmp_path / "cube.html"), "--poster", "none", "--stage", "none", "--verbose")
     told = run(str(cube), *plain, "--color", "#7b1e3a", "--distance", "7mm").out
     assert "white light is #7b1e3a after 0.007 m" in told
     header, _ = contents(tmp_path / "cube.html")

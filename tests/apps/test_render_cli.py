@@ -239,7 +239,8 @@ class TestRendering:
         model, frames = write_scene(tmp_path / "scene.glb", glass), {}
         for interfaces in ("screen", "front"):
             output = tmp_path / f"{interfaces}.npz"
-            result = run("render", model, "-o", output, "--size", "9x5", "--samples", "1", "--interfaces", interfaces)
+            few = ("--size", "9x5", "--samples", "1", "--verbose")
+            result = run("render", model, "-o", output, *few, "--interfaces", interfaces)
             assert (result.code, result.err) == (0, "")
             assert ("leaves without bending" in result.out) == (interfaces == "front")
             with np.load(output) as arrays:
@@ -255,7 +256,7 @@ class TestRendering:
             output = tmp_path / f"{name}.npz"
             asked = ("--scattering", name) if name else ()
             asked += ("--diffusion-resolution", "16") if name == "diffusion" else ()
-            alone = ("--size", "9x5", "--samples", "1", "--stage", "none")
+            alone = ("--size", "9x5", "--samples", "1", "--stage", "none", "--verbose")
             result = run("render", cube, "-o", output, *alone, *medium, *asked)
             assert result.code == 0
             told[name] = result.out
@@ -315,7 +316,7 @@ class TestRendering:
         self, run: Run, glass_box: Path, tmp_path: Path, camera: tuple[str, ...], metres: float
     ) -> None:
         output = tmp_path / "scene.npz"
-        result = run("render", glass_box, "-o", output, "--size", "9x5", "--samples", "1", *camera)
+        result = run("render", glass_box, "-o", output, "--size", "9x5", "--samples", "1", "--verbose", *camera)
         assert (result.code, result.err) == (0, "")
         assert "medium: extinction 2.773, 1.386, 0 1/m" in result.out
         with np.load(output) as arrays:
@@ -328,7 +329,7 @@ class TestRendering:
         for material in ({"extensions": GLASS}, {}):  # translucent, or opaque and filled all the same
             write_scene(model, material, cameras=False)
             medium = ("--color", "linear(1,0.5,0.25)", "--distance", "1m")
-            result = run("render", model, "-o", output, *self.VIEW, *medium, "--unit", "cm")
+            result = run("render", model, "-o", output, *self.VIEW, *medium, "--unit", "cm", "-v")
             assert (result.code, result.err) == (0, "")
             assert "medium: extinction 0, 0.6931, 1.386 1/m" in result.out
             with np.load(output) as arrays:
@@ -462,7 +463,7 @@ def test_scattering_is_shown_and_not_warned_of(run: Run, tmp_path: Path) -> None
 
 
 def test_a_preset_brings_its_roughness_unless_one_is_given(run: Run, tmp_path: Path) -> None:
-    command = ["render", "bear", "-o", tmp_path / "a.png", "--preset"]
+    command = ["render", "bear", "-o", tmp_path / "a.png", "--verbose", "--preset"]
     rough = "rough ones blur both"
     assert rough in run(*command, "jade", *SMALL).out
     assert rough not in run(*command, "jade", "--roughness", "0", *SMALL).out
@@ -472,3 +473,14 @@ def test_a_preset_brings_its_roughness_unless_one_is_given(run: Run, tmp_path: P
     assert [jade.surface_roughness(one) for one in (0.5, 0.0, None)] == [0.5, 0.0, 0.15]
     # A preset that says nothing of surfaces leaves a file's as they are.
     assert (marble.surface_roughness(), MediumOptions().surface_roughness()) == (None, None)
+
+
+def test_the_answer_comes_first_and_advice_last(run: Run, tmp_path: Path) -> None:
+    output = tmp_path / "a.png"
+    lines = run("render", "soap", "-o", output, "--preset", "whole_milk", *SMALL).out.splitlines()
+    assert lines[0].startswith(f"{output}: 64x48, ")
+    assert lines[1] == "size: 9 cm long"
+    assert [line.split(": ")[:2] for line in lines[2:]] == [["advice", "'soap.ply'"]]
+    told = run("render", "soap", "-o", output, "--color", "white", "--distance", "1", *SMALL)
+    assert [line.split(" ")[:2] for line in told.err.splitlines()] == [["note:", "--color"], ["note:", "--distance"]]
+    assert "--distance 1 is 1 m; lengths have a unit, as 1cm" in told.err

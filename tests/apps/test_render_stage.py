@@ -48,10 +48,10 @@ def write_gltf(path: Path, **more: object) -> Path:
 
 def test_models_stand_on_a_stage_and_cast_shadows(run: Run, tmp_path: Path) -> None:
     staged, none = tmp_path / "staged.png", tmp_path / "none.png"
-    code, out, _ = run("render", "bear", "-o", str(staged), *FEW)
+    code, out, _ = run("render", "bear", "-o", str(staged), "--verbose", *FEW)
     assert code == 0
     assert "shadow_maps" in out
-    code, out, _ = run("render", "bear", "-o", str(none), "--stage", "none", *SMALL)
+    code, out, _ = run("render", "bear", "-o", str(none), "--stage", "none", "--verbose", *SMALL)
     assert code == 0
     assert "shadow_maps" not in out
     assert np.abs(pixels(staged) - pixels(none)).max() > 30
@@ -63,10 +63,10 @@ def test_models_stand_on_a_stage_and_cast_shadows(run: Run, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("option", [("--environment", "studio"), ("--background", "white")])
 def test_environments_take_the_place_of_the_stage(run: Run, tmp_path: Path, option: tuple[str, str]) -> None:
-    code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, *SMALL)
+    code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, "--verbose", *SMALL)
     assert code == 0
     assert "shadow_maps" not in out
-    code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, "--stage", "daylight", *FEW)
+    code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, "--stage", "daylight", "-v", *FEW)
     assert code == 0
     assert " 8 directions of the environment" in out
 

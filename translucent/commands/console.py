@@ -10,6 +10,7 @@ import os
 import re
 import sys
 import time
+from functools import partial
 from typing import TextIO
 
 import click
@@ -46,6 +47,11 @@ def echo(text: str, *, err: bool = False, nl: bool = True, color: bool | None = 
             raise
         found = f"it cannot be written ({error.strerror})"
         raise RenderError("standard output", found, "check the disk, and where it is redirected to") from error
+
+
+def advise(text: str) -> None:
+    """Print advice on stderr, behind all that the running command prints."""
+    click.get_current_context().call_on_close(partial(echo, f"note: {text}", err=True))
 
 
 def _discard(stream: TextIO) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -21,7 +22,7 @@ from translucent.commands.options import (
     takes,
 )
 from translucent.errors import TranslucentError
-from translucent.model_size import size_note
+from translucent.model_size import size_note, tall
 
 if TYPE_CHECKING:
     from translucent.geometry.mesh import Mesh
@@ -70,6 +71,7 @@ def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
         found = None if chosen is None else {**chosen.summary(), "traffic": _traffic(scene, chosen).summary()}
         echo(json.dumps({**_summary(model, scene), "plan": found}))
         return
+    echo(_sentence(model, scene, chosen))
     if is_scene_file(model):
         _echo_scene(model, scene)
     else:
@@ -79,6 +81,24 @@ def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
     else:
         echo(f"plan: {chosen}")
         echo(str(_traffic(scene, chosen)))
+
+
+def _sentence(model: str, scene: Scene, chosen: RenderPlan | None) -> str:
+    """Answer in one sentence: whether and how the picture is made."""
+    if chosen is None:
+        return f"{Path(model).name} is opaque: name a medium, and light passes it."
+    count = len(scene.bodies)
+    what = f"{count} bod{'y' if count == 1 else 'ies'}"
+    how = [
+        "refracted and mirrored light" if chosen.interfaces is not None else "light that goes straight on",
+        *(["light that is scattered many times"] if chosen.multiple_scattering else []),
+        *(["random paths"] if chosen.paths is not None else []),
+    ]
+    exact = "is exact" if chosen.exact else "is not exact everywhere, as the limits below say"
+    return (
+        f"{Path(model).name} shows {what}, {tall(scene.shown_bounds)}, with {' and '.join(how)}, "
+        f"in {len(chosen.passes)} passes; its thickness {exact}."
+    )
 
 
 def _summary(model: str, scene: Scene) -> dict[str, Any]:

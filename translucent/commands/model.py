@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
-from translucent.commands.console import echo
+from translucent.commands.console import advise, echo
 from translucent.commands.options import (
     DEFAULT_FOV,
     DEFAULT_UP,
@@ -28,7 +28,7 @@ from translucent.commands.options import (
     with_options,
 )
 from translucent.errors import InputError
-from translucent.model_size import scale_to, size_note
+from translucent.model_size import scale_to, size_note, tall
 
 if TYPE_CHECKING:
     from translucent.arrays import Array
@@ -125,7 +125,7 @@ def read_scene(model: str, requested: SceneRequest) -> Scene:
     for one in requested.media:
         scene = with_roughness(scene, one.roughness, objects_named(scene, one.name))
     for line in _textured_roughness(scene, requested):
-        echo(line, err=True)
+        advise(line)
     if options.defining:
         scene = dataclasses.replace(scene, camera=_defined_camera(scene, options, requested.size, chosen))
     if chosen is not None:
@@ -154,7 +154,7 @@ def _textured_roughness(scene: Scene, requested: SceneRequest) -> list[str]:
     factors = " or ".join(
         f"{value:g}" for value in sorted({item.surface.roughness for item in textured if item.surface})
     )
-    names = f"note: {object_names(textured)}: roughness is the file's texture"
+    names = f"{object_names(textured)}: roughness is the file's texture"
     return [f"{names} times {factors}, which is requested; --roughness 1 shows the texture alone"] if textured else []
 
 
@@ -317,9 +317,17 @@ def assumes_metres(model: str, file: FileOptions) -> bool:
     return not (file.unit or file.sizes or is_scene_file(model) or is_own(model))
 
 
-def size_lines(scene: Scene) -> list[str]:
-    """Line about the size of a scene whose file names no unit, with what sets another; none where it is known."""
-    return [f"size: {note}" for note in dict.fromkeys(size_note(item.mesh) for item in scene.shown) if note]
+def size_text(scene: Scene) -> str:
+    """Size of what a scene shows; where its file names no unit, with what sets another."""
+    notes = [note for item in scene.shown if (note := size_note(item.mesh))]
+    return notes[0] if notes else tall(scene.shown_bounds)
+
+
+def echo_advice(scene: Scene, remarks: Sequence[str]) -> None:
+    """Print how large a scene is, and what would show it better."""
+    echo(f"size: {size_text(scene)}")
+    for remark in remarks:
+        echo(f"advice: {remark}")
 
 
 def medium_lines(scene: Scene, reach: Callable[[Object], float] | None = None) -> list[str]:

@@ -31,7 +31,7 @@ from urllib.parse import unquote
 
 import click
 
-from translucent.commands.console import echo
+from translucent.commands.console import advise, echo
 from translucent.errors import InputError
 from translucent.planning.flags import Flags
 
@@ -228,8 +228,11 @@ class MediumOptions:
             raise InputError(given, f"{missing} is missing", "give both: a color has a meaning only at a distance")
         if color is None or distance is None:
             return None
+        metres = parse_length(distance)
+        if metres >= 1.0 and not distance.strip()[-1:].isalpha():
+            advise(f"--distance {distance} is {metres:g} m; lengths have a unit, as {distance}cm")
         applied, warnings = clamped(color) if self.clamp is not False else (color, [])
-        medium = Medium.from_color(applied, parse_length(distance))
+        medium = Medium.from_color(applied, metres)
         for line in warnings:
             echo(f"warning: {line}", err=True)
         return medium
@@ -294,7 +297,7 @@ class BodyOptions(AnyMediumOptions):
             return None
         if self.color is not None and not medium.extinction.any():
             do = "for white wax or milk: --preset wax, or --scattering-color white --mean-free-path 2mm"
-            echo(f"note: --color {self.color} takes no light away, so that it is clear glass; {do}", err=True)
+            advise(f"--color {self.color} takes no light away, so that it is clear glass; {do}")
         ior = self.ior or (SOLID_IOR if self.color is not None else medium.ior)
         return medium if ior == medium.ior else dataclasses.replace(medium, ior=ior)
 
@@ -570,6 +573,11 @@ def read_size(text: str) -> tuple[int, int]:
 def triple_text(values: Any) -> str:
     """Three numbers, aligned."""
     return " ".join(f"{value:10.5g}" for value in values)
+
+
+def verbose_option() -> Any:
+    """Field for saying how a picture was made."""
+    return option(False, names=("-v", "--verbose"), help="Also print the media, and the plan with its reasons.")
 
 
 def overwrite_option() -> Any:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -22,12 +23,13 @@ from translucent.commands.console import ProgressLine, echo
 from translucent.commands.model import (
     ObjectCommand,
     SceneRequest,
+    echo_advice,
     is_own,
     medium_lines,
     read_objects,
     read_scene,
     require_translucent,
-    size_lines,
+    size_text,
 )
 from translucent.commands.options import (
     BodyOptions,
@@ -42,8 +44,10 @@ from translucent.commands.options import (
     refuse_overwriting,
     stage_option,
     takes,
+    verbose_option,
 )
 from translucent.errors import InputError
+from translucent.planning.passes import NoteKind
 from translucent.units import METRES_PER_UNIT, extent_text, metres_per_unit, short_length
 
 if TYPE_CHECKING:
@@ -145,6 +149,7 @@ class RenderOptions:
         help="Also write pictures of thickness, transmittance and validity into this folder.",
     )
     overwrite: bool = overwrite_option()
+    verbose: bool = verbose_option()
     backend: str | None = option(metavar="B", help="egl, window, osmesa or cpu. Default: what works here.")
 
 
@@ -167,7 +172,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     from translucent.scene.stages import NO_STAGE, STAGED_TONE
     from translucent.scene.turntable import framed_all_around
 
-    pixels = read_size(given.size)
+    pixels, began = read_size(given.size), time.perf_counter()
     request = replace(given.choices.read(), samples=given.samples, transparent=given.transparent)
     pictures = Pictures(given, given.look.tone or "none", pixels)
     _check_together(given, request, pictures)
@@ -226,25 +231,27 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
         else:
             frame = pictures.write(scene, draw)
             summary = frame.summary()
-    warn_if_black(scene, frame, given.file.unit or "m", own=is_own(model) or bool(given.file.sizes))
-    if given.output.suffix.lower() == ".png":
-        warn_if_white(frame, given.look.exposure, pictures.tone)
-    media, sizes = medium_lines(scene), size_lines(scene)
+    black = black_text(scene, frame, given.file.unit or "m", own=is_own(model) or bool(given.file.sizes))
+    white = white_text(frame, given.look.exposure, pictures.tone) if given.output.suffix.lower() == ".png" else ""
+    media = medium_lines(scene)
     if as_json:
-        said = {"medium": "; ".join(media), "model_size": "; ".join(sizes)}
+        said = {"medium": "; ".join(media), "model_size": size_text(scene)}
         echo(json.dumps({"output": str(given.output), **said, **summary}))
-        return
-    drawn_by = [frame.provenance[key] for key in ("backend", "renderer") if key in frame.provenance]
-    tiled = ", in tiles" if pictures.tiled else ""
-    echo(f"{given.output}: {pixels[0]}x{pixels[1]}{tiled}, {', '.join(drawn_by)}")
-    if "opaque" in frame.provenance:
-        echo(f"opaque objects: {frame.provenance['opaque']}")
-    for line in media:
-        echo(f"medium: {line}")
-    for line in sizes:
-        echo(line)
-    echo(str(frame.plan))
-    echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in summary["seconds"].items()))
+    else:
+        drawn_by = [frame.provenance[key] for key in ("backend", "renderer") if key in frame.provenance]
+        tiled, took = ", in tiles" if pictures.tiled else "", time.perf_counter() - began
+        echo(f"{given.output}: {pixels[0]}x{pixels[1]}{tiled}, {', '.join(drawn_by)}, {took:.1f} s")
+        if "opaque" in frame.provenance:
+            echo(f"opaque objects: {frame.provenance['opaque']}")
+        if given.verbose:
+            for line in media:
+                echo(f"medium: {line}")
+            echo(str(frame.plan))
+            echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in summary["seconds"].items()))
+        # What the picture says of darkness is more than what its plan does.
+        echo_advice(scene, [note for note in frame.plan.remarks if not (black and note.kind is NoteKind.BLACK)])
+    for text in filter(None, (black, white)):
+        echo(f"warning: {text}", err=True)
 
 
 def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pictures) -> None:
@@ -387,8 +394,8 @@ class Pictures:
         return first
 
 
-def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -> None:
-    """Warn if hardly any light passes or is scattered back, with the likely reason.
+def black_text(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -> str:
+    """Warning where hardly any light passes or is scattered back, with the likely reason; empty for other pictures.
 
     Parameters
     ----------
@@ -402,13 +409,13 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
     """
     visible = frame.coverage & frame.valid
     if not visible.any():
-        return
+        return ""
     from translucent.planning.remarks import scattered_back
 
     passed = float(frame.transmittance[visible].mean())
     media = [body.medium for body in scene.bodies if body.medium is not None and body.has_interface]
     if passed >= NEARLY_BLACK or any(scattered_back(scene, one) >= HARDLY_LIT for one in media if one.scatters):
-        return
+        return ""
     depth = frame.optical_depth[visible].astype(np.float64)
     low, high = (
         np.min([body.bounds[0] for body in scene.bodies], 0),
@@ -421,28 +428,26 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
     # How much clearer the medium would have to be for a fifth to pass.
     times = float(f"{clearest / math.log(5.0):.2g}")
     clearer = f"in a medium {times:.3g} times as clear (a color at a --distance so much longer), a fifth would pass"
-    echo(
-        f"warning: only {passed:.2%} of the light passes: the model is {extent_text(high - low)} and "
+    return (
+        f"only {passed:.2%} of the light passes: the model is {extent_text(high - low)} and "
         f"{short_length(thickness)} thick at the median, and this medium leaves a tenth of the light after "
         f"{short_length(tenth)}; "
-        f"{_other_unit(high - low, depth, unit, own) or clearer}",
-        err=True,
+        f"{_other_unit(high - low, depth, unit, own) or clearer}"
     )
 
 
-def warn_if_white(frame: Frame, exposure: float, tone: str) -> None:
-    """Warn if much of what media cover is beyond the white of a picture that clamps, with what shows it."""
+def white_text(frame: Frame, exposure: float, tone: str) -> str:
+    """Warning where much of what media cover is beyond the white of a picture that clamps, with what shows it."""
     visible = frame.coverage & frame.valid
     if tone != "none" or not visible.any():
-        return
+        return ""
     bright = frame.radiance[visible].astype(np.float64).min(axis=-1) * 2.0**exposure
     if (fraction := float((bright > WHITE).mean())) < BURNT_OUT:
-        return
+        return ""
     darker = exposure - math.ceil(math.log2(float(np.quantile(bright, 0.95))))
-    echo(
-        f"warning: {fraction:.0%} of what media cover is brighter than white, and shown as white; "
-        f"--tone neutral keeps its shape, and --exposure {darker:g} its brightness",
-        err=True,
+    return (
+        f"{fraction:.0%} of what media cover is brighter than white, and shown as white; "
+        f"--tone neutral keeps its shape, and --exposure {darker:g} its brightness"
     )
 
 

@@ -14,11 +14,11 @@ import click
 from translucent.commands.console import echo
 from translucent.commands.model import (
     SceneRequest,
+    echo_advice,
     file_unit,
     medium_lines,
     read_scene,
     require_translucent,
-    size_lines,
 )
 from translucent.commands.options import (
     BodyOptions,
@@ -33,6 +33,7 @@ from translucent.commands.options import (
     refuse_overwriting,
     stage_option,
     takes,
+    verbose_option,
 )
 from translucent.errors import InputError, RenderError, TranslucentError, message_of
 from translucent.extras import require_package
@@ -156,6 +157,7 @@ class PageOptions:
     )
     simplify: int | None = option(metavar="N", help="Show a copy of the model with about N triangles.")
     overwrite: bool = overwrite_option()
+    verbose: bool = verbose_option()
 
 
 @click.command(epilog="Example: translucent page goblet -o goblet.html --color '#7b1e3a' --distance 1cm")
@@ -222,13 +224,13 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
     echo(f"{output}: {written / 1e6:.2f} MB")
     if given.simplify is not None:
         echo(f"simplified: {before:,} triangles to {triangles(scene):,}")
-    for line in media:
-        echo(f"medium: {line}")
-    for line in size_lines(scene):
-        echo(line)
-    echo(str(planned.plan))
     for note in planned.own_notes:
-        echo(f"  page: {note}")
+        echo(f"page: {note}")
+    if given.verbose:
+        for line in media:
+            echo(f"medium: {line}")
+        echo(str(planned.plan))
+    echo_advice(scene, planned.plan.remarks)
 
 
 def _read_poster(poster: str) -> bytes | None:
