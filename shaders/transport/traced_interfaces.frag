@@ -92,7 +92,9 @@ void main() {
 #if MIRROR
     vec3 reflectance;
     if (mirrored == 1) {
-        out_radiance = out_transmittance = vec4(0.0);
+        // Counted where no interface is before what the ground mirrors.
+        out_radiance = vec4(0.0, 0.0, 0.0, adaptive == 1 && front.w >= NOTHING ? 1.0 : 0.0);
+        out_transmittance = vec4(0.0);
         if (front.w < NOTHING || !begin_in_mirror(pixel, number, texel, direction, ray, primary, reflectance)) { return; }
     } else
 #endif
@@ -108,8 +110,9 @@ void main() {
 #if MIRROR
     if (mirrored == 1) {
         vec3 without = environment_radiance(ray.origin, ray.direction, true, ray.blur);
-        out_radiance = vec4(reflectance * through * (min(light, vec3(NOTHING)) - without), 0.0);
-        out_transmittance.a = -strength(reflectance) / 3.0 * min(traced_lost, 1.0);
+        out_radiance = vec4(reflectance * through * (min(light, vec3(NOTHING)) - without), float(adaptive));
+        float level = clamp(luminance(out_radiance.rgb), -1e15, 1e15);
+        out_transmittance = vec4(adaptive == 1 ? level * level : 0.0, 0.0, 0.0, -strength(reflectance) / 3.0 * min(traced_lost, 1.0));
         return;
     }
 #endif

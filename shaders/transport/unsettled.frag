@@ -1,6 +1,7 @@
 // Pixels whose light from interfaces needs more samples; the others are discarded. After one sample those are whose light differs
 // within 5 x 5 pixels; after several those where the standard error of the mean is large within 3 x 3. Pixels with the edge
-// of an interface take all samples, as every error of their mean shows. Row 0 is the top row.
+// of an interface take all samples, as every error of their mean shows. MIRROR: likewise for the light that bodies add to what the
+// ground mirrors, in samples that hit no interface, as a fraction of all light of these. Row 0 is the top row.
 
 #include <constants>
 #include <View>
@@ -8,7 +9,7 @@
 
 uniform sampler2D bent_light;      // sum over the samples that hit an interface; alpha: how many of them there are so far
 uniform sampler2D bent_spread;     // r: sum of squared luminance
-uniform sampler2D average_light;   // alpha: how many samples hit no interface, of all
+uniform sampler2D average_light;   // sum over the samples that hit no interface; alpha: how many these are
 uniform float samples;             // of a pixel
 uniform float contrast;            // largest range of light near a pixel that one sample is enough for, as a fraction of its mean
 uniform float error;               // largest standard error that is as good as none, likewise
@@ -18,10 +19,10 @@ layout(location = 0) out float unsettled;
 
 void main() {
     ivec2 here = ivec2(gl_FragCoord.xy), last = ivec2(frame_size.xy) - 1;
-    float hits = samples - texelFetch(average_light, here, 0).a, taken = texelFetch(bent_light, here, 0).a;
-    if (taken >= hits) { discard; }
+    float beside = texelFetch(average_light, here, 0).a, taken = texelFetch(bent_light, here, 0).a;
+    if (taken >= (MIRROR == 1 ? beside : samples - beside)) { discard; }
     unsettled = 1.0;
-    if (taken == 0.0 || hits < samples) { return; }
+    if (taken == 0.0 || (MIRROR == 0 && beside > 0.0)) { return; }
     int reach = first == 1 ? 2 : 1;
     vec3 low = vec3(NOTHING), high = vec3(0.0);
     float sum = 0.0, count = 0.0, worst = 0.0;
@@ -34,7 +35,12 @@ void main() {
             low = min(low, mean);
             high = max(high, mean);
             float level = luminance(mean);
+#if MIRROR
+            vec4 all_light = texelFetch(average_light, at, 0);
+            sum += luminance(all_light.rgb) / all_light.a;
+#else
             sum += level;
+#endif
             count += 1.0;
             if (light.a > 1.0) {
                 float variance = max(texelFetch(bent_spread, at, 0).r / light.a - level * level, 0.0);

@@ -113,7 +113,7 @@ def test_the_ground_mirrors_what_a_mirrored_eye_sees(
     with_image = renderer.render(scene, SIZE)
     assert "'mesh' mirrors what stands on it, once" in str(with_image.plan)
     with monkeypatch.context() as patch:
-        patch.setattr("translucent.gpu.passes.traced_interfaces.mirror_of", lambda scene: None)
+        patch.setattr("translucent.gpu.job.mirror_of", lambda scene: None)
         without = renderer.render(scene, SIZE)
     changed = (with_image.radiance - without.radiance)[~with_image.coverage]
     down = np.array([1.0, -1.0, 1.0])

@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from translucent.formulas.sampling import sample_shifts
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, interior_at_eye
+from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, interior_at_eye, mirrored_part
 from translucent.gpu.passes.variants import Variants
-from translucent.gpu.shaders import set_uniform
+from translucent.gpu.placement import Part
+from translucent.gpu.shaders import set_uniform, set_used
 from translucent.gpu.targets import add_up, read_floats
 from translucent.planning.passes import PassName
 
@@ -22,6 +23,10 @@ Floats = npt.NDArray[np.float32]
 #: Of 16 samples: the largest range of light near a pixel that one sample is enough for, and the largest standard error
 #: that is as good as none, both as fractions of the light. With more samples they are smaller.
 CONTRAST, ERROR = 0.1, 0.01
+
+#: The same of the light that bodies add to what a ground mirrors, as fractions of all light of the ground: that is
+#: smooth but for the mirror image, so that less of an error shows.
+MIRROR_CONTRAST, MIRROR_ERROR = 0.01, 0.003
 
 #: Passes of a sample whose results are there, or are not read, when rays are traced from its interfaces.
 _DONE = (PassName.BACKDROP, PassName.CAUSTICS)
@@ -35,7 +40,8 @@ class AdaptiveSampling:
 
     The first round finds for every sample which pixels show an interface, and sums up the light of all others:
     edges are as smooth as ever. The second traces rays; in each pixel, their mean replaces all of its
-    samples that hit an interface. Opaque objects are visible through interfaces as the mean of all samples shows them.
+    samples that hit an interface. Rays that a ground mirrors add their mean to the other samples. Opaque objects are
+    visible through interfaces as the mean of all samples shows them.
 
     Parameters
     ----------
@@ -54,6 +60,8 @@ class AdaptiveSampling:
         clock = _Clock(job, samples)
         job.targets["average"].clear()
         job.targets["bent"].clear()
+        if job.mirror is not None:
+            job.targets["mirrored"].clear()
         job.bent_apart = True
         if job.features.has_opaque:
             job.targets["opaque_mean"].clear()
@@ -90,22 +98,37 @@ class AdaptiveSampling:
 
     def _find_unsettled(self, job: FrameJob, samples: int, taken: int) -> int:
         """Mark the pixels that need more samples than these; returns how many there are."""
-        mask = job.targets["unsettled"]
-        mask.clear()
         if not job.covered:
             return 0
-        light, spread = job.targets["bent"].color_attachments
+        whole = Part(0, 0, *job.targets.size)
+        left = self._mark_unsettled(job, samples, taken, ("bent", "unsettled"), (CONTRAST, ERROR), whole)
+        if job.mirror is not None:
+            part, names = mirrored_part(job, job.mirror), ("mirrored", "mirror_unsettled")
+            left += self._mark_unsettled(job, samples, taken, names, (MIRROR_CONTRAST, MIRROR_ERROR), part)
+        return left
+
+    def _mark_unsettled(
+        self,
+        job: FrameJob,
+        samples: int,
+        taken: int,
+        names: tuple[str, str],
+        most: tuple[float, float],
+        part: Part,
+    ) -> int:
+        """Mark the pixels of a part whose range or standard error of light is larger than that."""
+        source, mask = (job.targets[name] for name in names)
+        mask.clear()
+        light, spread = source.color_attachments
         average = job.targets["average"].color_attachments[0]
         self._unsettled.bind(bent_light=light, bent_spread=spread, average_light=average)
-        program = self._unsettled.program()
+        program = self._unsettled.program(MIRROR=names[0] == "mirrored")
         finer = min(16.0 / samples, 1.0) ** 0.5
-        values = {"samples": samples, "contrast": CONTRAST * finer, "error": ERROR * finer, "first": taken == 1}
-        for name, value in values.items():
-            set_uniform(program, name, value)
-        mask.use()
+        values = {"samples": samples, "contrast": most[0] * finer, "error": most[1] * finer, "first": taken == 1}
+        set_used(program, values)
         self._gl.enable_only(moderngl.NOTHING)
         with self._left:
-            self._unsettled.draw_fullscreen(program)
+            self._unsettled.draw_part(part, program, mask)
         return int(self._left.samples)
 
 
@@ -126,10 +149,14 @@ def read_averages(job: FrameJob, samples: int) -> tuple[Floats, Floats, Floats]:
     light, spread = (read_floats(averages, i, 4) for i in range(2))
     with np.errstate(under="ignore"):
         if job.bent_apart:
-            bent, trusted = read_floats(job.targets["bent"], 0, 4), read_floats(job.targets["bent"], 1, 4)[..., 3]
-            standing_for = (np.float32(samples) - light[..., 3]) / np.maximum(bent[..., 3], np.float32(1.0))
-            light[..., :3] += standing_for[..., None] * bent[..., :3]
-            spread[..., 3] += standing_for * trusted
+            parts = {"bent": np.float32(samples) - light[..., 3]}
+            if job.mirror is not None:
+                parts["mirrored"] = light[..., 3].copy()
+            for name, samples_of in parts.items():
+                found, trusted = read_floats(job.targets[name], 0, 4), read_floats(job.targets[name], 1, 4)[..., 3]
+                standing_for = samples_of / np.maximum(found[..., 3], np.float32(1.0))
+                light[..., :3] += standing_for[..., None] * found[..., :3]
+                spread[..., 3] += standing_for * trusted
         count = np.float32(samples)
         return light[..., :3] / count, spread[..., :3] / count, spread[..., 3] / count
 
@@ -151,7 +178,8 @@ def _central_first(samples: int) -> list[tuple[float, float]]:
 def _left_out(job: FrameJob) -> tuple[PassName, ...]:
     """Passes of a sample that tracing its rays does not need."""
     features = job.features
-    if job.plan.ordered or features.emits or features.scatters or not features.one_interface:
+    # Of what the ground mirrors, media without an interface may absorb some.
+    if job.plan.ordered or features.emits or features.scatters or not features.one_interface or job.mirror is not None:
         return _DONE
     return tuple(step.name for step in job.plan.passes if step.name not in _NEEDED)
 

@@ -59,6 +59,7 @@ from translucent.gpu.uniforms import (
 from translucent.planning.passes import PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.backdrop import Backdrop
+from translucent.scene.grounds import Mirror, mirror_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,6 +305,11 @@ class FrameJob(CameraView):
     def diffused_light(self) -> DiffusedTexture | None:
         """Light that diffuses in bodies; None where it does not."""
         return self.resources.diffusion.of(self.plan)
+
+    @cached_property
+    def mirror(self) -> Mirror | None:
+        """Ground that mirrors the bodies."""
+        return mirror_of(self.scene) if self.features.has_opaque else None
 
     @property
     def diffused_rows(self) -> dict[int, dict[str, npt.ArrayLike]]:

@@ -15,12 +15,12 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches
-from translucent.gpu.placement import extents, part_of
+from translucent.gpu.placement import Part, extents, part_of
 from translucent.gpu.shaders import set_used
 from translucent.gpu.uniforms import media_center
 from translucent.planning.passes import PassSpec
 from translucent.planning.rendered import Treatment, treatment_of
-from translucent.scene.grounds import Mirror, ground_of, mirror_of
+from translucent.scene.grounds import Mirror, ground_of
 from translucent.scene.scene import Scene
 
 _SAMPLERS = (
@@ -81,13 +81,13 @@ class TracedInterfacesPass:
         gl.blend_func = moderngl.ONE, moderngl.ONE
         record = interior_at_eye(job)
         gl.enable_only(blending)
-        mirror = mirror_of(job.scene) if job.features.has_opaque else None
+        mirror = job.mirror
         if not any(record):
             if job.bending:
-                self._mark_unsettled(job, framebuffer)
+                self._mark_unsettled(job)
             else:
                 self._no_interface.draw(job, framebuffer, blending)
-            if not job.covered or (job.bent_apart and not job.bending and mirror is None):
+            if not job.covered or (job.bent_apart and not job.bending):
                 return
         stack = ExitStack()
         textures, scene_values = traced_scene(job, stack)
@@ -111,20 +111,24 @@ class TracedInterfacesPass:
         if mirror is not None and not any(record):
             # What is drawn next finds zeros. Software rasterizers compile a program again for every other state.
             gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
-        if job.bending or not job.bent_apart:
-            self._variants.draw_covered(job, program, framebuffer, top_first=True)
-        if mirror is not None and not job.bending:
+        self._variants.draw_covered(job, program, framebuffer, top_first=True)
+        if mirror is not None:
             self._draw_mirrored(job, mirror, framebuffer, program)
         gl.enable_only(blending)
         stack.close()
 
-    def _mark_unsettled(self, job: FrameJob, framebuffer: moderngl.Framebuffer) -> None:
-        """Leave a depth test that passes where an interface is visible in a pixel that needs more samples."""
-        entered, unsettled = (t.color_attachments[0] for t in (job.targets["entered"], job.targets["unsettled"]))
-        self._where_unsettled.bind(entered=entered, unsettled=unsettled)
+    def _mark_unsettled(self, job: FrameJob) -> None:
+        """Leave depths that let pass pixels that need more samples: of interfaces, and of what a ground mirrors."""
+        marked = [("unsettled", "bent", job.covered.flipped(job.targets.size[1]))]
+        if job.mirror is not None:
+            marked.insert(0, ("mirror_unsettled", "mirrored", mirrored_part(job, job.mirror)))
         job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         job.gl.depth_func = "1"
-        self._where_unsettled.draw_covered(job, self._where_unsettled.program(), framebuffer, top_first=True)
+        entered = job.targets["entered"].color_attachments[0]
+        for mask, name, part in marked:
+            self._where_unsettled.bind(entered=entered, unsettled=job.targets[mask].color_attachments[0])
+            program = self._where_unsettled.program(MIRROR=name == "mirrored")
+            self._where_unsettled.draw_part(part, program, job.targets[name])
         job.gl.depth_func = "<"
 
     def _draw_mirrored(
@@ -136,14 +140,11 @@ class TracedInterfacesPass:
         height = mirror.height - float(mirror.normal @ media_center(job.scene))
         mirroring = surface.roughness, surface.ior
         set_used(program, {"mirrored": 1, "mirror_plane": (*mirror.normal, height), "mirror_surface": mirroring})
-        twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
-        width, rows = job.targets.size
-        boxes, radii = np.array([twin.bounds for twin in twins]), np.array([twin.radius for twin in twins])
-        edges = extents(boxes, radii, job.scene.camera, (width, rows))
-        visible = edges[:, 2] > edges[:, 0]
-        edges[visible] += MIRROR_ROOM * rows * np.array([-1.0, -1.0, 1.0, 1.0])
-        part = part_of(edges, (0.0, 0.0), (width, rows)).flipped(rows)
+        part = mirrored_part(job, mirror)
         if not part:
+            return
+        if job.bending:
+            self._variants.draw_part(part, program, job.targets["mirrored"])
             return
         # The state of the first interfaces, and depths that let all pass.
         job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
@@ -201,6 +202,17 @@ def _shows_more(job: FrameJob) -> bool:
     """True if the picture has photons or shadows on opaque objects that rays do not look up."""
     shadows = interface_shadow_switches(job)["SHADOW_MAPS"]
     return job.features.has_caustics or (job.features.has_shadow_maps and not shadows)
+
+
+def mirrored_part(job: FrameJob, mirror: Mirror) -> Part:
+    """Pixels in which a ground may mirror bodies. Row 0 is the top row."""
+    twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
+    width, rows = job.targets.size
+    boxes, radii = np.array([twin.bounds for twin in twins]), np.array([twin.radius for twin in twins])
+    edges = extents(boxes, radii, job.scene.camera, (width, rows))
+    visible = edges[:, 2] > edges[:, 0]
+    edges[visible] += MIRROR_ROOM * rows * np.array([-1.0, -1.0, 1.0, 1.0])
+    return part_of(edges, (0.0, 0.0), (width, rows)).flipped(rows)
 
 
 def _footprint(job: FrameJob) -> dict[str, float]:
