@@ -4,6 +4,7 @@
 // Needs <constants>. Points count from the center of the media; normals are unit vectors.
 
 #include <Lights>
+#include "shade/ground_map.glsl"
 
 #if SHADOW_MAPS
 #include <Shadows>
@@ -140,6 +141,16 @@ bool in_sky_map(int number, vec3 point) {
     return max(abs(dot(sky_views[4 * number], vec4(point, 1.0))), abs(dot(sky_views[4 * number + 1], vec4(point, 1.0)))) < 1.0;
 }
 
+#if GROUND_SHADOWS
+uniform sampler2D ground_shadows;  // fraction of the light of the environment that bodies take from a ground
+uniform vec4 ground_rows[2];       // position on the ground, from a point
+
+// Fraction of the light of the environment that reaches a point of the ground.
+vec3 environment_reaching(vec3 point, vec3 normal) {
+    vec2 at = vec2(dot(ground_rows[0], vec4(point, 1.0)), dot(ground_rows[1], vec4(point, 1.0)));
+    return 1.0 - textureLod(ground_shadows, 0.5 + 0.5 * squeezed(at), 0.0).rgb;
+}
+#else
 // Share of the light of the environment that reaches a surface.
 vec3 environment_reaching(vec3 point, vec3 normal) {
     if (sky_count == 0) { return vec3(1.0); }
@@ -164,6 +175,7 @@ vec3 environment_reaching(vec3 point, vec3 normal) {
     }
     return mix(vec3(1.0), (alone ? 1.0 : float(step)) * reaching / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
 }
+#endif
 #else
 float light_unblocked(int light, vec3 point, vec3 normal) { return 1.0; }
 vec3 light_reaching(int light, vec3 point, vec3 normal) { return vec3(1.0); }

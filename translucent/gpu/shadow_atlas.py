@@ -227,6 +227,25 @@ class ShadowMapKey:
         return self.places == other.places and (self.media == other.media or (path_only and self.slots == other.slots))
 
 
+@dataclass(frozen=True, eq=False)
+class GroundShadows:
+    """Map of the environment's shadows on a ground; see ``shaders/shade/ground_map.glsl``.
+
+    Attributes
+    ----------
+    number : int
+        Of the object that is the ground.
+    texture : moderngl.Texture
+        Fraction of the light of the environment that bodies take, by channel.
+    rows : tuple of 2 tuples of 4 floats
+        Position on the ground, from a point that counts from the center of the media.
+    """
+
+    number: int
+    texture: moderngl.Texture
+    rows: tuple[tuple[float, ...], ...]
+
+
 class ShadowAtlas:
     """Textures with all maps: what rays of lights go through, and where each hits the first opaque surface.
 
@@ -243,6 +262,8 @@ class ShadowAtlas:
         opaque objects end some.
     two_media : bool
         The maps are paths in two media (RG32F).
+    ground : GroundShadows, optional
+        What the maps of the environment make of a ground, in the frame that is being drawn.
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
@@ -253,6 +274,7 @@ class ShadowAtlas:
         self.drawn: set[ShadowView] = set()
         self.views: ShadowViews | None = None
         self.spectral = self.two_media = False
+        self.ground: GroundShadows | None = None
 
     def make(self, views: ShadowViews, *, spectral: bool, two_media: bool = False) -> None:
         """Make room for maps; what the textures held is lost.

@@ -59,21 +59,28 @@ def ground_of(scene: Scene) -> Mirror | None:
     return next((found for item in scene.opaque if item.shadow_catcher and (found := _flat(item))), None)
 
 
-def lit_side(scene: Scene) -> Array | None:
-    """Normal of all that a scene shows of opaque surfaces, where that is the upper side of a ground; None elsewhere.
-
-    Bodies stand on it, so that no ray sees it from below.
-    """
-    if len(scene.opaque) != 1 or (ground := ground_of(scene)) is None:
+def ground_from_above(scene: Scene) -> Mirror | None:
+    """Ground of a scene that is viewed from above, and lit from there alone with one normal; None elsewhere."""
+    if (ground := ground_of(scene)) is None:
         return None
     surface, eye = ground.ground.surface, scene.camera.eye
     if surface is not None and (surface.normal_texture is not None or surface.diffuse_transmission > 0):
         return None
     level = scene.camera.fov_y is None
     above = -float(scene.camera.forward @ ground.normal) if level else float(eye @ ground.normal) - ground.height
+    return ground if above > 0 else None
+
+
+def lit_side(scene: Scene) -> Array | None:
+    """Normal of all that a scene shows of opaque surfaces, where that is the upper side of a ground; None elsewhere.
+
+    Bodies stand on it, so that no ray sees it from below.
+    """
+    if len(scene.opaque) != 1 or (ground := ground_from_above(scene)) is None:
+        return None
     low, high = scene.boxes[scene.filled][:, 0], scene.boxes[scene.filled][:, 1]
     lowest = np.where(ground.normal > 0, low, high) @ ground.normal - ground.height
-    return ground.normal if above > 0 and (lowest >= -SUNK * scene.diagonal).all() else None
+    return ground.normal if (lowest >= -SUNK * scene.diagonal).all() else None
 
 
 def _is_smooth(item: Object) -> bool:

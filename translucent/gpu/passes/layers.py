@@ -73,6 +73,7 @@ class LayersPass:
             BODIES=bodies,
             SHADOW_MAPS=0,
             SHADOW_SPECTRAL=0,
+            GROUND_SHADOWS=0,
             **look_switches(body),
             **coat_switches([body]),
         )

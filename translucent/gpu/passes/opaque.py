@@ -15,7 +15,15 @@ from translucent.planning.passes import PassSpec
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS
 from translucent.scene.surface import TEXTURE_FIELDS, Surface
 
-_MAPS = ("light_irradiance", "light_map", "light_levels", "reflectance_table", "shadow_sums", "shadow_ends")
+_MAPS = (
+    "light_irradiance",
+    "light_map",
+    "light_levels",
+    "reflectance_table",
+    "shadow_sums",
+    "shadow_ends",
+    "ground_shadows",
+)
 #: Samplers of ``shaders/shade/opaque_surface.glsl``.
 SURFACE_SAMPLERS = *_MAPS, *TEXTURE_FIELDS
 
@@ -48,7 +56,9 @@ class OpaquePass:
         common |= shadow_switches(job.features.has_shadow_maps, job.resources)
         if light_map:
             job.resources.environments.light(environment).irradiance.use(self._plain.units["light_irradiance"])
+        ground = job.resources.shadows.ground if job.features.has_shadow_maps else None
         for i in spec.objects[::-1]:
+            common["GROUND_SHADOWS"] = ground is not None and ground.number == i
             if (surface := job.scene.objects[i].surface) is None:
                 program = self._plain.program(
                     WITH_NORMAL=1,
@@ -66,6 +76,10 @@ class OpaquePass:
                 program = self._surfaced.program(SURFACE=1, **common, **looks)
                 self._surfaced.bind(**job.resources.light_textures(environment))
                 set_surface(job, program, surface, surface.alpha_cutoff)
+            if common["GROUND_SHADOWS"]:
+                assert ground is not None
+                ground.texture.use(self._plain.units["ground_shadows"])
+                set_uniform(program, "ground_rows", ground.rows)
             job.draw(program, (i,))
         job.gl.depth_func = "<"
 
@@ -79,7 +93,7 @@ class OpaquePass:
         framebuffer.use()
         view.gl.enable_only(moderngl.DEPTH_TEST)
         common = {"LIGHT_MAP": False, "DEPTH_ONLY": True, "PROJECTED_DEPTH": projected}
-        common |= {"SHADOW_MAPS": False, "SHADOW_SPECTRAL": False} | coat_switches(())
+        common |= shadow_switches(False, view.resources) | coat_switches(())
         for i in objects:
             surface = view.scene.objects[i].surface
             if surface is None or not surface.alpha_cutoff:
@@ -93,7 +107,8 @@ class OpaquePass:
 
 def shadow_switches(used: bool, resources: Resources) -> dict[str, bool]:
     """Switches of ``shaders/shade/shadows.glsl``."""
-    return {"SHADOW_MAPS": used, "SHADOW_SPECTRAL": used and resources.shadows.spectral}
+    spectral = used and resources.shadows.spectral
+    return {"SHADOW_MAPS": used, "SHADOW_SPECTRAL": spectral, "GROUND_SHADOWS": False}
 
 
 def interface_shadow_switches(job: FrameJob) -> dict[str, bool]:

@@ -18,6 +18,7 @@ from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
 from translucent.gpu.light_cameras import ShadowOccluders, holds_eye, light_key, objects_key, support_of
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
+from translucent.gpu.passes.ground_shadows import GroundShadowsPass
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
@@ -32,7 +33,7 @@ from translucent.media.medium import Medium
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import MapPlan, RenderPlan
 from translucent.planning.rendered import darkened, occluding_bodies
-from translucent.scene.grounds import lit_side
+from translucent.scene.grounds import Mirror, ground_from_above, lit_side
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light, Scene
 from translucent.scene.shadow_directions import shadow_directions
@@ -116,6 +117,7 @@ class ShadowMapsPass:
         #: What the first of the lights see, where frames that follow find the rest.
         self._looked_at: tuple[object, list[SeenFrom]] = None, []
         self._plans: dict[Hashable, RenderPlan] = {}
+        self._ground = GroundShadowsPass(gl)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Render those of the maps that the frame reads and that are not there, and write the uniforms.
@@ -140,8 +142,10 @@ class ShadowMapsPass:
             map_key, first, step, few = replace(map_key, step=step), 0, 1, False  # no more than these
         elif atlas.held is not None and atlas.held.step > 1:
             atlas.held = None
-        if atlas.held is None or not atlas.drawn.issuperset(_read(job, atlas.views, first, step)):
-            self._render(job, map_key, first, step)
+        ground = _mapped_ground(job)
+        looked_at = (first, step) if few or ground is None else (0, 1)
+        if atlas.held is None or not atlas.drawn.issuperset(_read(job, atlas.views, *looked_at)):
+            self._render(job, map_key, *looked_at)
         assert atlas.views is not None
         center = media_center(scene)
         media = _slots(scene)[1] if atlas.two_media else [occluding_bodies(scene)[0].medium]
@@ -154,6 +158,11 @@ class ShadowMapsPass:
         irradiance = shadow_directions(scene.environment, count)[1][:: atlas.held.step] if count else np.zeros((0, 3))
         job.uniforms.add(SKY_SHADOWS, atlas.views.sky_uniforms(center, irradiance))
         job.uniforms.bind()
+        atlas.ground = None
+        if ground is not None:
+            made_of = map_key, extinctions.tobytes()
+            directions = range(looked_at[0], len(atlas.views.sky), looked_at[1])
+            atlas.ground = self._ground.run(job, ground, irradiance, directions, made_of)
 
     def _render(self, job: FrameJob, map_key: ShadowMapKey, first: int, step: int) -> None:
         """Render the maps of lights, and of every so-many-th direction of the environment."""
@@ -256,6 +265,13 @@ class ShadowMapsPass:
         if name not in self._made:
             self._made[name] = _STEPS[name](self._gl).run
         return self._made[name]
+
+
+def _mapped_ground(job: FrameJob) -> Mirror | None:
+    """Ground whose shadows of the environment are found once for all samples; None where they are not."""
+    if job.bending or job.any_eye or not job.scene.environment_shadows or not job.plan.has(PassName.OPAQUE):
+        return None
+    return ground_from_above(job.scene)
 
 
 def _read(job: FrameJob, views: ShadowViews | None, first: int, step: int) -> list[ShadowView]:
