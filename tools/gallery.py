@@ -27,7 +27,7 @@ OVERVIEW = ("wine", "jade", "soap", "bears", "amber", "candle")
 TILE = (320, 240)
 
 #: A picture of docs/pictures/ that a page shows.
-SHOWN = re.compile(r"\(\.\./pictures/(\w+)\.jpg\)")
+SHOWN = re.compile(r"\((?:\.\./)?pictures/(\w+)\.jpg\)")
 
 #: Of a picture on a page.
 SMALL = ["--size", "480x320", "--samples", "8"]
@@ -42,7 +42,7 @@ def commands(page: str) -> dict[str, str]:
 def pages() -> dict[str, str]:
     """All commands that draw pictures of pages."""
     found = {}
-    for page in sorted((ROOT / "docs" / "guides").glob("*.md")):
+    for page in (ROOT / "docs" / "commands.md", *sorted((ROOT / "docs" / "guides").glob("*.md"))):
         found.update(commands(page.read_text(encoding="utf-8")))
     return found
 
