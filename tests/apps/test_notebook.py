@@ -140,6 +140,36 @@ def test_the_widget_brings_all_that_the_browser_needs(view: Any, script: Path) -
     )
 
 
+def test_the_material_is_in_the_state_that_marimo_shows_as_a_value(view: Any) -> None:
+    def shown() -> list[Any]:
+        state = view.get_state()
+        return [state[name] for name in ("medium", "color", "distance", "ior", "roughness", "preset")]
+
+    assert shown() == [0, view.color, view.distance, 1.0, 0.0, None]
+    view.preset = "whisky"
+    whisky = tl.preset("whisky")
+    assert shown()[3:] == [whisky.medium.ior, whisky.roughness, "whisky"]
+    # A change in the browser, where only what is kept of each medium comes from.
+    view.set_state({"_media": [{**view._media[0], "ior": 1.7}]})
+    assert shown()[3:] == [1.7, whisky.roughness, None]
+
+
+def test_a_view_of_a_preset_that_hardly_scatters_has_its_name_and_keeps_its_scene(script: Path) -> None:
+    pytest.importorskip("anywidget", reason="anywidget is not installed (extra notebook)")
+    merlot = tl.preset("merlot").medium
+    assert merlot.scatters
+    scene = tl.showcase(
+        tl.Mesh(BOX.vertices, BOX.faces, name="box"), merlot, SIZE, lights=[tl.DirectionalLight((0, -1, 0), 1)]
+    )
+    made = tl.view(scene, SIZE)
+    assert made.preset == "merlot"
+    assert made.scene.objects[0].medium is merlot
+    made.ior = 1.5
+    assert made.preset is None
+    assert made.scene.objects[0].medium == tl.Medium(merlot.extinction, ior=1.5)
+    made.close()
+
+
 def test_a_material_of_python_goes_to_the_browser(view: Any) -> None:
     view.set_material(color=(0.3, 0.5, 0.9), distance=0.02, ior=1.3, roughness=0.25)
     (told,) = view.get_state("_media")["_media"]
@@ -211,7 +241,7 @@ def test_a_medium_that_the_viewer_keeps_is_told(script: Path, data: bytes, monke
     pytest.importorskip("anywidget", reason="anywidget is not installed (extra notebook)")
     from translucent.notebook import view as module
 
-    told = [{"extinction": [51, 51, 51], "ior": 1, "roughness": 0, "distance": 0.01}] * 2
+    told = [{"extinction": [51, 51, 51], "ior": 1, "roughness": 0, "distance": 0.01, "preset": ""}] * 2
     monkeypatch.setattr(module, "payload", lambda *_: data)
     monkeypatch.setattr(module, "header_of", lambda _: {"scene": {"media": told}})
     mesh, moved = tl.Mesh(BOX.vertices, BOX.faces, name="box"), trimesh.transformations.translation_matrix((0.1, 0, 0))
@@ -219,7 +249,7 @@ def test_a_medium_that_the_viewer_keeps_is_told(script: Path, data: bytes, monke
     view = tl.view(tl.Scene([tl.Object(mesh, medium=WINE), milk], tl.Camera.look_at((0, 0, 1), (0, 0, 0))), SIZE)
     view.color = "#7b1e3a"
     assert view._media[0] != told[0]
-    assert view._media[1] == told[1]
+    assert view._media[1] == {key: told[1][key] for key in view._media[1]}
     view.medium = 1
     assert view.color == to_hex(tl.Medium(absorption=51).transmittance(0.01))
     with pytest.raises(tl.InputError, match=r"medium 1 of a view; This medium scatters light"):

@@ -161,6 +161,33 @@ def test_turning_probing_and_loss(web_page: WebPage, web_dist: Path, tmp_path: P
     assert page.evaluate("viewer.probe(0.5, 0.5)")["covered"]
 
 
+def test_an_absorber_that_scatters_a_little_has_its_thickness(
+    web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str
+) -> None:
+    """Pages follow no light into media: what little is scattered is left out and told, and nothing is invalid."""
+    merlot = tl.preset("merlot")
+    assert merlot.medium.scatters
+    scene = scene_of(ball(merlot.medium), lights=[tl.DirectionalLight((-0.4, -1, -0.3), 2.0)])
+    opened(web_page, scene, tmp_path, tools)
+    page = web_page.page
+    page.wait_for_function("async () => (window.viewer = await translucent).still")
+    found = page.evaluate("viewer.probe(0.5, 0.5)")
+    assert found["valid"]
+    assert found["thickness"] == pytest.approx(0.04, rel=2e-3)
+    assert found["transmittance"] == pytest.approx(merlot.medium.transmittance(found["thickness"]), rel=1e-4)
+    notes = page.locator(".notes li").all_text_contents()
+    assert any("scattered in 'ball.ply'" in note for note in notes)
+    preset = page.locator("#preset")
+    chosen = "(field) => field.selectedOptions[0].text"
+    assert preset.evaluate(chosen) == "merlot, as written"
+    assert preset.is_enabled()
+    page.locator("#ior-number").fill("1.2")
+    page.keyboard.press("Enter")
+    assert preset.evaluate(chosen) == "of your own"
+    page.locator(".stage canvas").press("m")
+    assert preset.evaluate(chosen) == "merlot, as written"
+
+
 def fields_show_what_is_kept(page: Any) -> None:
     """Numbers out of range, and presets that something else has changed, do not stay on the panel."""
     for field, entered, shown in (
@@ -205,6 +232,18 @@ def test_touch_on_a_phone(chromium: Any, web_dist: Path, tmp_path: Path) -> None
             touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
         page.page.wait_for_function("(eye) => Math.abs(viewer.state().camera.eye[0] - eye[0]) > 1e-3", arg=before)
         assert page.run("() => document.documentElement.scrollHeight") <= 844
+        line = page.page.locator(".at")
+        assert "Point at the model, or tap it" in line.inner_text()  # a finger that turns reads nothing
+        page.page.wait_for_function("() => viewer.still")
+        page.page.touchscreen.tap(canvas["x"] + canvas["width"] / 2, canvas["y"] + canvas["height"] / 2)
+        page.page.wait_for_function("() => viewer.still && viewer.panel.pointer")
+        thickness = page.run("() => viewer.probe(0.5, 0.5).thickness")
+        assert thickness == pytest.approx(0.04, rel=2e-3)
+        assert f"{1e3 * thickness:.2f} mm" in line.inner_text()
+        # It stays: no finger is there any more, and what is read follows the view.
+        page.run("() => viewer.setCamera({ eye: [0.05, 0.06, 0.12], target: [0, 0, 0], up: [0, 1, 0] })")
+        page.page.wait_for_function("() => viewer.still")
+        assert "mm" in line.inner_text()
         assert page.errors == []
     finally:
         page.close()

@@ -166,4 +166,4 @@ def view(
     mesh = (scene.bodies or scene.objects)[0].mesh
     data = payload(planned, mesh.name, check_size(size), VIEW_SAMPLES, exposure, tone)
     values = header_of(data)["scene"]["media"]
-    return SceneView(scene, data, script.read_text(encoding="utf-8"), values, size[1])
+    return SceneView(planned, data, script.read_text(encoding="utf-8"), values, size[1])

@@ -1,7 +1,8 @@
 """Widget of a scene: what the browser knows of media and camera, and the traits that Python sees of it.
 
 Two traits go to the browser and come back: ``_media``, a dict of extinction, ior, roughness and distance for each
-medium, and ``_camera``. All others are views of these, so that a change means the same whichever side it comes from.
+medium, and ``_camera``. All others are views of these, so that a change means the same whichever side it comes from;
+those of the material go to the browser, too, since a `value` in marimo holds what does.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from translucent.formulas.color import to_hex
 from translucent.media.colors import parse_color
 from translucent.media.medium import BLACKEST, Medium, extinction_at
 from translucent.media.presets import preset as named_preset
-from translucent.page.plans import editable
+from translucent.page.plans import PagePlan, editable
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
@@ -64,22 +65,24 @@ class SceneView(Widget):  # type: ignore[misc]
     _moved = traitlets.Bool(False).tag(sync=True)
     problem = traitlets.Unicode("").tag(sync=True)
 
-    medium = traitlets.Int(0)
-    color = traitlets.Any()
-    distance = traitlets.Float()
-    ior = traitlets.Float()
-    roughness = traitlets.Float()
-    preset = traitlets.Unicode(None, allow_none=True)
+    medium = traitlets.Int(0).tag(sync=True)
+    color = traitlets.Any().tag(sync=True)
+    distance = traitlets.Float().tag(sync=True)
+    ior = traitlets.Float().tag(sync=True)
+    roughness = traitlets.Float().tag(sync=True)
+    preset = traitlets.Unicode(None, allow_none=True).tag(sync=True)
     camera = traitlets.Instance(Camera)
 
-    def __init__(self, scene: Scene, payload: bytes, script: str, media: list[Json], height: int) -> None:
-        self._scene, self._quiet = scene, True
+    def __init__(self, planned: PagePlan, payload: bytes, script: str, media: list[Json], height: int) -> None:
+        scene = planned.scene
+        self._planned, self._scene, self._quiet = planned, scene, True
         self._bodies = _users(scene)
         self._exact = np.ones(3)  # the color, which hexadecimal digits round
         super().__init__(_esm=script, _payload=payload, _height=height, camera=scene.camera)
         self._label = f"Interactive view of a {repr(scene)[:1].lower()}{repr(scene)[1:]}"
         self._camera = _camera_values(scene, scene.camera)
         self._media = [{key: values[key] for key in ("extinction", "ior", "roughness", "distance")} for values in media]
+        self.preset = media[0]["preset"] or None
         self._show()
 
     # What Python sees
@@ -92,10 +95,11 @@ class SceneView(Widget):  # type: ignore[misc]
     @property
     def scene(self) -> Scene:
         """The scene with the media and the camera that are shown."""
-        objects = list(self._scene.objects)
+        objects = [self._planned.given_body(body) for body in self._scene.objects]
         for bodies, values in zip(self._bodies, self._media, strict=True):
             for body in bodies:
-                objects[self._scene.objects.index(body)] = _changed(body, values)
+                if (changed := _changed(body, values)) is not body:
+                    objects[self._scene.objects.index(body)] = changed
         return dataclasses.replace(self._scene, objects=objects, camera=self.camera)
 
     def set_material(self, **values: Any) -> None:

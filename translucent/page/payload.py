@@ -28,7 +28,7 @@ from translucent.gpu.uniforms import BodyRoles, bounded_extinction, media_center
 from translucent.media.medium import Medium
 from translucent.media.presets import presets
 from translucent.page.plans import PagePlan, current, editable, variant
-from translucent.scene.scene import Scene
+from translucent.scene.scene import Object, Scene
 from translucent.version import VERSION
 
 #: First bytes of a container.
@@ -218,9 +218,18 @@ def _medium_entry(planned: PagePlan, medium: Medium) -> dict[str, Any]:
         "ior": medium.ior,
         "roughness": 0.0 if first.surface is None else first.surface.roughness,
         "distance": planned.panel_distance(first),
+        "preset": _preset_of(planned, first),
         "editable": not why,
         "why": why,
     }
+
+
+def _preset_of(planned: PagePlan, body: Object) -> str:
+    """Name of the preset that a body was given; nothing if its medium is of none."""
+    given = planned.given_body(body)
+    roughness = 0.0 if given.surface is None else given.surface.roughness
+    found = (name for name, one in presets().items() if (one.medium, one.roughness) == (given.medium, roughness))
+    return next(found, "")
 
 
 def _presets_entry() -> list[dict[str, Any]]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
+from translucent.media.medium import Medium
 from translucent.planning.interfaces import FrontInterface
 from translucent.planning.methods import DepthPeeling
 from translucent.planning.passes import Note, NoteKind, PassName
@@ -15,7 +18,7 @@ from translucent.planning.plan import plan_scene
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.request import RenderRequest
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS
-from translucent.scene.scene import Object, Scene, check_scene
+from translucent.scene.scene import Object, Scene, check_scene, object_names
 from translucent.scene.surface import Surface
 
 #: Triangles that a mesh keeps in any case.
@@ -142,6 +145,8 @@ class PagePlan:
         As the planner gets it.
     distance : float, optional
         In metres, at which panels show colors of media at first. Default: as far as each body is thick.
+    given : Scene, optional
+        The scene before pages left anything out of it; its objects have the same numbers. Default: `scene`.
     """
 
     scene: Scene
@@ -149,6 +154,17 @@ class PagePlan:
     request: RenderRequest
     texture_units: int
     distance: float | None = None
+    given: Scene | None = None
+
+    def given_body(self, body: Object) -> Object:
+        """A body of the scene as it was given."""
+        return body if self.given is None else self.given.objects[list(self.scene.objects).index(body)]
+
+    @property
+    def unlit(self) -> tuple[Object, ...]:
+        """Bodies as they were given, whose scattered light the page leaves out."""
+        given = (self.given_body(body) for body in self.scene.objects)
+        return tuple(one for one, body in zip(given, self.scene.objects, strict=True) if one is not body)
 
     @property
     def notes(self) -> tuple[Note, ...]:
@@ -159,6 +175,14 @@ class PagePlan:
     def own_notes(self) -> tuple[Note, ...]:
         """Notes on the page itself, beside those of the plan."""
         found = []
+        if self.unlit:
+            media = [body.medium for body in self.unlit if body.medium is not None]
+            most = max(float(_albedo(medium).max()) for medium in media)
+            text = (
+                f"light that is scattered in {object_names(self.unlit)}: up to {most:.0%} of what a ray loses there; "
+                "thickness and transmittance are exact"
+            )
+            found.append(Note(NoteKind.UNLIT, text))
         if (count := triangles(self.scene)) > MANY_TRIANGLES:
             text = f"{count:,} triangles load and turn slowly in a browser: --simplify 300000 shows a coarser copy"
             found.append(Note(NoteKind.MANY_TRIANGLES, text))
@@ -204,7 +228,29 @@ def plan_page(scene: Scene, request: RenderRequest | None = None) -> PagePlan:
     if found.has(PassName.SURFACES):
         units = TEXTURE_UNITS
         found = _planned(scene, request, units)
-    return PagePlan(scene, found, request, units)
+    given = scene
+    if found.has(PassName.UNLIT):
+        numbers = {i for step in found.passes if step.name is PassName.UNLIT for i in step.objects}
+        scene = _absorbing(scene, numbers)
+        found = _planned(scene, request, units)
+    return PagePlan(scene, found, request, units, given=given)
+
+
+def _absorbing(scene: Scene, numbers: Container[int]) -> Scene:
+    """Scene in which these bodies absorb what they would scatter: pages follow no light from lights into media."""
+    media: dict[Medium, Medium] = {}  # bodies that share a medium go on to
+
+    def changed(body: Object) -> Object:
+        assert body.medium is not None
+        own = Medium(body.medium.extinction, emission=scene.source(body), ior=body.medium.ior)
+        return replace(body, medium=media.setdefault(own, own))
+
+    return replace(scene, objects=[changed(body) if i in numbers else body for i, body in enumerate(scene.objects)])
+
+
+def _albedo(medium: Medium) -> Array:
+    extinction = medium.extinction
+    return np.asarray(medium.scattering) / np.where(extinction > 0, extinction, 1.0)
 
 
 def _planned(scene: Scene, request: RenderRequest, units: int) -> RenderPlan:

@@ -2,6 +2,9 @@
 
 import { colorAfter, hexOf } from "./material.js";
 
+/** CSS pixels by which a finger that taps may move. */
+const TAP = 10;
+
 const UNITS = { mm: 1e-3, cm: 1e-2, m: 1 };
 
 const STYLE = `
@@ -72,7 +75,7 @@ details dt { color: #d6d8dc; } details dd { margin: 0; }
 const BODY = `
 <div class="layout">
   <div class="stage"><canvas tabindex="0" role="img"></canvas><div class="busy"></div><div class="told" role="status"></div></div>
-  <div class="probe"><span class="at">Point at the model: thickness and transmittance</span><span class="grow"></span><span class="quality wide"></span></div>
+  <div class="probe"><span class="at">Point at the model, or tap it: thickness and transmittance</span><span class="grow"></span><span class="quality wide"></span></div>
   <div class="panel">
     <h1></h1>
     <div class="segments" role="group" aria-label="View">
@@ -97,7 +100,7 @@ const BODY = `
     <div class="buttons"><button data-do="view">Reset view</button><button data-do="material">Reset material</button></div>
     <details class="notes"><summary></summary><ul></ul></details>
     <details class="keys"><summary>Keys and gestures</summary><dl>
-      <dt>Drag, arrows</dt><dd>turn</dd><dt>Right drag, two fingers, Shift + arrows</dt><dd>move</dd>
+      <dt>Tap</dt><dd>read thickness</dd><dt>Drag, arrows</dt><dd>turn</dd><dt>Right drag, two fingers, Shift + arrows</dt><dd>move</dd>
       <dt>Wheel, pinch, + and −</dt><dd>closer, farther</dd><dt>T</dt><dd>thickness</dd>
       <dt>R</dt><dd>reset the view</dd><dt>M</dt><dd>reset the material</dd><dt>P</dt><dd>panel on and off</dd></dl></details>
   </div>
@@ -147,7 +150,7 @@ export class Panel {
     for (const item of this.shadow.querySelectorAll(".several")) item.style.display = media.length > 1 ? "" : "none";
     this.$("#medium").replaceChildren(...media.map((medium, i) => new Option(medium.name, i)));
     this.$("#preset").replaceChildren(
-      new Option("as in the file", ""), ...page.presets.map(({ name }) => new Option(name.replaceAll("_", " "), name)));
+      new Option("as written", ""), ...page.presets.map(({ name }) => new Option(name.replaceAll("_", " "), name)));
     const ramp = this.$(".scale canvas").getContext("2d");
     const colors = page.sections[page.false_colors];
     const row = ramp.createImageData(256, 1);
@@ -172,6 +175,9 @@ export class Panel {
       const field = this.$(id);
       if (entered || field !== active || field.type !== "number") field.value = value;
     };
+    // What the page was written with has a name if it is a preset; others that the list lacks cannot be chosen.
+    const written = told.preset ? `${told.preset.replaceAll("_", " ")}, as written` : "as written";
+    this.$("#preset").options[0].text = medium.changed && !medium.preset ? "of your own" : written;
     set("#preset", medium.preset);
     set("#color", hexOf(colorAfter(medium.extinction, medium.distance)));
     set("#distance", digits(medium.distance / UNITS[this.$("#unit").value], 4));
@@ -215,9 +221,22 @@ export class Panel {
     on('[data-do="view"]', "click", () => viewer.view.reset());
     on('[data-do="material"]', "click", () => viewer.resetMaterial());
     this.canvas.addEventListener("keydown", (event) => this.#key(event));
-    this.canvas.addEventListener("pointermove", (event) => { this.pointer = event; this.#probe(); });
-    this.canvas.addEventListener("pointerdown", (event) => { this.pointer = event; });
-    this.canvas.addEventListener("pointerleave", () => { this.pointer = null; this.#probe(); });
+    // A mouse reads where it is; a finger or a pen what it taps, which stays until the next tap.
+    const mouse = (event) => event.pointerType === "mouse";
+    this.canvas.addEventListener("pointermove", (event) => { if (mouse(event)) this.#point(event); });
+    this.canvas.addEventListener("pointerdown", (event) => { this.down = event; if (mouse(event)) this.pointer = event; });
+    this.canvas.addEventListener("pointerup", (event) => {
+      const { down } = this;
+      const tapped = down?.pointerId === event.pointerId && event.isPrimary
+        && Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) < TAP;
+      if (!mouse(event) && tapped) this.#point(event);
+    });
+    this.canvas.addEventListener("pointerleave", (event) => { if (mouse(event)) this.#point(null); });
+  }
+
+  #point(event) {
+    this.pointer = event;
+    this.#probe();
   }
 
   #key(event) {
@@ -256,13 +275,13 @@ export class Panel {
     const box = this.canvas.getBoundingClientRect();
     const found = event && this.viewer.probe((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
     if (!found) {
-      if (!event) line.textContent = "Point at the model: thickness and transmittance";
+      if (!event) line.textContent = "Point at the model, or tap it: thickness and transmittance";
       return;
     }
     const [red, green, blue] = found.transmittance.map((x) => x.toFixed(3));
     const count = found.layers == null ? `count ${found.count ?? 0}` : `${found.layers} crossings`;
     line.innerHTML = !found.valid
-      ? '<b class="mark">not valid</b>: surfaces here do not bound a volume'
+      ? `<b class="mark">not valid</b>: ${found.layers == null ? "" : "more surfaces lie here than are counted, or "}surfaces here do not bound a volume`
       : `<b>${lengthText(found.thickness)}</b> &nbsp; <span class="chip" style="background:${hexOf(found.transmittance)}"></span> ` +
         `<b>${red} ${green} ${blue}</b><span class="wide"> transmittance &nbsp; ${count}</span>`;
   }
