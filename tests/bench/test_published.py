@@ -6,10 +6,12 @@ import importlib.util
 import json
 import re
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
+
+import translucent as tl
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -98,6 +100,32 @@ def test_rows_are_as_wide_as_their_header(name: str) -> None:
     assert len({line.count("|") for line in TABLES[name]}) == 1
 
 
+@pytest.mark.parametrize(
+    ("built", "failed", "written"), [(True, False, "page"), (False, False, "picture"), (True, True, "")]
+)
+def test_the_front_page_has_a_scene_or_a_picture(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, built: bool, failed: bool, written: str
+) -> None:
+    live = extension("live_scene")
+
+    def web_path(name: str) -> str:
+        if not built:
+            raise tl.InputError(name, "it is not built", "make web")
+        return name
+
+    monkeypatch.setattr(live, "web_path", web_path)
+    monkeypatch.setattr(live, "write_scene", lambda path: path.write_text("page"))
+    app = SimpleNamespace(builder=SimpleNamespace(name="html"), outdir=tmp_path, srcdir=DOCS)
+    live.write_live(app, ValueError() if failed else None)
+    page = tmp_path / "live.html"
+    assert page.exists() == bool(written)
+    if written == "picture":
+        shown = re.findall(r'src="([^"]+)" alt="\w', page.read_text(encoding="utf-8"))
+        assert [(tmp_path / name).exists() for name in shown] == [True]
+    elif written:
+        assert page.read_text(encoding="utf-8") == "page"
+
+
 def test_pages_include_what_is_written() -> None:
     written = {*TABLES, "presets", "blender"}  # the last two by preset_reference
     included = set()
@@ -108,3 +136,41 @@ def test_pages_include_what_is_written() -> None:
                 assert target.parent == DOCS / "generated", (page, path)
                 included.add(target.stem)
     assert included == written
+
+
+#: A figure that somebody has measured, or a bound: a number with a unit of time or memory, a percentage, or a factor.
+FIGURE = re.compile(
+    r"(?<![\w.#/-])\d[\d.,]*(?: to \d[\d.,]*)? ?(?:%|(?:ms|s|us|µs|seconds?|minutes?|times|[kMG]B|megabytes?|fps)\b)"
+)
+
+#: Those that define something: limits, defaults and examples. What is measured is generated, or dated in docs/notes/.
+DEFINED = {
+    "docs/baking-files.md": {"2 %"},
+    "docs/baking.md": {"0.2 %", "64 times", "5 %", "35 %"},
+    "docs/gltf.md": {"1.5 times", "3 times", "10 %", "25 %", "2 %", "5 %", "0.139 s", "1.17 s"},
+    "docs/guides/sizes-and-units.md": {"10 %"},
+    "docs/mitsuba.md": {"2 %", "16 %"},
+    "docs/photographs.md": {"60 %", "1 %", "95 %", "10 %", "5 %"},
+    "docs/physics/interfaces.md": {"0.4 %", "0.5 %"},
+    "docs/physics/paths-and-photons.md": {"4 times"},
+    "docs/preview.md": {"0.1 %"},
+    "docs/report-errors.md": {"128 times"},
+    "docs/report-scenes.md": {"3 %", "4 ms", "16 times", "99.9 %", "15 %"},
+    "docs/report.md": {"0.1 %", "15 %"},
+    "docs/scenes.md": {"1.5 seconds"},
+}
+
+
+def test_no_measured_figure_is_typed_by_hand() -> None:
+    apart = ("docs/generated/", "docs/gallery_of_examples/", "docs/notes/")
+    found = {}
+    for path in (ROOT / "README.md", *DOCS.rglob("*.md")):
+        name = path.relative_to(ROOT).as_posix()
+        prose = re.sub(r"(?ms)^ *```(?!\{).*?^ *```", "", path.read_text(encoding="utf-8"))
+        figures = set(FIGURE.findall(prose))
+        if figures and not name.startswith(apart):
+            found[name] = figures
+    pages = {*found, *DEFINED}
+    typed = {name: more for name in pages if (more := found.get(name, set()) - DEFINED.get(name, set()))}
+    gone = {name: less for name in pages if (less := DEFINED.get(name, set()) - found.get(name, set()))}
+    assert (typed, gone) == ({}, {})
