@@ -116,7 +116,8 @@ class LitAlone:
         values[..., 0, :] = BAND_0 * uniform.fluence
         for i in range(1, COUNT):
             values[..., i, :] = self.field(_harmonic(i)).fluence - UNIFORM * uniform.fluence
-        values *= uniform.exit_share / np.pi
+        with np.errstate(under="ignore"):
+            values *= uniform.exit_share / np.pi
         return Transfer(values, uniform.low, uniform.turn, uniform.step, uniform.cells)
 
 
