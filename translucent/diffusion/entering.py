@@ -111,6 +111,9 @@ BRIGHT = 2.0
 #: Rays of each sample that carry such light.
 SKY_RAYS = 4
 
+#: Pairs of a sample and a direction whose transfer is found at a time.
+_TOGETHER = 1 << 13
+
 #: Digits to which the stretch of a body is rounded, so that it does not depend on its rotation, and the least size of
 #: a body along one axis over that along another up to which this is done.
 _DIGITS, _LEAST_STRETCH = 12, 1e-6
@@ -292,8 +295,10 @@ def _map_directions() -> tuple[Array, Array]:
 
 def transfer(sky: Sky, samples: int, ior: float, interface: DiffuseInterface) -> Array:
     """(n,): flux that enters for a unit of radiance from the part of the sphere around each direction of the pairs."""
-    cosine, solid_angles = sky.cosine.astype(np.float64), nearest_parts(sky.directions)[1][sky.direction]
-    passed = (1.0 - optics.fresnel_dielectric(cosine, ior)) * cosine * solid_angles
+    # In parts that stay in the processor's cache.
+    parts = np.array_split(sky.cosine, len(sky.cosine) // _TOGETHER + 1)
+    reflected = np.concatenate([optics.fresnel_dielectric(part, ior) for part in parts])
+    passed = (1.0 - reflected) * sky.cosine * nearest_parts(sky.directions)[1][sky.direction]
     polished = np.bincount(sky.sample, passed, samples)
     exact = np.pi * interface.entering
     correction = np.clip(exact / np.maximum(polished, 1e-9), *_CORRECTION)

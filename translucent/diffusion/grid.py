@@ -170,20 +170,21 @@ _LAYER_PLACES = (np.arange(4) + 0.5) / 4
 
 @dataclass(frozen=True, eq=False)
 class Probe:
-    """Linear interpolation of cell values at points.
+    """Linear interpolation of cell values at points, from the eight cells around each as far as they are inside.
 
     Attributes
     ----------
-    weights : (points, cells) csr_array
-        Rows sum to 1, or to 0 where no cell is near.
-    center : (points, 3) float64
-        Where the weighted centroid of the cells is, in cells from the corner of the grid.
+    cells, weights : (points, 8) int64, float64
+        Numbers of the cells, and weights, which sum to 1 at each point, or to 0 where no cell is near.
+    places : (points, 8) int64
+        Of the cells in the flat grid.
     around : (points,) float64
         Fraction of the cells around each point that is inside.
     """
 
-    weights: sparse.csr_array
-    center: Array
+    cells: Integers
+    weights: Array
+    places: Integers
     around: Array
 
 
@@ -223,12 +224,11 @@ class BodyGrid:
         if ior not in self._crossings:
             start = self.points - START * self.cells.step * self.face_normals
             into, caster = np.linalg.inv(self.body.matrix), ray_caster_of(self.body.mesh)
-            origins = start @ into[:3, :3].T + into[:3, 3]
             directions = np.stack([self.inward_directions(ior, number) for number in range(INWARD_DIRECTIONS)])
-            metres = np.zeros(directions.shape[:2])
-            for number, local_direction in enumerate(directions @ into[:3, :3].T):
-                face, distance = caster.nearest(origins, local_direction)
-                metres[number] = np.where(face >= 0, distance, 0.0)
+            local = directions.reshape(-1, 3) @ into[:3, :3].T
+            point = np.tile(np.arange(len(start)), INWARD_DIRECTIONS)
+            found = caster.distances(start @ into[:3, :3].T + into[:3, 3], local, point, np.arange(len(local)))
+            metres = np.where(np.isfinite(found), found, 0.0).astype(np.float64).reshape(directions.shape[:2])
             self._crossings.clear()
             self._crossings[ior] = directions, metres
         return self._crossings[ior]
@@ -239,14 +239,19 @@ class BodyGrid:
         first, second = other_plane_points(len(self.points)).T
         first, second = (first + number / INWARD_DIRECTIONS) % 1.0, (second + 0.618 * number) % 1.0
         cosine = optics.refracted_cosine(np.sqrt(first), ior)
+        across, along = self._tangents
+        angle, level = 2.0 * np.pi * second, np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+        sideways = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * along
+        return np.asarray(level[:, None] * sideways - cosine[:, None] * self.face_normals)
+
+    @cached_property
+    def _tangents(self) -> tuple[Array, Array]:
+        """(s, 3), (s, 3): two directions along the surface at each sample, at right angles."""
         normal = self.face_normals
         aside = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
         across = np.cross(normal, aside)
         across /= np.linalg.norm(across, axis=1, keepdims=True)
-        along = np.cross(normal, across)
-        angle, level = 2.0 * np.pi * second, np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-        sideways = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * along
-        return np.asarray(level[:, None] * sideways - cosine[:, None] * normal)
+        return across, np.cross(normal, across)
 
     @cached_property
     def count(self) -> int:
@@ -278,18 +283,21 @@ class BodyGrid:
     @cached_property
     def below(self) -> tuple[sparse.csr_array, Array]:
         """Interpolation of the fluence somewhat below each sample, and its depth there in m, (s,)."""
-        weights = sparse.csr_array((len(self.points), self.count))
-        depth = np.zeros(len(self.points))
-        missing = np.ones(len(self.points), bool)
+        cells, weights = np.zeros((len(self.points), 8), np.int64), np.zeros((len(self.points), 8))
+        depth, missing = np.zeros(len(self.points)), np.arange(len(self.points))
         for target in PROBE_DEPTHS:
-            probe = self.probe(self.points - target * self.cells.step * self.face_normals)
-            found = self._depth(probe)
-            taken = missing & (probe.around > LEAST_AROUND) & (found > 0.3 * target)
-            weights = weights + _rows(probe.weights, taken)
-            depth[taken] = found[taken]
-            missing &= ~taken
-        nearest = self._nearest(missing)
-        return sparse.csr_array(weights + nearest), np.maximum(depth, LEAST_DEPTH) * self.cells.step
+            probe = self.probe(self.points[missing] - target * self.cells.step * self.face_normals[missing])
+            found = self._depth(probe, missing)
+            taken = (probe.around > LEAST_AROUND) & (found > 0.3 * target)
+            at = missing[taken]
+            cells[at], weights[at], depth[at] = probe.cells[taken], probe.weights[taken], found[taken]
+            missing = missing[~taken]
+        at, nearest = self._nearest(missing)
+        cells[at, 0], weights[at, 0] = nearest, 1.0
+        used = weights > 0.0
+        starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
+        read = sparse.csr_array((weights[used], cells[used], starts), (len(self.points), self.count))
+        return read, np.maximum(depth, LEAST_DEPTH) * self.cells.step
 
     @cached_property
     def blocks(self) -> Integers:
@@ -317,7 +325,8 @@ class BodyGrid:
         volume = np.zeros(self.count)
         for place in _LAYER_PLACES:
             probe = self.probe(self.points - (place * depth)[:, None] * self.face_normals)
-            volume += probe.weights.T @ (self.area * depth / len(_LAYER_PLACES))
+            part = probe.weights * (self.area * depth / len(_LAYER_PLACES))[:, None]
+            volume += np.bincount(probe.cells.ravel(), part.ravel(), self.count)
         return volume
 
     @cached_property
@@ -337,29 +346,20 @@ class BodyGrid:
         return np.asarray(rest * min(max(target, 0.0) / max(rest.sum(), np.finfo(np.float64).tiny), 1.0))
 
     def probe(self, points: Array) -> Probe:
-        """Linear interpolation at points (k, 3), in metres, from the cells around each as far as they are inside."""
-        place = (points - self.cells.low) / self.cells.step - 0.5
-        corner = np.floor(place).astype(int)
-        fraction = place - corner
+        """Linear interpolation at points (k, 3), in metres."""
         size = np.array(self.number.shape)
-        rows, columns, values = [], [], []
-        center, around = np.zeros(points.shape), np.zeros(len(points))
-        for offset in np.ndindex(2, 2, 2):
-            cell = corner + offset
-            x, y, z = np.clip(cell, 0, size - 1).T
-            number = self.number[x, y, z]
-            weight = np.where(offset, fraction, 1.0 - fraction).prod(axis=1) * self.cells.inside[x, y, z]
-            weight = np.where((number >= 0) & ((cell >= 0) & (cell < size)).all(axis=1), weight, 0.0)
-            used = np.flatnonzero(weight)
-            rows.append(used)
-            columns.append(number[used])
-            values.append(weight[used])
-            center += weight[:, None] * self.cells.center[x, y, z]
-            around += weight
-        row, value = np.concatenate(rows), np.concatenate(values)
-        scale = np.where(around > 0.0, around, 1.0)
-        weights = sparse.csr_array((value / scale[row], (row, np.concatenate(columns))), (len(points), self.count))
-        return Probe(weights, center / scale[:, None], around)
+        # Cells at the sides of the grid are empty: nothing is found outside.
+        place = np.clip((points - self.cells.low) / self.cells.step - 0.5, 0.0, size - 1.0)
+        corner = np.minimum(place.astype(np.int64), size - 2)
+        fraction = place - corner
+        x, y, z = (np.stack([1.0 - part, part], axis=1) for part in fraction.T)
+        flat = (corner[:, 0] * size[1] + corner[:, 1]) * size[2] + corner[:, 2]
+        offsets = [(i * size[1] + j) * size[2] + k for i, j, k in np.ndindex(2, 2, 2)]
+        places = flat[:, None] + np.array(offsets)
+        number, inside = self._flat_cells
+        weights = np.einsum("ki,kj,kl->kijl", x, y, z).reshape(-1, 8) * inside[places]
+        around = weights.sum(axis=1)
+        return Probe(number[places], weights / np.where(around > 0.0, around, 1.0)[:, None], places, around)
 
     def cell_at(self, places: Floats) -> tuple[Integers, Array]:
         """(k,), (k,): number of the cell at places (3, k) in cells, and its fraction inside; 0 outside the system."""
@@ -376,20 +376,20 @@ class BodyGrid:
         number = self.number.ravel()
         return np.maximum(number, 0), np.where(number >= 0, self.cells.inside.ravel(), 0.0)
 
-    def _depth(self, probe: Probe) -> Array:
-        """(s,): depth below the samples at which the fluence is read, in cells."""
-        places = (self.points - self.cells.low) / self.cells.step
-        return np.asarray(((places - probe.center) * self.face_normals).sum(axis=1))
+    def _depth(self, probe: Probe, samples: Integers) -> Array:
+        """(k,): depth below samples (k,) at which the fluence is read, in cells: of the centroid of what is read."""
+        places = (self.points[samples] - self.cells.low) / self.cells.step
+        center = np.einsum("kc,kci->ki", probe.weights, self.cells.center.reshape(-1, 3)[probe.places])
+        return np.asarray(((places - center) * self.face_normals[samples]).sum(axis=1))
 
-    def _nearest(self, missing: Mask) -> sparse.csr_array:
-        """(s, cells): weights that read the nearest cell, for samples without cells below them."""
-        found = np.full(len(self.points), -1)
-        places = (self.points - self.cells.low) / self.cells.step
+    def _nearest(self, samples: Integers) -> tuple[Integers, Integers]:
+        """Those of samples (k,) that have no cells around a point below them but one near, and the number of that."""
+        found = np.full(len(samples), -1)
+        places, normals = (self.points[samples] - self.cells.low) / self.cells.step, self.face_normals[samples]
         for depth in (0.02, 0.25, 0.5, 0.9, 1.3):
-            x, y, z = np.clip((places - depth * self.face_normals).astype(int), 0, np.array(self.number.shape) - 1).T
+            x, y, z = np.clip((places - depth * normals).astype(int), 0, np.array(self.number.shape) - 1).T
             found = np.where(found < 0, self.number[x, y, z], found)
-        row = np.flatnonzero(missing & (found >= 0))
-        return sparse.csr_array((np.ones(len(row)), (row, found[row])), (len(self.points), self.count))
+        return samples[found >= 0], found[found >= 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -498,11 +498,6 @@ def box_points(count: int) -> Array:
     """(count, 3): the same recurrence in the unit cube."""
     shifts = [0.8191725133961645, 0.6710436067037893, 0.5497004779019703]
     return np.asarray((0.5 + np.arange(count)[:, None] * shifts) % 1.0)
-
-
-def _rows(matrix: sparse.csr_array, taken: npt.NDArray[np.bool_]) -> sparse.csr_array:
-    """The matrix with all other rows set to 0."""
-    return sparse.csr_array(sparse.diags_array(taken.astype(np.float64)) @ matrix)
 
 
 #: Points in each cell, along each axis, at which its density is looked at.
