@@ -8,7 +8,10 @@ without the caches of the driver instead, which compile all shaders.
 
 Scenes: ``absorbing`` is a body without interfaces, lights or scattering; ``glass`` a bear with interfaces, which covers
 a quarter of 640 x 480 pixels; ``empty`` the same with the bear out of view; ``staged`` the bear as `render` shows it,
-in 240 x 135 pixels; ``rim`` the rim of a goblet of glass on the same stage, from near by.
+in 240 x 135 pixels; ``rim`` the rim of a goblet of glass on the same stage, from near by. ``light``, ``medium``,
+``index``, ``pose`` and ``mesh`` are no frames: light that diffuses in a bear is solved for again after a change of the
+sun and the environment, of absorption, of the index of refraction, of where the body is, or of its mesh; those with
+``-64`` in a grid of 64 cells along a side in place of 32.
 """
 
 from __future__ import annotations
@@ -39,7 +42,44 @@ eye = [at + share * mesh.diagonal for at, share in zip(top, (0.25, 0.12, 0.55))]
 scene = tl.showcase(mesh, tl.Medium(ior=1.5), size, camera=tl.Camera.look_at(eye, top, fov_y=30.0))
 """
 
-#: What makes a scene and its size, by any version of the project.
+_FRAMES = """
+renderer = tl.Renderer()
+def prepared():
+    return lambda: renderer.render(scene, size, samples=1)
+"""
+
+_SOLVES = """
+from itertools import count
+from math import cos, sin
+from translucent.diffusion.cache import FieldCache
+from translucent.planning.plan import plan
+mesh, numbers, cache = tl.load_mesh("meshes/bear.ply"), count(), FieldCache()
+unit = 10 / max(mesh.bounds[1] - mesh.bounds[0])
+def prepared():
+    i = next(numbers)
+    turn = angle = 0.0
+    absorption, ior, shape = 1.0, 1.4, mesh
+    {change}
+    absorbed = [share * absorption * unit for share in (0.02, 0.1, 0.5)]
+    medium = tl.Medium(absorbed, [20 * unit, 15 * unit, 10 * unit], ior=ior)
+    pose = [[cos(angle), 0, sin(angle), angle], [0, 1, 0, 0], [-sin(angle), 0, cos(angle), 0], [0, 0, 0, 1]]
+    sun = tl.DirectionalLight((cos(turn), -1.0, sin(turn)), (1, 1, 1))
+    scene = tl.Scene([tl.Object(shape, medium, pose)], tl.Camera.look_at((0, 0, 5), (0, 0, 0)), [sun],
+                     tl.Environment.studio(rotation=37.0 * turn))
+    planned = plan(scene, scattering=tl.Diffusion({resolution}))
+    return lambda: cache.of(planned)
+"""
+
+#: What changes from one solve to the next.
+_CHANGES = {
+    "light": "turn = float(i)",
+    "medium": "absorption = 1.0 + 0.01 * i",
+    "index": "ior = 1.3 + 0.001 * i",
+    "pose": "angle = 0.1 * i",
+    "mesh": "shape = tl.Mesh(mesh.vertices, mesh.faces)",
+}
+
+#: What makes a scene and prepares a frame of it, or a solve, by any version of the project.
 SCENES = {
     "absorbing": """
 size = (512, 512)
@@ -50,21 +90,28 @@ scene = tl.showcase(tl.load_mesh("meshes/knot.ply"), tl.Medium.from_color((0.8, 
     "staged": 'size = (240, 135)\nscene = tl.showcase(tl.load_mesh("meshes/bear.ply"), None, size)',
     "rim": _RIM,
 }
+SCENES = {name: scene + _FRAMES for name, scene in SCENES.items()}
+SCENES |= {
+    f"{name}{suffix}": _SOLVES.format(change=change, resolution=resolution)
+    for name, change in _CHANGES.items()
+    for suffix, resolution in (("", 32), ("-64", 64))
+}
 
 #: Answers every line on its input with the processor time of some frames.
 DRAWS = """
 import time
 import translucent as tl
 {scene}
-renderer, begin = tl.Renderer(), time.process_time()
-renderer.render(scene, size, samples=1)
+work, begin = prepared(), time.process_time()
+work()
 print(time.process_time() - begin, flush=True)
 for _ in range(5):
-    renderer.render(scene, size, samples=1)
+    prepared()()
 while input() != "end":
+    works = [prepared() for _ in range(5)]
     begin = time.process_time()
-    for _ in range(5):
-        renderer.render(scene, size, samples=1)
+    for work in works:
+        work()
     print((time.process_time() - begin) / 5, flush=True)
 """
 

@@ -144,11 +144,11 @@ def test_bright_parts_of_the_environment_enter_as_lamps_do(monkeypatch: pytest.M
     texels = np.zeros((64, 128, 3), np.float32)
     texels[:3] = 1.0
     overhead = tl.Environment.image(texels)
-    body = tl.Object(BALL, tl.Medium(absorption=0.15, scattering=2.85, ior=1.3))
-    assert body.medium is not None
-    solver = DiffusingBody(lit_body(body, None, Diffusion(12).cell_size(body)), body.medium, 0.0)
+    medium = tl.Medium(absorption=0.15, scattering=2.85, ior=1.3)
+    body = tl.Object(BALL, medium)
 
     def zones(environment: tl.Environment, *lights: tl.DirectionalLight) -> Array:
+        solver = DiffusingBody(lit_body(body, None, Diffusion(12).cell_size(body)), medium, 0.0)
         found = fluence_at(solver.field(tl.Scene([body], CAMERA, lights, environment), 0))
         return found / found.mean()
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from threading import Lock
-from typing import TypeVar
 
 from translucent.diffusion.entering import opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField
@@ -14,6 +13,7 @@ from translucent.diffusion.keys import (
     coefficients_of,
     diffusing_media,
     diffusion_key,
+    kept,
     media_lit_by_photons,
     place_of,
     roughness_of,
@@ -32,8 +32,6 @@ from translucent.scene.scene import Object
 
 #: Bodies, and lit scenes, that are kept.
 KEPT_BODIES, KEPT_SCENES = 16, 4
-
-_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +89,7 @@ class FieldCache:
 
         def make() -> Fields:
             places = tuple(place_of(item) for item in scene.opaque)
-            opaque = _kept(self._opaque, places, lambda: opaque_surfaces(scene.opaque), 1)
+            opaque = kept(self._opaque, places, lambda: opaque_surfaces(scene.opaque), 1)
             surfaces, volumes = {}, {}
             bent = self._bent(plan)
             for i, medium in diffusing_media(scene).items():
@@ -104,12 +102,12 @@ class FieldCache:
             return Fields(surfaces, volumes)
 
         with self._lock:
-            return _kept(self._scenes, key, make, KEPT_SCENES)
+            return kept(self._scenes, key, make, KEPT_SCENES)
 
     def keep(self, plan: RenderPlan, fields: Fields) -> None:
         """Store the light of a plan, found by another solver."""
         with self._lock:
-            _kept(self._scenes, diffusion_key(plan), lambda: fields, KEPT_SCENES)
+            kept(self._scenes, diffusion_key(plan), lambda: fields, KEPT_SCENES)
 
     def has(self, key: Hashable) -> bool:
         """True if the light of this `diffusion_key` is known."""
@@ -135,8 +133,8 @@ class FieldCache:
         roughness, own = roughness_of(body), own_frame(body)
         step = diffusion.cell_size(own)
         shape_key = place_of(own), body.density, step
-        shape = _kept(self._shapes, shape_key, lambda: body_shape(own, step), KEPT_BODIES)
-        lit = _kept(
+        shape = kept(self._shapes, shape_key, lambda: body_shape(own, step), KEPT_BODIES)
+        lit = kept(
             self._bodies,
             (place_of(body), shape_key, places),
             lambda: lit_body(body, opaque, step, shape),
@@ -153,7 +151,7 @@ class FieldCache:
                 warm_starts=self._warm_starts,
             )
 
-        system = _kept(self._systems, (shape_key, medium, roughness), make, KEPT_BODIES)
+        system = kept(self._systems, (shape_key, medium, roughness), make, KEPT_BODIES)
         return DiffusingBody(lit, medium, roughness, system)
 
     def _volume(self, body: Object, medium: Medium, diffusion: Diffusion) -> DiffusingVolume:
@@ -162,11 +160,11 @@ class FieldCache:
         def make() -> DiffusingVolume:
             return DiffusingVolume(grid, medium, warm_starts=self._warm_starts)
 
-        return _kept(self._volumes, key, make, KEPT_BODIES)
+        return kept(self._volumes, key, make, KEPT_BODIES)
 
     def _grid(self, body: Object, diffusion: Diffusion) -> VolumeGrid:
         place = _density_place(body, diffusion)
-        return _kept(self._grids, place, lambda: VolumeGrid(body, diffusion.cell_size(body)), KEPT_BODIES)
+        return kept(self._grids, place, lambda: VolumeGrid(body, diffusion.cell_size(body)), KEPT_BODIES)
 
     def _bent(self, plan: RenderPlan) -> _Bent:
         """Light that photons carry into bodies."""
@@ -189,16 +187,6 @@ class _Bent:
     volumes: dict[int, PhotonFluence]
     entering: dict[int, EnteringPhotons]
     stops: dict[int, RayCaster | None]
-
-
-def _kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T], most: int) -> _T:
-    """Entry of a store, made if it is missing; beyond `most`, that which was used longest ago is dropped."""
-    if key not in store:
-        store[key] = make()
-        if len(store) > most:
-            store.popitem(last=False)
-    store.move_to_end(key)
-    return store[key]
 
 
 def _density_place(body: Object, diffusion: Diffusion) -> Hashable:

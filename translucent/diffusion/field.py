@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,7 @@ from translucent.diffusion.entering import (
 )
 from translucent.diffusion.first_events import EnteringRays, joined_rays
 from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.keys import dimming_key, environment_key, kept, light_key
 from translucent.diffusion.lit_body import LitBody
 from translucent.diffusion.photons import EnteringPhotons
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
@@ -31,7 +32,7 @@ from translucent.formulas.diffusion import emergent_radiance, in_scattered_share
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight
-from translucent.scene.scene import Object, Scene
+from translucent.scene.scene import Light, Object, Scene
 
 #: Values (x, y, z, 3) in cells.
 Volume = npt.NDArray[np.float32]
@@ -183,19 +184,25 @@ class DiffusingBody:
         `photons` carry the light that other bodies, whose surfaces are `stops`, refract and reflect; none of it goes
         straight through these.
         """
-        dimming = dimming_bodies(scene, body)
-        grid, placement = self._lit.grid, self._lit.placement
-        parts = environment_parts(scene.environment, self._lit.shape.sky.directions, placement.turn)
-        entering, bright = self._from_sky(parts, dimming)
-        rays = [bright]
-        inside = np.zeros((grid.count, 3))
+        dimming, grid, placement = dimming_bodies(scene, body), self._lit.grid, self._lit.placement
+        through = (self._medium.ior, self._roughness, tuple(map(dimming_key, dimming)), stops)
+
+        def sky() -> tuple[Array, EnteringRays]:
+            directions = self._lit.shape.sky.directions
+            return self._from_sky(environment_parts(scene.environment, directions, placement.turn), dimming)
+
+        def rays_of(light: Light) -> tuple[Array, EnteringRays]:
+            found = from_light(grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops)
+            return np.zeros((0, 3)), found
+
+        arriving, most = self._lit.arriving, 1 + len(scene.lights)
+        entering, bright = kept(arriving, (environment_key(scene.environment), through), sky, most)
+        rays, inside = [bright], np.zeros((grid.count, 3))
         for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, placement, light.position)) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
-                rays.append(
-                    from_light(grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops)
-                )
+                rays.append(kept(arriving, (light_key(light), through), partial(rays_of, light), most)[1])
         if photons is not None:
             entering = entering + flux_of(photons, grid, placement)
         found = self._system.solved(entering, self._entrance.itself, inside, rays)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
 from dataclasses import astuple
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +14,10 @@ from translucent.media.medium import Medium
 from translucent.planning.caustics import lit_by_photons
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import Treatment, scatterer_of, treatment_of
-from translucent.scene.scene import Object, Scene
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Light, Object, Scene
+
+_T = TypeVar("_T")
 
 
 def diffusion_key(plan: RenderPlan) -> Hashable:
@@ -32,22 +37,26 @@ def diffusion_key(plan: RenderPlan) -> Hashable:
         for i, medium in diffusing_media(scene).items()
     )
     opaque = tuple(place_of(item) for item in scene.opaque)
-    around = scene.environment  # a background lights nothing
-    lighting = (
-        around.kind,
-        around.first.tobytes(),
-        around.second.tobytes(),
-        around.map,
-        around.rotation,
-        around.exposure,
-    )
-    lights = tuple((type(light), *map(_bytes, astuple(light))) for light in scene.lights)
-    dimming = tuple(
-        (i, place_of(item), np.asarray(item.medium.extinction).tobytes(), np.asarray(item.medium.absorption).tobytes())
-        for i, item in enumerate(scene.objects)
-        if item.medium is not None and may_dim(item)
-    )
+    lighting = environment_key(scene.environment)
+    lights = tuple(light_key(light) for light in scene.lights)
+    dimming = tuple((i, dimming_key(item)) for i, item in enumerate(scene.objects) if may_dim(item))
     return (plan.diffusion, bodies, opaque, lighting, lights, dimming, bending)
+
+
+def environment_key(around: Environment) -> Hashable:
+    """Fields of an environment that its light depends on; a background lights nothing."""
+    return around.kind, around.first.tobytes(), around.second.tobytes(), around.map, around.rotation, around.exposure
+
+
+def light_key(light: Light) -> Hashable:
+    """Type and fields of a light."""
+    return type(light), *map(_bytes, astuple(light))
+
+
+def dimming_key(item: Object) -> Hashable:
+    """All that the light depends on that a body lets through."""
+    assert item.medium is not None
+    return place_of(item), _bytes(item.medium.extinction), _bytes(item.medium.absorption)
 
 
 def may_dim(item: Object) -> bool:
@@ -100,6 +109,16 @@ def _bending(scene: Scene) -> Hashable:
         for item in scene.objects
     )
     return scene.overlap, objects
+
+
+def kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T], most: int) -> _T:
+    """Entry of a store, made if it is missing; beyond `most`, that which was used longest ago is dropped."""
+    if key not in store:
+        store[key] = make()
+        if len(store) > most:
+            store.popitem(last=False)
+    store.move_to_end(key)
+    return store[key]
 
 
 def _bytes(value: npt.ArrayLike) -> bytes:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import OrderedDict
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -12,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
 from translucent.diffusion.entering import BEFORE, Occluders, Placement, Sky, sky_of, sky_paths, transfer
+from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, Densities, body_grid, densities
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.mesh import Mesh
@@ -164,10 +166,13 @@ class LitBody:
     ----------
     shape : BodyShape
     casters : Occluders
+    arriving : OrderedDict
+        Uniform flux (s, 3) and rays that enter from the last environment, and from each of the last lights, by keys.
     """
 
     shape: BodyShape
     casters: Occluders
+    arriving: OrderedDict[Hashable, tuple[Array, EnteringRays]] = field(default_factory=OrderedDict)
     _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
     _sky_paths: dict[tuple[Mesh, bytes], sparse.csr_array] = field(default_factory=dict)
 
