@@ -152,7 +152,6 @@ DEFINED = {
     "docs/mitsuba.md": {"2 %", "16 %"},
     "docs/photographs.md": {"60 %", "1 %", "95 %", "10 %", "5 %"},
     "docs/physics/interfaces.md": {"0.4 %", "0.5 %"},
-    "docs/physics/paths-and-photons.md": {"4 times"},
     "docs/preview.md": {"0.1 %"},
     "docs/report-errors.md": {"128 times"},
     "docs/report-scenes.md": {"3 %", "4 ms", "16 times", "99.9 %", "15 %"},
