@@ -391,6 +391,8 @@ def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierar
 
 def test_nobody_waits_for_what_is_known(view: ViewportRenderer, work: Workspace, near: threading.Event) -> None:
     near.set()
+    work.do(SetField("material.distance", 0.004))
+    work.do(SetField("material.ior", 1.0))  # or how coarse it is depends on how long tracing takes
     finish(view, work)
     near.clear()
     work.do(SetField("material.distance", 0.003))
@@ -443,3 +445,25 @@ def test_a_shader_that_does_not_compile_is_told_by_the_process(
     assert view.renderer is not before
     finish(view, work)
     assert view.problem == ""
+
+
+def test_programs_of_media_that_scatter_are_compiled_before_one_is_chosen(
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    requested: list[tuple[str, list[str]]] = []
+    finish(view, work)
+
+    def request(name: str, plans: Any, then: object, **_: object) -> None:
+        requested.append((name, [plan.multiple_scattering for plan in plans]))
+
+    monkeypatch.setattr(work.compiler, "request", request)
+    for _ in range(2):
+        view.foresee(work)
+    grid = "diffuses (Diffusion(resolution=12)) in 1 body"
+    assert requested == [("", ["leaves as from layers in 1 body", grid])]  # once, and nobody waits for it
+    work.do(ChoosePreset("wax"))
+    monkeypatch.undo()
+    finish(view, work)
+    monkeypatch.setattr(work.compiler, "request", request)
+    view.foresee(work)
+    assert len(requested) == 1

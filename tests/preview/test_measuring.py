@@ -65,7 +65,7 @@ def test_the_inset_shows_textures_paint_and_leaves() -> None:
 class StillView:
     """A view whose picture is always there."""
 
-    idle, state, viewport = False, "full picture", SimpleNamespace(size=SIZE)
+    idle, state, viewport = False, "full picture", SimpleNamespace(size=SIZE, steps=lambda _: 0)
 
     def draw(self, *_: object) -> bool:
         return False

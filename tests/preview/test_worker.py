@@ -137,9 +137,16 @@ def test_work_that_reports_ends_and_its_process_goes_on(
 
 
 @pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="this system knows no idle processes")
-def test_processes_run_when_nobody_else_wants_to(task: Task, pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_processes_run_when_nobody_else_wants_to_unless_the_picture_waits(
+    task: Task, pool: Pool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(worker, "IDLE", os.SCHED_IDLE)
-    assert pool.call(task, policies) == {os.SCHED_IDLE}
+    for urgency, policy in 2 * [
+        (Urgency.PICTURE, os.SCHED_OTHER),
+        (Urgency.ANSWER, os.SCHED_IDLE),
+        (Urgency.LATER, os.SCHED_IDLE),
+    ]:
+        assert pool.call(task, policies, urgency=urgency) == {policy}
 
 
 def test_a_process_that_dies_is_told_and_the_next_one_begins(task: Task, pool: Pool) -> None:
@@ -251,8 +258,9 @@ def runs(process: int) -> bool:
 class Fake:
     """A worker without a process, whose work is done when it is told."""
 
-    def __init__(self, _: object) -> None:
+    def __init__(self, _: object, *, pictures: bool) -> None:
         self.process = SimpleNamespace(is_alive=lambda: True)
+        self.pictures = pictures
         self.modules = set[str]()
 
     def ask(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:

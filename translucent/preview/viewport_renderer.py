@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import time
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from translucent.assets import newest_shader
-from translucent.errors import TranslucentError
+from translucent.errors import InputError, TranslucentError
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.context import open_context
 from translucent.gpu.shaders import PostponedError, ProgramName
 from translucent.gpu.viewport import PixelProbe, Shown, Viewport
+from translucent.media.presets import preset
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering import ScatteringLayer
 from translucent.preview.measuring import ReferencePicture
 from translucent.preview.preparation import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.quality import (
@@ -23,6 +25,7 @@ from translucent.preview.quality import (
     FACTORS,
     PREPARING,
     SCREEN,
+    SMALL,
     FrameBudget,
     InteractiveQuality,
     PathRefinement,
@@ -37,6 +40,7 @@ from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
+from translucent.scene.showcase import filled, with_roughness
 
 #: Largest time of a step in seconds, where the rest of the window takes little.
 BUDGET = 0.045
@@ -107,6 +111,7 @@ class ViewportRenderer:
         self._rendered: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
         self._requested: Task | None = None
+        self._foreseen: set[tuple[PassName, ...]] = set()
         self.presenter, self._times = Presenter(), StepTimes()
         self._frame_budget, self._left = FrameBudget(), 0.0
         self.budget, self.preparing = BUDGET, PREPARING
@@ -317,6 +322,21 @@ class ViewportRenderer:
             workspace.prepare()
             if self._compiler is not None:
                 self._compiler.begin(self._drawn_plans, partial(self._take_compiled, workspace))
+
+    def foresee(self, workspace: Workspace) -> None:
+        """Have programs compiled for media that scatter before one is chosen: it is then on show at once."""
+        compiler, plan, scene = self._compiler, self.plans[0], workspace.scene()
+        if compiler is None or not compiler.budget.postpones or compiler.lane.task is not None or scene is None:
+            return
+        if plan is None or plan.diffuses or (passes := tuple(step.name for step in plan.passes)) in self._foreseen:
+            return
+        self._foreseen.add(passes)
+        wax = preset("wax")
+        waxen = with_roughness(filled(scene, wax.medium), wax.roughness)
+        requests = [replace(self.quality.request, scattering=scattering) for scattering in (ScatteringLayer(), SMALL)]
+        with suppress(InputError):  # a scene that scatters no light, or a method that cannot
+            plans = [self.renderer.plan_requested(waxen, request) for request in requests]
+            compiler.request("", plans, partial(self._take_compiled, workspace))
 
     @property
     def _drawn_plans(self) -> list[RenderPlan]:

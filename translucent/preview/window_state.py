@@ -126,6 +126,8 @@ class WindowState:
         self.work.update()
         more = self.view.draw(self.work, pixels)
         self.drawn, self.idle = not more, self.view.idle or not more
+        if self.view.viewport.steps(0) and not self.work.relights:
+            self.view.foresee(self.work)
         # All pixels are there; edges may become smooth later.
         self.work.thumbnails.begin_frame(idle=not more or self.view.state.startswith("full"))
         if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:

@@ -1,9 +1,9 @@
 """Worker processes, as libraries that hold the interpreter lock for seconds would freeze the window.
 
 Processes start when there is work for them, and end when others are idle, too. Work that the picture waits for goes
-first. Large arrays travel in files that all processes map into memory. Such a file has no name: it ends with the last
-process that holds it, however that ends; and where memory is short, the system writes its pages to disk, which shared
-memory would keep.
+first, and at normal priority; all other work is done when nobody else wants to run. Large arrays travel in files that
+all processes map into memory. Such a file has no name: it ends with the last process that holds it, however that ends;
+and where memory is short, the system writes its pages to disk, which shared memory would keep.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ PATIENCE = 0.1
 
 #: Policy of a scheduler that has others run at once when they want to, so that the window comes first. Before a frame
 #: that wakes up may go on, Linux leaves even nice processes the rest of their slice: a millisecond or more, at each of
-#: the many times that a frame waits.
+#: the many times that a frame waits. What the picture waits for has processes of normal priority: on a machine whose
+#: cores are all busy, idle ones get a second of processor in minutes. Linux lets none return from that policy.
 IDLE: int | None = getattr(os, "SCHED_IDLE", None)
 
 #: Niceness where the system knows no such policy.
@@ -298,9 +299,11 @@ class Pool:
                 self._waiting.remove(ticket)
                 self._changed.notify_all()
             self._idle = [worker for worker in self._idle if worker.process.is_alive()]
-            known = [worker for worker in self._idle if work.__module__ in worker.modules]
-            worker = (known or self._idle)[-1] if self._idle else _Worker(self._kept)
-            if self._idle:
+            pictures = urgency is Urgency.PICTURE
+            alike = [worker for worker in self._idle if worker.pictures == pictures]
+            known = [worker for worker in alike if work.__module__ in worker.modules]
+            worker = (known or alike)[-1] if alike else _Worker(self._kept, pictures=pictures)
+            if alike:
                 self._idle.remove(worker)
             self._busy.append(worker)
             return worker
@@ -309,7 +312,11 @@ class Pool:
         with self._changed:
             self._busy.remove(worker)
             self._idle.append(worker)
-            surplus = [self._idle.pop(0) for _ in range(len(self._idle) - MOST_IDLE)]
+            surplus = []
+            while len(self._idle) > MOST_IDLE:  # one of each priority stays
+                pictures = 2 * sum(one.pictures for one in self._idle) > len(self._idle)
+                surplus.append(next(one for one in self._idle if one.pictures == pictures))
+                self._idle.remove(surplus[-1])
             with suppress(ConnectionError):  # one that has died is noticed at its next work
                 for idle in self._idle:
                     idle.forget()
@@ -360,11 +367,13 @@ class _Worker:
     Attributes
     ----------
     process : BaseProcess
+    pictures : bool
+        It does what the picture waits for, at normal priority.
     modules : set of str
         Modules of the work that it has done, for which it is prepared.
     """
 
-    def __init__(self, kept: _Kept) -> None:
+    def __init__(self, kept: _Kept, *, pictures: bool) -> None:
         # Spawned, not forked: OpenGL and threads do not survive a fork.
         context = multiprocessing.get_context("spawn")
         pipe, theirs = context.Pipe()
@@ -373,10 +382,13 @@ class _Worker:
         theirs.close()
         assert self.process.pid is not None
         with suppress(OSError):  # containers may forbid it, or it has ended
-            if IDLE is not None:
+            if pictures:
+                pass
+            elif IDLE is not None:
                 os.sched_setscheduler(self.process.pid, IDLE, os.sched_param(0))
             elif hasattr(os, "setpriority"):
                 os.setpriority(os.PRIO_PROCESS, self.process.pid, NICENESS)
+        self.pictures = pictures
         self._channel = Channel(pipe, self.process.pid)
         self._kept, self._sent = kept, set[int]()
         self._closing = threading.Lock()
