@@ -11,8 +11,11 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+import translucent as tl
+from tests.rays import Found
 from translucent.arrays import Array, Integers
-from translucent.gpu.hierarchies import SceneHierarchies
+from translucent.gpu.embree_hits import EmbreeHits
+from translucent.gpu.hierarchies import SceneHierarchies, packed_mesh
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.uniforms import object_rows, packed_objects
@@ -105,6 +108,17 @@ class RayProbe:
             resource.release()
         item = hits[:, 1].astype(np.int64)
         return NearestHits(hits[:, 0].copy().view(np.float32), item, hierarchies.faces(scene, item, hits[:, 2]))
+
+
+def embree_hits(scene: tl.Scene, hits: EmbreeHits, origins: Array, directions: Array) -> Found:
+    """The nearest surface of any object, as traced interfaces get it from Embree."""
+    rays = origins - scene_center(scene), directions
+    found = hits.nearest(*(part.astype(np.float32) for part in rays))
+    face = np.full(len(origins), -1, np.int64)
+    for number, body in enumerate(scene.objects):
+        own = found.object == number
+        face[own] = packed_mesh(body.mesh).faces[found.triangle[own]]
+    return Found(found.path.astype(np.float64), found.object.astype(np.int64), face)
 
 
 def scene_center(scene: Scene) -> Array:

@@ -2,6 +2,7 @@
 
 ``python tools/check_rays.py [--rays N] [--quick] [MESH ...]`` prints a line of JSON for each mesh (default: four of the
 toolkit): triangles, seconds to build and to pack, how many random rays meet another surface than Embree says, how many
+meet another on the GPU than with the hits of traced interfaces by Embree, how many
 from inside find no way out, millions of rays per second of processor time beside Embree's on the same rays; then
 one for balls of 20 thousand and of a million triangles without the comparison.
 """
@@ -21,12 +22,13 @@ import trimesh
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import translucent as tl
-from tests.ray_probe import RayProbe
+from tests.ray_probe import RayProbe, embree_hits, scene_center
 from tests.rays import agreeing, embree_nearest, inside_points, random_rays, sah_cost
 from translucent.assets import mesh_path
 from translucent.geometry.bvh import build_hierarchy
 from translucent.geometry.normals import drawn_normals
 from translucent.geometry.ray_caster import RayCaster
+from translucent.gpu.embree_hits import EmbreeHits
 from translucent.gpu.hierarchies import SceneHierarchies, packed_mesh
 
 #: Meshes of the toolkit: a shape of blobs, thin walls, many turns, and holes.
@@ -59,10 +61,10 @@ def checked(renderer: tl.Renderer, mesh: tl.Mesh, rays: int, rng: np.random.Gene
     """Comparison of random rays with Embree, and leaks of rays from inside."""
     scene = tl.Scene([tl.Object(mesh, tl.Medium())], tl.Camera.framing(mesh.vertices, (64, 64)))
     embree = RayCaster(mesh)
-    found = {"different": 0, "hit": 0}
+    found = {"different": 0, "hits_different": 0, "hit": 0}
     seconds = np.zeros(2)
     with renderer.gpu.context.current() as gl:
-        probe, held = RayProbe(gl), SceneHierarchies(gl, [mesh], 1)
+        probe, held, hits = RayProbe(gl), SceneHierarchies(gl, [mesh], 1), EmbreeHits(scene, scene_center(scene))
         probe.nearest(scene, held, np.zeros((1, 3)), np.eye(3)[:1])  # compiles
         for begin in range(0, rays, CHUNK):
             origins, directions = random_rays(scene, min(CHUNK, rays - begin), rng)
@@ -75,6 +77,8 @@ def checked(renderer: tl.Renderer, mesh: tl.Mesh, rays: int, rng: np.random.Gene
             seconds[1] += time.process_time() - started
             theirs = embree_nearest(scene, origins, directions)
             found["different"] += int((~agreeing(scene, ours, theirs)).sum())
+            own = embree_hits(scene, hits, origins, directions)
+            found["hits_different"] += int((~agreeing(scene, ours, own)).sum())
             found["hit"] += int((theirs.face >= 0).sum())
         leaks = None
         if mesh.diagnosis.solid:

@@ -7,11 +7,11 @@ memory and threads come to lie, so several pairs of them draw one after the othe
 without the caches of the driver instead, which compile all shaders.
 
 Scenes: ``absorbing`` is a body without interfaces, lights or scattering; ``glass`` a bear with interfaces, which covers
-a quarter of 640 x 480 pixels; ``empty`` the same with the bear out of view; ``staged`` the bear as `render` shows it,
-in 240 x 135 pixels; ``rim`` the rim of a goblet of glass on the same stage, from near by. ``light``, ``medium``,
-``index``, ``pose`` and ``mesh`` are no frames: light that diffuses in a bear is solved for again after a change of the
-sun and the environment, of absorption, of the index of refraction, of where the body is, or of its mesh; those with
-``-64`` in a grid of 64 cells along a side in place of 32.
+a quarter of 640 x 480 pixels; ``knot`` a knot of the same glass; ``empty`` the bear out of view; ``staged`` the bear as
+`render` shows it, in 240 x 135 pixels; ``rim`` the rim of a goblet of glass on the same stage, from near by. ``light``,
+``medium``, ``index``, ``pose`` and ``mesh`` are no frames: light that diffuses in a bear is solved for again after a
+change of the sun and the environment, of absorption, of the index of refraction, of where the body is, or of its mesh;
+those with ``-64`` in a grid of 64 cells along a side in place of 32.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from pathlib import Path
 
 ROUNDS, PAIRS = 10, 6
 
-_BEAR = """
-mesh = tl.load_mesh("meshes/bear.ply")
+_GLASS = """
+mesh = tl.load_mesh("meshes/{mesh}.ply")
 size, center = (640, 480), mesh.vertices.min(axis=0) / 2 + mesh.vertices.max(axis=0) / 2
 glass = tl.Medium(absorption=[share / mesh.diagonal for share in (0.3, 0.6, 1.0)], ior=1.5)
 eye = center + (0, 0, 1.12 * mesh.diagonal)
@@ -85,8 +85,9 @@ SCENES = {
 size = (512, 512)
 scene = tl.showcase(tl.load_mesh("meshes/knot.ply"), tl.Medium.from_color((0.8, 0.3, 0.2), 0.01), size, stage="none")
 """,
-    "glass": _BEAR.format(target="center"),
-    "empty": _BEAR.format(target="2 * eye - center"),
+    "glass": _GLASS.format(mesh="bear", target="center"),
+    "knot": _GLASS.format(mesh="knot", target="center"),
+    "empty": _GLASS.format(mesh="bear", target="2 * eye - center"),
     "staged": 'size = (240, 135)\nscene = tl.showcase(tl.load_mesh("meshes/bear.ply"), None, size)',
     "rim": _RIM,
 }

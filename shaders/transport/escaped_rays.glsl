@@ -77,15 +77,15 @@ bool environment_in_footprint(EscapedRay end, out vec3 light) {
 
 vec3 escaped_radiance(EscapedRay end) {
     vec3 light;
-    if (end.object == AIR) {
-        if (environment_in_footprint(end, light)) { return light; }
-        return environment_radiance(end.origin, end.direction, end.reflected, end.blur);
-    }
 #if OPAQUE
-    bool has_textures = picture_first == 0 && end.triangle >= 0 && end.blur == 0.0 && reads_all_textures(end.object);
-    if (!has_textures && opaque_in_picture(end, light)) { return light; }
+    if (end.object != AIR) {
+        bool has_textures = picture_first == 0 && end.triangle >= 0 && end.blur == 0.0 && reads_all_textures(end.object);
+        if (!has_textures && opaque_in_picture(end, light)) { return light; }
+        ObjectRow body = traced_body(end.object);
+        if (end.triangle >= 0) { body = body_at(end.object, end.triangle, end.weights, end.width); }
+        return opaque_light(body, end.normal, end.direction, end.point);
+    }
 #endif
-    ObjectRow body = traced_body(end.object);
-    if (end.triangle >= 0) { body = body_at(end.object, end.triangle, end.weights, end.width); }
-    return opaque_light(body, end.normal, end.direction, end.point);
+    if (environment_in_footprint(end, light)) { return light; }
+    return environment_radiance(end.origin, end.direction, end.reflected, end.blur);
 }

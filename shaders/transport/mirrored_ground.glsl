@@ -7,20 +7,20 @@ uniform vec4 mirror_plane;   // of the ground: unit normal upwards, and metres a
 uniform vec2 mirror_surface; // roughness and ior of its coat
 
 // The ray of a pixel in which the ground is visible, and the fraction of the light that its coat reflects; false elsewhere.
-bool begin_in_mirror(vec2 pixel, uvec2 number, ivec2 texel, vec3 direction, out Ray ray, out PrimaryHit primary, out vec3 reflectance) {
-    vec3 point = point_at(pixel, texelFetch(opaque_axial_depth, texel, 0).r), normal = mirror_plane.xyz;
+bool begin_in_mirror(Pixel pixel, out Ray ray, out vec3 reflectance) {
+    vec3 direction = pixel.direction, normal = mirror_plane.xyz;
+    vec3 point = point_at(pixel.center, texelFetch(opaque_axial_depth, pixel.texel, 0).r);
     float cosine = -dot(normal, direction);
     // Nothing is that far off, either.
     if (cosine <= 0.0 || !(abs(dot(normal, point) - mirror_plane.w) <= MIRROR_TOLERANCE * surface_reach)) { return false; }
     point += (dot(normal, point) - mirror_plane.w) / cosine * direction;  // where the rasterizer does not quite see it
     float alpha = mirror_surface.x * mirror_surface.x;
     vec3 facet = normal;
-    if (blurred_fraction < 1.0) { facet = microfacet_normal(normal, direction, sqrt(1.0 - blurred_fraction) * alpha, microfacet_numbers(number, 0, 1u)); }
+    if (blurred_fraction < 1.0) { facet = microfacet_normal(normal, direction, sqrt(1.0 - blurred_fraction) * alpha, microfacet_numbers(pixel.number, 0, 1u)); }
     vec3 reflected = reflected_direction(direction, facet);
     if (dot(reflected, normal) <= 0.0) { return false; }
     ray = Ray(point + MIRROR_MARGIN * surface_reach * normal, 0.0, reflected, blurred_fraction * alpha * alpha, vec3(1.0),
         packed_state(1, 0, true, MOST_INTERACTIONS), 1u, uvec4(0u), -normal, no_footprint());
-    primary = PrimaryHit(AIR, ray.origin, normal, 0.0, 0.0, vec3(0.0), 0.0, number);
     float step = (mirror_surface.y - 1.0) / (mirror_surface.y + 1.0);
     reflectance = layer_of(vec3(step * step), reflectance_entry(cosine, mirror_surface.x)).albedo;
     return true;

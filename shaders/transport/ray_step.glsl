@@ -58,6 +58,11 @@ struct PrimaryHit {
     uvec2 pixel;        // in all of the picture, for random numbers
 };
 
+// What is known of a ray before a step.
+const int EITHER = 0;
+const int HITS = 1;
+const int LEAVES = 2;
+
 // Branches that go on behind a step.
 const int NONE = 0;
 const int ONE = 1;      // the ray alone
@@ -85,9 +90,34 @@ void lose(Ray ray) {
     traced_lost += strength(ray.throughput) / 3.0;
 }
 
-// Adds the light at the end of a ray.
+// Rays that have ended in a step, two at most, and their throughput. What light they see is looked up in one place: processors that
+// draw compute every place for all rays.
+int ends = 0;
+EscapedRay first_end, second_end;
+vec3 first_throughput, second_throughput;
+
 void escape(Ray ray, EscapedRay end) {
-    traced_radiance += ray.throughput * escaped_radiance(end);
+    if (ends == 0) {
+        first_end = end;
+        first_throughput = ray.throughput;
+    } else {
+        second_end = end;
+        second_throughput = ray.throughput;
+    }
+    ++ends;
+}
+
+// Adds the light at the ends of rays.
+void add_ends() {
+    for (; ends > 0; --ends) {
+        EscapedRay end = first_end;
+        vec3 throughput = first_throughput;
+        if (ends == 2) {
+            end = second_end;
+            throughput = second_throughput;
+        }
+        traced_radiance += throughput * escaped_radiance(end);
+    }
 }
 
 EscapedRay escaped_ray(Ray ray, int object, vec3 normal, vec3 point) {
@@ -298,17 +328,19 @@ int interact(inout Ray ray, out Ray weaker, Interaction at, ObjectRow body, Hit 
 
 // Lets a ray interact with the surface that it hits, and returns which branches go on. hit: the nearest one, or that of `first_hit`;
 // where nothing is hit as far as its path, which is not NOTHING, the ray stays as it is.
-int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int channel) {
+int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int channel, int known) {
     int before = effective_medium(ray.interior);
     bool sound = true;
-    SurfaceHit surface = surface_hit(ray.origin, ray.direction, ray.interior, 0.0, hit, before, channel, sound);
-    if (hit.object < 0 && hit.path < NOTHING) { return ONE; }
-    if (hit.object < 0 && all_closed == 1) {
+    SurfaceHit surface;
+    if (known != LEAVES) { surface = surface_hit(ray.origin, ray.direction, ray.interior, 0.0, hit, before, channel, sound); }
+    bool leaves = known == LEAVES || (known == EITHER && hit.object < 0);
+    if (leaves && hit.path < NOTHING) { return ONE; }
+    if (leaves && all_closed == 1) {
         ray.interior = uvec4(0u);
         before = AIR;
     }
     vec3 passed = through_media(ray, before, hit);
-    if (hit.object < 0) {
+    if (leaves) {
         escape(ray, escaped_ray(ray, AIR, vec3(0.0), ray.origin));
         return NONE;
     }
@@ -346,28 +378,11 @@ int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int chann
     return interact(ray, weaker, at, body, hit, surface, primary, first ? primary.unoccluded : 1.0, again, last);
 }
 
-// The first ray of a pixel, which starts a little before what the rasterizer has found, and how far it looks for that. front,
-// parameters, tint: of the first interface. pixel: to the right and down; its sample may be aside of its center.
-void begin(vec2 pixel, uvec2 number, vec3 direction, vec4 front, vec4 parameters, vec4 tint, bool starts_inside, out Ray ray,
-    out PrimaryHit primary, out float reach) {
-    int object = front.w < NOTHING ? int(parameters.x + 0.5) : AIR;
-    primary = PrimaryHit(object, point_at(pixel, front.w), front.xyz, parameters.y, parameters.z, tint.rgb, tint.a, number);
-    vec3 eye = point_at(pixel, surface_eye_axial_depth);
-    float margin = min(1e-3 * surface_reach, distance(primary.point, eye));
-    ray = Ray(primary.point - margin * direction, 0.0, direction, 0.0, vec3(1.0), packed_state(0, FORKS, false, MOST_INTERACTIONS), 0u,
-        uvec4(0u), -direction, footprint_of(pixel, front.w));
-    reach = margin + 1e-3 * surface_reach;
-#if FROM_EYE
-    // Something may lie before the first interface.
-    ray.origin = point_at(pixel, 0.0);
-    ray.footprint = footprint_of(pixel, starts_inside ? surface_eye_axial_depth : 0.0);
-    if (starts_inside) {
-        ray.skipped = 2.0 * SURFACE_OFFSET * surface_reach;
-        ray.origin = eye + ray.skipped * direction;
-        ray.interior = interior_at_eye(eye, direction, ray.skipped);
-    }
-    reach = NOTHING;
-#endif
+// The same with the light at the ends of rays.
+int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int channel, int known) {
+    int goes_on = follow_to_end(ray, weaker, hit, primary, channel, known);
+    add_ends();
+    return goes_on;
 }
 
 // Light of the traced rays of a pixel with that of the lights in its first interface, where there is one. emitted: what media emit

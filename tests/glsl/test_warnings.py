@@ -13,7 +13,7 @@ from translucent.assets import shader_path
 from translucent.gpu.shaders import gather, preprocess
 
 FOLDER = shader_path("README.md").parent
-STAGES = {".vert": 0x8B31, ".frag": 0x8B30}
+STAGES = {".vert": 0x8B31, ".frag": 0x8B30, ".comp": 0x91B9}
 SHADERS = sorted(path.relative_to(FOLDER).as_posix() for path in FOLDER.rglob("*") if path.suffix in STAGES)
 #: What is never asked for, in any shader or in one.
 SETTLED = {"UNION": 0, "SLOTS": 2}

@@ -40,8 +40,9 @@ def test_frames_of_many_bodies_are_drawn_in_linear_time(method: tl.Method | None
         return calls(lambda: renderer.render(given, (8, 8), method, samples=2))
 
     work(FEW)
+    most, more, few = (work(number * FEW) for number in (3, 2, 1))
     # What a frame takes besides its bodies is the same for any number of them.
-    assert work(3 * FEW) - work(2 * FEW) < 1.1 * (work(2 * FEW) - work(FEW))
+    assert most - more < 1.1 * (more - few)
 
 
 @pytest.mark.parametrize("method", [None, tl.FragmentLists()])
@@ -50,8 +51,11 @@ def test_samples_cost_each_body_little_more_than_its_draws(method: tl.Method | N
         given = scene(count, "add")
         return calls(lambda: renderer.render(given, (8, 8), method, samples=samples, adaptive=False))
 
-    work(FEW, 2)
-    more = (work(2 * FEW, 4) - work(2 * FEW, 2)) - (work(FEW, 4) - work(FEW, 2))
+    def added(count: int) -> int:
+        work(count, 2)  # makes what is kept for all scenes of these bodies
+        return work(count, 4) - work(count, 2)
+
+    more = added(2 * FEW) - added(FEW)
     # Half of the bodies are drawn more than once, in some seven calls each; nothing else is done again for each.
     assert more / (2 * FEW) < 30
 

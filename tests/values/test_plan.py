@@ -255,6 +255,7 @@ def test_a_plan_goes_into_json(objects: list[tl.Object], method: Any) -> None:
         "cost",
         "exact",
         "given_back",
+        "hits",
         "interfaces",
         "limits",
         "method",

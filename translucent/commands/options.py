@@ -472,6 +472,11 @@ class ChoiceOptions:
         metavar="N",
         help="Of --interfaces traced: how often rays go on as the weaker of reflected and refracted light. Default: 2.",
     )
+    interface_hits: str | None = option(
+        type=NamesOf("translucent.planning.interfaces", "HITS"),
+        help="Of --interfaces traced: what finds the surfaces that light meets, Embree or shaders. Default: Embree "
+        "where OpenGL draws on the processors, too.",
+    )
     scattering: str | None = option(
         type=NamesOf("translucent.planning.scattering", "SCATTERINGS"),
         help="Light that media scatter many times: as it diffuses in the body (wax, milk, jade); as a flat layer gives "
@@ -538,7 +543,11 @@ class ChoiceOptions:
     def _interfaces(self) -> InterfaceMode | None:
         from translucent.planning.interfaces import INTERFACES, TracedInterfaces
 
-        stated = {"depth": self.interface_depth, "forks": self.interface_forks}
+        stated: dict[str, Any] = {
+            "depth": self.interface_depth,
+            "forks": self.interface_forks,
+            "hits": self.interface_hits,
+        }
         given = {key: value for key, value in stated.items() if value is not None}
         if given and self.interfaces != TracedInterfaces.name:
             requested = f"--interface-{next(iter(given))}"

@@ -45,6 +45,9 @@ MISSED = np.float32(1e30)
 #: Number of rejected faces after which a ray ends.
 MOST_REJECTED = 64
 
+#: Oldest embreex that has all that is needed here.
+_OLDEST = 4, 4
+
 #: Smallest cosine between a normal for shading and a ray that hits its surface.
 EDGE_ON = 1e-3
 
@@ -79,7 +82,7 @@ class RayCaster:
         self.bounds = mesh.bounds
         with np.errstate(under="ignore"):
             vertices = ((mesh.vertices - self.center) / self.radius).astype(np.float32)
-        self.scene = embree_scene(vertices, mesh.faces)
+        self.scene = embree_scene((vertices, mesh.faces))
 
     def nearest(self, origins: Array, directions: Array) -> tuple[Integers, Array]:
         """Nearest face ahead, (k,), -1 where there is none, and its distance (k,), inf where there is none.
@@ -243,7 +246,7 @@ class SceneRayCaster:
             together = np.concatenate(own)
             count += len(together)
             faces = np.arange(3 * len(together), dtype=np.int32).reshape(-1, 3)
-            self._scenes.append(embree_scene(together.reshape(-1, 3).astype(np.float32), faces))
+            self._scenes.append(embree_scene((together.reshape(-1, 3).astype(np.float32), faces)))
         corners, item = (np.concatenate(part) for part in zip(*parts, strict=True))
         edges = corners[:, 1:] - corners[:, :1]
         outward = np.cross(edges[:, 0], edges[:, 1])
@@ -420,26 +423,46 @@ def _embree_version() -> str:
     return str(EmbreeDevice()).rpartition(" ")[2]
 
 
-def _import_embreex() -> None:
+def embree_refusal() -> str:
+    """Reason why Embree cannot be used; empty if it can."""
     try:
         import embreex.mesh_construction
         import embreex.rtcore_scene  # noqa: F401
     except ImportError as error:
+        return f"embreex cannot be imported ({error})"
+    found = version("embreex")
+    return "" if _numbers(found) >= _OLDEST else f"embreex is {found}, older than 4.4"
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    """The first two numbers of a version."""
+    return tuple(int(part) for part in text.split(".")[:2])
+
+
+def _import_embreex() -> None:
+    if refusal := embree_refusal():
         raise RenderError(
             "rendering on the CPU",
-            f"embreex cannot be imported ({error})",
-            "pip install embreex, or render with OpenGL (`translucent doctor` says how)",
-        ) from None
+            refusal,
+            "pip install -U embreex, or render with OpenGL (`translucent doctor` says how)",
+        )
 
 
-def embree_scene(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int32]) -> EmbreeScene:
-    """Embree scene of triangles, ready for rays; raises `RenderError` if embreex cannot be imported."""
+def embree_scene(*geometries: tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]) -> EmbreeScene:
+    """Embree scene of triangles, each geometry by its vertices (n, 3) and faces (m, 3), ready for rays.
+
+    Raises
+    ------
+    RenderError
+        If embreex cannot be imported.
+    """
     _import_embreex()
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 
     scene = EmbreeScene(robust=True)
-    TriangleMesh(scene, vertices, faces)
+    for vertices, faces in geometries:
+        TriangleMesh(scene, vertices, faces)
     # The first ray builds the acceleration structure, which several threads must not do at once.
     scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
     return scene

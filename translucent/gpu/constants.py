@@ -53,7 +53,19 @@ STORAGE_BINDINGS = {
     "light_nodes": 4,
     "light_media": 5,
     "light_ends": 6,
+    "rays": 0,
+    "ray_segments": 1,
+    "live_rays": 2,
+    "branches": 3,
+    "branch_segments": 4,
+    "branch_pixels": 5,
+    "ray_light": 6,
+    "pixel_rays": 0,
+    "traced_light": 7,
 }
+
+#: Invocations in a group of a compute shader.
+COMPUTE_GROUP = 64
 
 #: Bits of the width of the textures that hold hierarchies, in texels: every OpenGL has that.
 HIERARCHY_WIDTH_BITS = 12
@@ -138,6 +150,7 @@ CONSTANTS: dict[str, str] = {
     "ALPHA_OF_DEVIATION": repr(ALPHA_OF_DEVIATION),
     "REFLECTANCE_TABLE_SIZE": f"{TABLE_SIZE:.1f}",
     **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},
+    "COMPUTE_GROUP": str(COMPUTE_GROUP),
     "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored
     "FAINTEST_HIGHLIGHT": "1e-6",  # of a light's irradiance, in 1/sr, for which occluders are not looked for
 }

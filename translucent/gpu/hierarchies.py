@@ -187,6 +187,8 @@ class SceneHierarchies:
     nodes, triangles : moderngl.Texture
     object_nodes : int
         Nodes of the hierarchy of objects, in each of eight orders.
+    first_triangles : (objects,) int32
+        Number of the first triangle of the mesh of each object that has been placed.
     surface_table : int
         Texel behind the triangles at which the table of the textures of surfaces begins, if the scene has any.
     """
@@ -225,6 +227,7 @@ class SceneHierarchies:
             _check_texels(gl, texels)
         self.nodes, self.triangles = _texture(gl, first, nodes), _texture(gl, end, triangles)
         self.object_nodes = 0
+        self.first_triangles = np.zeros(0, np.int32)
         self._placed: tuple[Hashable, tuple[Fields, ...], tuple[float, float, float, float]] | None = None
 
     def place(self, scene: Scene, center: Array) -> tuple[tuple[Fields, ...], tuple[float, float, float, float]]:
@@ -258,6 +261,7 @@ class SceneHierarchies:
         reserved = np.zeros((self._rows * _WIDTH, 4), np.uint32)
         reserved[: len(nodes)] = nodes
         self.nodes.write(reserved, viewport=(0, 0, _WIDTH, self._rows))
+        self.first_triangles = np.array([self._spans[id(body.mesh)].triangle for body in scene.objects], np.int32)
         return tuple(self._placement(body, center) for body in scene.objects), (*middle, scale)
 
     def faces(self, scene: Scene, objects: Integers, triangles: npt.NDArray[np.integer]) -> Integers:

@@ -28,6 +28,7 @@ from translucent.frames.frame import (
     transmitted_of,
     valid_of,
 )
+from translucent.geometry.ray_caster import embree_versions
 from translucent.gpu.adaptive import AdaptiveSampling, is_adaptive, read_averages, traced_samples
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.context import GpuContext, adopt_context, open_context, require_own_process
@@ -44,6 +45,7 @@ from translucent.gpu.shaders import before_drawing, before_making, set_uniform
 from translucent.gpu.shadow_atlas import ShadowAtlas
 from translucent.gpu.targets import SHADER_STORAGE, Targets, read_floats
 from translucent.gpu.uniforms import bounded_extinction
+from translucent.planning.interfaces import HITS
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.scene.backdrop import Backdrop
@@ -187,6 +189,7 @@ class GpuRenderer:
     def __init__(self, backend: str | None = None, context: moderngl.Context | None = None) -> None:
         self.context: GpuContext = open_context(backend) if context is None else adopt_context(context)
         self._resources = Resources(self.context.gl)
+        self._software = "software" in self.context.renderer
         with self.context.current():
             self._timer = PassTimer(self.context.gl)
         self._targets: Targets | None = None
@@ -219,7 +222,9 @@ class GpuRenderer:
     def capabilities(self) -> Capabilities:
         """Capabilities of this OpenGL for the planner."""
         return Capabilities(
-            shader_storage=self.context.gl.version_code >= SHADER_STORAGE, texture_units=self._resources.texture_units
+            shader_storage=self.context.gl.version_code >= SHADER_STORAGE,
+            texture_units=self._resources.texture_units,
+            software=self._software,
         )
 
     def render(
@@ -335,6 +340,10 @@ class GpuRenderer:
         provenance = dict(self.provenance)
         if job.bent_apart:
             provenance["traced_samples"] = f"{traced_samples(job):.1f} of {samples}"
+        if job.plan.hits == "embree":
+            provenance["hits"] = "Embree {embree} (embreex {embreex})".format(**embree_versions())
+        elif job.plan.hits:
+            provenance["hits"] = HITS[job.plan.hits]
         return Frame(plan=job.plan, seconds=seconds, provenance=provenance, **arrays)
 
     def close(self) -> None:

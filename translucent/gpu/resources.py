@@ -12,6 +12,7 @@ import numpy.typing as npt
 from translucent.geometry.mesh import Mesh, unit_normals
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.diffusion import DiffusionCache, GridTexture
+from translucent.gpu.embree_hits import EmbreeHitsCache
 from translucent.gpu.hierarchies import HierarchyCache
 from translucent.gpu.shaders import before_making
 from translucent.gpu.shadow_atlas import ShadowAtlas
@@ -172,6 +173,8 @@ class Resources:
         self.media_change = False
         #: Views from lights, which are the same for frames of all sizes.
         self.light_lists = Storage(gl, "light that media scatter")
+        self.rays = Storage(gl, "traced rays")
+        self.ray_hits = EmbreeHitsCache()
 
     @property
     def shadows(self) -> ShadowAtlas:
@@ -204,6 +207,7 @@ class Resources:
             self.diffusion,
             *self._shadows,
             self.light_lists,
+            self.rays,
         )
         for cache in caches:
             cache.release()

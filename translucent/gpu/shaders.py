@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, TypeAlias
@@ -276,7 +276,35 @@ def build_program(
     except moderngl.Error as error:
         log = str(error)
         stage = stages[1] if "fragment_shader" in log else stages[0]
-        raise RenderError(f"shader {stage.files[0]!r}", stage.locate(log).strip(), "mend the GLSL") from error
+        raise _refused(stage, log) from error
+    _bind(program, stages, samplers)
+    return program
+
+
+def build_compute(
+    gl: moderngl.Context, name: str, defines: Mapping[str, int] | None = None, /, **samplers: int
+) -> moderngl.ComputeShader:
+    """Compile a compute shader, as `build_program` does two files; it gets the switches in its text."""
+    gathered = gather(name)
+    own = {key: value for key, value in (defines or {}).items() if key in gathered.switches}
+    stage = _with_switches(name, gathered, own, 430)
+    try:
+        with DeferredSignals():
+            program = gl.compute_shader(stage.text)
+    except moderngl.Error as error:
+        raise _refused(stage, str(error)) from error
+    _bind(program, [stage], samplers)
+    return program
+
+
+def _refused(stage: ShaderSource, log: str) -> RenderError:
+    return RenderError(f"shader {stage.files[0]!r}", stage.locate(log).strip(), "mend the GLSL")
+
+
+def _bind(
+    program: moderngl.Program | moderngl.ComputeShader, stages: Sequence[ShaderSource], samplers: Mapping[str, int]
+) -> None:
+    """Set the bindings of a program's uniform blocks, and the units of its samplers."""
     for name, block in BLOCKS.items():
         if name in program:
             program[name].binding = block.binding
@@ -284,10 +312,9 @@ def build_program(
         # A sampler that this variant declares but does not need is gone from the linked program.
         if name in program or not any(re.search(rf"\b{name}\b", stage.text) for stage in stages):
             set_uniform(program, name, unit)
-    return program
 
 
-def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:
+def set_uniform(program: moderngl.Program | moderngl.ComputeShader, name: str, value: Any) -> None:
     """Set a loose uniform; a name that the program does not have is an error, not a black picture."""
     try:
         program[name].value = value
@@ -296,7 +323,7 @@ def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:
         raise RenderError(f"uniform {name!r}", f"the program has only {known}", "check the spelling") from None
 
 
-def set_used(program: moderngl.Program, values: Mapping[str, Any]) -> None:
+def set_used(program: moderngl.Program | moderngl.ComputeShader, values: Mapping[str, Any]) -> None:
     """Set those of these loose uniforms that the program has: variants of a shader use some of them each."""
     for name, value in values.items():
         if name in program:

@@ -17,7 +17,14 @@ from translucent.planning.bodies import (
     sheets_of,
     solids_of,
 )
-from translucent.planning.interfaces import InterfaceMode, touching_interfaces, with_interfaces
+from translucent.planning.interfaces import (
+    EMBREE_COST,
+    HITS,
+    InterfaceMode,
+    chosen_hits,
+    touching_interfaces,
+    with_interfaces,
+)
 from translucent.planning.limits import (
     AMBIENT,
     MAX_SCATTER_LIGHTS,
@@ -80,6 +87,11 @@ def assembled(
     # Sheets go first where intervals are in order: their sums are read where the intervals are resolved.
     passes = (*beside, *_light_views(scene, method), *own) if method.ordered else (*own, *beside)
     found = _interface_passes(scene, method, interfaces, instead)
+    hits, slower = "", ""
+    if found and interfaces.traced:
+        hits, slower = chosen_hits(interfaces, capabilities.software, capabilities.shader_storage)
+        cost = found[1].cost * (EMBREE_COST if hits == "embree" else 1.0)
+        found = found[0], replace(found[1], reason=f"{found[1].reason}; {HITS[hits]} finds what they hit", cost=cost)
     unlit = _unlit_passes(scene, spectral) if scatters(scene) and not capabilities.shader_storage else ()
     passes = (
         *_opaque_passes(scene),
@@ -99,7 +111,8 @@ def assembled(
     limits = (*_limits(scene, method), *([UNLIT] if unlit else []))
     unmodelled = with_ambient(unmodelled) if ambient else unmodelled
     used = interfaces if found else None
-    return RenderPlan(scene, method, passes, spectral, limits, unmodelled, interfaces=used)
+    remarks = (Note(NoteKind.SLOW_HITS, slower),) if slower else ()
+    return RenderPlan(scene, method, passes, spectral, limits, unmodelled, remarks, interfaces=used, hits=hits)
 
 
 def _unlit_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:

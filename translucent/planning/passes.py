@@ -55,6 +55,7 @@ class NoteKind(StrEnum):
     BLACK = "black"
     OPAQUE_BODIES = "opaque bodies"
     UNSEEN_BODIES = "unseen bodies"
+    SLOW_HITS = "slow hits"
 
     # What a page in a browser does with a scene.
     MANY_TRIANGLES = "many triangles"

@@ -148,7 +148,7 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
             paths=paths,
         )
     unmodelled = (*found.unmodelled, *spheres)
-    found = replace(found, request=request, unmodelled=unmodelled, remarks=remarks(scene))
+    found = replace(found, request=request, unmodelled=unmodelled, remarks=(*found.remarks, *remarks(scene)))
     if request.caustics is not None:
         found = _with_caustics(found, scene, request.caustics, machine)
     found = _with_textures(found, machine)
@@ -370,6 +370,8 @@ def _traced(
     followed = _followed(scene, interfaces)
     chosen = method or FragmentLists()
     sheets = chosen.makes_sheets
+    if isinstance(interfaces, TracedInterfaces) and interfaces.hits == "gl":
+        raise InputError('TracedInterfaces(hits="gl")', "this renderer has no OpenGL", "leave hits out")
     reason = "no OpenGL: all surfaces on each ray, in float64"
     if method is not None and not sheets:
         reason += f", in place of {method}, which was requested"

@@ -35,6 +35,8 @@ class Capabilities:
         Textures that one shader can read.
     textured_rays : bool
         Rays can read textures of surfaces wherever they hit one.
+    software : bool
+        OpenGL draws on the processors, as Mesa's llvmpipe does.
     """
 
     shader_storage: bool = True
@@ -42,6 +44,7 @@ class Capabilities:
     scattering: bool = True
     texture_units: int = 32
     textured_rays: bool = True
+    software: bool = False
 
 
 @dataclass(frozen=True)
@@ -92,9 +95,11 @@ class RenderPlan:
     unmodelled : tuple of Note
         What the scene requests and no pass renders.
     remarks : tuple of Note
-        What is rendered right, and a picture hardly shows: bodies that are black.
+        What is rendered right, and a picture hardly shows: bodies that are black; or is slower than need be.
     interfaces : Interfaces, optional
         How interfaces are found; None where none changes light, or none is rendered.
+    hits : str
+        What finds the surfaces that traced rays hit: "embree" or "gl"; empty where no rays are traced by OpenGL.
     diffusion : Diffusion
         Grid of the bodies in which light diffuses.
     traced : bool
@@ -125,6 +130,7 @@ class RenderPlan:
     unmodelled: tuple[Note, ...] = ()
     remarks: tuple[Note, ...] = ()
     interfaces: InterfaceMode | None = None
+    hits: str = ""
     diffusion: Diffusion = field(default_factory=Diffusion)
     traced: bool = False
     paths: PathTraced | None = None
@@ -210,6 +216,7 @@ class RenderPlan:
             "method": self.runs,
             "exact": self.exact,
             "interfaces": None if self.interfaces is None else str(self.interfaces),
+            "hits": self.hits or None,
             "given_back": self.multiple_scattering or None,
             "caustics": None if self.caustics is None else str(self.caustics),
             "cost": round(self.cost, 2),

@@ -25,6 +25,7 @@ from translucent.formulas.tone import TONES
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import drawn_normals, has_drawn_normals, keep_drawn_normals, made_normals
 from translucent.geometry.solids import Box
+from translucent.gpu.embree_hits import mesh_scene
 from translucent.gpu.hierarchies import has_packed, keep_packed, pack_mesh
 from translucent.gpu.refinement import PhotonPicture
 from translucent.gpu.renderer import GpuRenderer
@@ -60,10 +61,10 @@ BOXES = 4
 _smoothing = threading.Lock()
 
 
-def untraceable(scene: Scene, pool: Pool, lane: Lane) -> str:
+def untraceable(scene: Scene, pool: Pool, lane: Lane, *, embree: bool) -> str:
     """Reason why rays cannot be traced through the meshes of a scene yet; empty if they can.
 
-    The hierarchy of the first mesh that lacks one is requested.
+    The hierarchy of the first mesh that lacks one is requested, and its Embree scene where `embree` finds hits.
     """
     meshes = dict.fromkeys(item.mesh for item in scene.objects)
     missing = [mesh for mesh in meshes if len(mesh.faces) > PACKED_AT_ONCE and not has_packed(mesh)]
@@ -77,6 +78,8 @@ def untraceable(scene: Scene, pool: Pool, lane: Lane) -> str:
         make_normals(task, pool, mesh)
         task.report(None, "hierarchy")
         keep_packed(mesh, pool.call(task, pack_mesh, mesh, drawn_normals(mesh), urgency=Urgency.PICTURE))
+        if embree:
+            mesh_scene(mesh)
 
     lane.request(ref(mesh), "preparing rays", prepare)
     return "interfaces in screen space, until rays can be traced through the mesh"

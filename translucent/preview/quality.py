@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from translucent.diffusion.keys import diffusion_key, media_lit_by_photons, place_of
 from translucent.errors import InputError
@@ -15,7 +15,7 @@ from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.refinement import Convergence, PhotonPicture
 from translucent.gpu.viewport import STRIDES, Viewport
 from translucent.planning.caustics import Caustics
-from translucent.planning.interfaces import ScreenInterfaces
+from translucent.planning.interfaces import ScreenInterfaces, TracedInterfaces
 from translucent.planning.methods import PathTraced
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
@@ -59,6 +59,9 @@ SAMPLES, SLOW_SAMPLES = 16, 4
 
 #: Interfaces of a picture in which rays cannot be traced, or would take too long.
 SCREEN = ScreenInterfaces()
+
+#: Largest number of triangles of a mesh that Embree gets: it holds Python's lock while it builds, which is 75 ms.
+MOST_EMBREE = 200_000
 
 #: Number of triangles from which on pictures and shadow maps take long to draw.
 MANY = 1_000_000
@@ -206,7 +209,7 @@ class InteractiveQuality:
     def __init__(self, traced_at_once: bool) -> None:
         self.request = RenderRequest()
         self.notes, self.solved = ["", ""], False
-        self._at_once = traced_at_once
+        self._at_once, self._embree = traced_at_once, False
         self._lights: tuple[object, ...] = ()
         self._last: Hashable = None
         #: Bodies whose cells of the small grid are known, which take longest.
@@ -217,13 +220,20 @@ class InteractiveQuality:
         self.notes, self.solved = ["", ""], False
         plan = renderer.plan_requested(scene, requested)
         request = replace(requested, scattering=self._choose_scattering(workspace, scene, plan, renderer.gpu.diffusion))
-        if renderer.plan_requested(scene, request).has(PassName.TRACED) and not self.traceable(workspace, scene):
+        plan = renderer.plan_requested(scene, request)
+        self._embree = plan.hits == "embree"
+        if self._embree and max(len(item.mesh.faces) for item in scene.objects) > MOST_EMBREE:
+            self._embree = False
+            request = replace(request, interfaces=replace(cast(TracedInterfaces, plan.interfaces), hits="gl"))
+        if plan.has(PassName.TRACED) and not self.traceable(workspace, scene):
             request = replace(request, interfaces=SCREEN)
         self.request = request
 
     def traceable(self, workspace: Workspace, scene: Scene) -> bool:
         """True if rays can be traced through the meshes of the scene without making the window wait."""
-        self.notes[0] = "" if self._at_once else untraceable(scene, workspace.pool, workspace.lanes["trace"])
+        self.notes[0] = (
+            "" if self._at_once else untraceable(scene, workspace.pool, workspace.lanes["trace"], embree=self._embree)
+        )
         return not self.notes[0]
 
     def quick_shadows(self, scene: Scene) -> ShadowMaps | None:

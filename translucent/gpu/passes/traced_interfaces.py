@@ -16,16 +16,16 @@ from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches
 from translucent.gpu.placement import Part, extents, part_of
+from translucent.gpu.ray_generations import RayGenerations
 from translucent.gpu.shaders import set_used
+from translucent.gpu.targets import SHADER_STORAGE
 from translucent.gpu.uniforms import media_center
 from translucent.planning.passes import PassSpec
 from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.grounds import Mirror, ground_of
 from translucent.scene.scene import Scene
 
-_SAMPLERS = (
-    "emitted_radiance_sum",
-    "straight_transmittance",
+_RAY_SAMPLERS = (
     "entered",
     "surface_parameters",
     "surface_color",
@@ -43,6 +43,7 @@ _SAMPLERS = (
     "shadow_sums",
     "shadow_ends",
 )
+_SAMPLERS = *_RAY_SAMPLERS, "emitted_radiance_sum", "straight_transmittance"
 _ENTERED = ("entered", "surface_parameters", "surface_color")
 
 #: Samplers of ``shaders/transport/hierarchy.glsl``, and of the table of objects.
@@ -62,7 +63,10 @@ class TracedInterfacesPass:
     """Tree of reflected and refracted rays; see ``shaders/transport/traced_interfaces.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._variants = Variants(gl, "geometry/fullscreen.vert", "transport/traced_interfaces.frag", *_SAMPLERS)
+        files = "geometry/fullscreen.vert", "transport/traced_interfaces.frag"
+        self._variants = Variants(gl, *files, *_SAMPLERS)
+        self._with_sums = Variants(gl, *files, *_SAMPLERS, version=SHADER_STORAGE)
+        self._generations = RayGenerations(gl, _RAY_SAMPLERS, len(_SAMPLERS))
         self._no_interface = NoInterface(gl)
         self._where_unsettled = Variants(
             gl, "geometry/fullscreen.vert", "transport/where_unsettled.frag", "entered", "unsettled"
@@ -92,7 +96,7 @@ class TracedInterfacesPass:
         stack = ExitStack()
         textures, scene_values = traced_scene(job, stack)
         self._bind(job, textures)
-        program = self._program(job, mirror=mirror is not None)
+        switches = _switches(job, mirror=mirror is not None)
         depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
         values = {
             "mirrored": 0,
@@ -107,15 +111,44 @@ class TracedInterfacesPass:
             **_ground(job.scene),
             **_footprint(job),
         }
-        set_used(program, values)
         if mirror is not None and not any(record):
             # What is drawn next finds zeros. Software rasterizers compile a program again for every other state.
             gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
-        self._variants.draw_covered(job, program, framebuffer, top_first=True)
-        if mirror is not None:
-            self._draw_mirrored(job, mirror, framebuffer, program)
+        self._draw(job, job.covered.flipped(job.targets.size[1]), framebuffer, "unsettled", switches, values)
+        if mirror is not None and (part := mirrored_part(job, mirror)):
+            values |= _mirroring(job.scene, mirror)
+            if job.bending:
+                framebuffer = job.targets["mirrored"]
+            else:
+                # The state of the first interfaces, and depths that let all pass.
+                gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
+                framebuffer.color_mask = ((False,) * 4,) * 2
+                framebuffer.clear()
+                framebuffer.color_mask = ((True,) * 4,) * 2
+            self._draw(job, part, framebuffer, "mirror_unsettled", switches, values)
         gl.enable_only(blending)
         stack.close()
+
+    def _draw(
+        self,
+        job: FrameJob,
+        part: Part,
+        framebuffer: moderngl.Framebuffer,
+        mask: str,
+        switches: dict[str, bool | int],
+        values: dict[str, Any],
+    ) -> None:
+        """Draw the pixels of a part, whose row 0 is the top one, with the light of their rays.
+
+        Of a job that is bending, only those in the target of the name `mask`.
+        """
+        by_generations = job.plan.hits == "embree"
+        if by_generations:
+            self._generations.trace(job, part, mask, switches, values)
+        variants = self._with_sums if by_generations else self._variants
+        program = variants.program(**switches, GENERATIONS=by_generations)
+        set_used(program, values)
+        variants.draw_part(part, program, framebuffer)
 
     def _mark_unsettled(self, job: FrameJob) -> None:
         """Leave depths that let pass pixels that need more samples: of interfaces, and of what a ground mirrors."""
@@ -130,55 +163,6 @@ class TracedInterfacesPass:
             program = self._where_unsettled.program(MIRROR=name == "mirrored")
             self._where_unsettled.draw_part(part, program, job.targets[name])
         job.gl.depth_func = "<"
-
-    def _draw_mirrored(
-        self, job: FrameJob, mirror: Mirror, framebuffer: moderngl.Framebuffer, program: moderngl.Program
-    ) -> None:
-        """Add the difference that bodies make to the light that the ground mirrors."""
-        surface = mirror.ground.surface
-        assert surface is not None
-        height = mirror.height - float(mirror.normal @ media_center(job.scene))
-        mirroring = surface.roughness, surface.ior
-        set_used(program, {"mirrored": 1, "mirror_plane": (*mirror.normal, height), "mirror_surface": mirroring})
-        part = mirrored_part(job, mirror)
-        if not part:
-            return
-        if job.bending:
-            self._variants.draw_part(part, program, job.targets["mirrored"])
-            return
-        # The state of the first interfaces, and depths that let all pass.
-        job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
-        framebuffer.color_mask = ((False,) * 4,) * 2
-        framebuffer.clear()
-        framebuffer.color_mask = ((True,) * 4,) * 2
-        self._variants.draw_part(part, program, framebuffer)
-
-    def _program(self, job: FrameJob, *, mirror: bool) -> moderngl.Program:
-        scene, environment = job.scene, job.scene.environment
-        surfaces = [body.surface for body in scene.bodies if body.surface is not None]
-        rough = any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces)
-        return self._variants.program(
-            FORKS=job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
-            DEEP=job.plan.interfaces is not None and job.plan.interfaces.tree[0] > 16,
-            FROM_EYE=job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
-            **ray_switches(scene),
-            TEXTURED=job.features.textured,
-            EMISSION=job.features.emits and not job.features.scatters,
-            LAYERED=any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
-            DIFFUSED=job.diffused_light is not None,
-            MICROFACETS=mirror or rough,
-            ROUGH=rough,
-            MIRROR=mirror,
-            DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
-            OPAQUE=job.features.has_opaque,
-            **interface_shadow_switches(job),
-            DIMMED=job.features.dims_interfaces,
-            DIFFUSE_BASE=any(s.transmission < 1 or s.transmission_texture is not None for s in surfaces),
-            **background_switches(environment),
-            SINGLE_SCATTERING=job.features.scatters,
-            FOOTPRINTS=environment.kind == "image",
-            **coat_switches(scene.objects),
-        )
 
     def _bind(self, job: FrameJob, traced: dict[str, moderngl.Texture]) -> None:
         emitted, through, *_ = job.targets["result"].color_attachments
@@ -204,8 +188,46 @@ def _shows_more(job: FrameJob) -> bool:
     return job.features.has_caustics or (job.features.has_shadow_maps and not shadows)
 
 
+def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
+    """Switches of the shaders; `mirror`: the ground mirrors bodies."""
+    scene, environment = job.scene, job.scene.environment
+    surfaces = [body.surface for body in scene.bodies if body.surface is not None]
+    rough = any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces)
+    return {
+        "FORKS": job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
+        "DEEP": job.plan.interfaces is not None and job.plan.interfaces.tree[0] > 16,
+        "FROM_EYE": job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
+        **ray_switches(scene),
+        "TEXTURED": job.features.textured,
+        "EMISSION": job.features.emits and not job.features.scatters,
+        "LAYERED": any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
+        "DIFFUSED": job.diffused_light is not None,
+        "MICROFACETS": mirror or rough,
+        "ROUGH": rough,
+        "MIRROR": mirror,
+        "DISPERSION": any(surface.dispersion > 0 for surface in surfaces),
+        "OPAQUE": job.features.has_opaque,
+        **interface_shadow_switches(job),
+        "DIMMED": job.features.dims_interfaces,
+        "DIFFUSE_BASE": any(s.transmission < 1 or s.transmission_texture is not None for s in surfaces),
+        **background_switches(environment),
+        "SINGLE_SCATTERING": job.features.scatters,
+        "FOOTPRINTS": environment.kind == "image",
+        **coat_switches(scene.objects),
+    }
+
+
+def _mirroring(scene: Scene, mirror: Mirror) -> dict[str, Any]:
+    """Loose uniforms of rays that the ground has mirrored."""
+    surface = mirror.ground.surface
+    assert surface is not None
+    height = mirror.height - float(mirror.normal @ media_center(scene))
+    mirroring = surface.roughness, surface.ior
+    return {"mirrored": 1, "mirror_plane": (*mirror.normal, height), "mirror_surface": mirroring}
+
+
 def mirrored_part(job: FrameJob, mirror: Mirror) -> Part:
-    """Pixels in which a ground may mirror bodies. Row 0 is the top row."""
+    """Pixels in which the ground may mirror bodies; row 0 is the top one."""
     twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
     width, rows = job.targets.size
     boxes, radii = np.array([twin.bounds for twin in twins]), np.array([twin.radius for twin in twins])

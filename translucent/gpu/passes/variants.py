@@ -6,10 +6,11 @@ from collections.abc import Iterable
 
 import moderngl
 
+from translucent.gpu.constants import COMPUTE_GROUP
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
 from translucent.gpu.placement import Part
-from translucent.gpu.shaders import before_making, build_program
+from translucent.gpu.shaders import before_making, build_compute, build_program
 from translucent.gpu.textures import AnyTexture
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object
@@ -123,6 +124,36 @@ class Variants:
                 self.draw_fullscreen(program)
         framebuffer.scissor = None
         framebuffer.use()
+
+
+class ComputeVariants:
+    """Compute shaders of one file that differ in their switches only; each is compiled when a scene first needs it.
+
+    Parameters
+    ----------
+    gl : moderngl.Context
+    file : str
+        Under ``shaders/``; its groups have `COMPUTE_GROUP` invocations.
+    units : int
+        Texture unit of each sampler.
+    """
+
+    def __init__(self, gl: moderngl.Context, file: str, **units: int) -> None:
+        self._gl, self._file, self._units = gl, file, units
+        self._programs: dict[tuple[tuple[str, int], ...], moderngl.ComputeShader] = {}
+
+    def program(self, **switches: bool | int) -> moderngl.ComputeShader:
+        """The compute shader with these switches; raises `PostponedError` as `Variants.program` does."""
+        key = tuple(sorted((name, int(value)) for name, value in switches.items()))
+        if key not in self._programs:
+            before_making(self._gl, (("", self._file), key))
+            self._programs[key] = build_compute(self._gl, self._file, dict(key), **self._units)
+        return self._programs[key]
+
+    def run(self, program: moderngl.ComputeShader, count: int) -> None:
+        """Run one of the shaders for so many invocations, which see the results of all runs before."""
+        program.run(-(-count // COMPUTE_GROUP))
+        self._gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
 
 
 def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:

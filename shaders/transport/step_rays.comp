@@ -1,0 +1,51 @@
+// One step of each live ray of a generation: its light, and up to two branches that go on, at places of their own. So nothing depends
+// on the order in which invocations run. The CPU has found what rays hit. MISSES: of the rays that hit nothing.
+
+#include <constants>
+
+layout(local_size_x = COMPUTE_GROUP) in;
+
+#include <View>
+#include <Environment>
+#include <Surfaces>
+#include <ObjectRow>
+#include "transport/ray_step.glsl"
+#include "transport/first_ray.glsl"
+#include "transport/stored_rays.glsl"
+
+layout(std430, binding = LIVE_RAYS_BINDING) readonly buffer LiveRays { int live_rays[]; };   // rows: number, place, pixel; path, object, triangle, weights of the hit
+layout(std430, binding = RAY_LIGHT_BINDING) writeonly buffer RayLight { vec4 ray_light[]; };  // and fraction that is lost
+
+uniform int first_number, live_count, live_room;
+
+void main() {
+    int at = first_number + int(gl_GlobalInvocationID.x);
+    if (at >= live_count) { return; }
+    read_bodies();
+    int number = live_rays[at];
+    Ray ray = stored_ray(live_rays[live_room + at]);
+    uint word = uint(live_rays[2 * live_room + at]);
+    int channel = channel_of(word);
+#if MISSES
+    Hit hit = Hit(NOTHING, -1, -1, vec2(0.0));
+    const int known = LEAVES;
+#else
+    Hit hit = Hit(intBitsToFloat(live_rays[3 * live_room + at]), live_rays[4 * live_room + at], live_rays[5 * live_room + at],
+        intBitsToFloat(ivec2(live_rays[6 * live_room + at], live_rays[7 * live_room + at])));
+    const int known = HITS;
+#endif
+    vec4 front;
+    float variance;
+    PrimaryHit primary = primary_hit(pixel_at(pixel_of(word)), front, variance);
+    Ray weaker;
+    int goes_on = follow(ray, weaker, hit, primary, channel, known);
+    vec4 light = vec4(traced_radiance, traced_lost);
+#if DISPERSION
+    if (mirrored == 0) { light *= vec4(equal(ivec4(channel), ivec4(0, 1, 2, channel))) * vec4(1.0, 1.0, 1.0, 1.0 / 3.0); }
+#endif
+    ray_light[number] = light;
+#if !MISSES
+    store(2 * at, ray, goes_on == NONE ? NO_RAY : word);
+    store(2 * at + 1, weaker, goes_on == BOTH ? word : NO_RAY);
+#endif
+}

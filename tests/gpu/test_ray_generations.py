@@ -1,0 +1,205 @@
+"""Trees of rays by generations, with hits by Embree: against the tree in one shader, and the same each time."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import moderngl
+import numpy as np
+import pytest
+
+import translucent as tl
+from tests.ray_probe import embree_hits, scene_center
+from tests.rays import agreeing, embree_nearest, random_rays
+from translucent.assets import mesh_path
+from translucent.geometry.ray_caster import embree_refusal
+from translucent.geometry.solids import Sphere, Torus
+from translucent.gpu import embree_hits as module
+from translucent.gpu import ray_generations
+from translucent.gpu.embree_hits import EmbreeHits
+from translucent.planning.render_plan import Capabilities
+
+SIZE = (40, 30)
+SKY = tl.Environment.gradient((0.2, 0.3, 0.4), (1.4, 1.2, 1.0))
+CAMERA = tl.Camera.look_at((2.0, 1.5, 4.0), (0, 0, 0), fov_y=30.0)
+GLASS, RED = tl.Medium(absorption=(0.5, 0.1, 0.9), ior=1.5), tl.Medium(absorption=(0.1, 0.8, 1.2), ior=1.33)
+FILM = tl.Medium(absorption=(300.0, 50.0, 100.0))
+BALL, CORE, RING = Sphere().tessellate(24), Sphere(radius=0.5).tessellate(24), Torus().tessellate(32)
+OPEN = tl.Mesh(BALL.vertices, BALL.faces[: len(BALL.faces) // 2])
+
+
+@pytest.fixture(autouse=True)
+def _embree(renderer: tl.Renderer) -> None:
+    if embree_refusal() or not renderer.gpu.capabilities.shader_storage:
+        pytest.skip("no Embree, or no compute shaders")
+
+
+def at(*position: float, by: float = 1.0) -> Any:
+    matrix = np.diag([by, by, by, 1.0])
+    matrix[:3, 3] = position
+    return matrix
+
+
+def seen(*objects: tl.Object, **rest: Any) -> tl.Scene:
+    return tl.Scene(list(objects), **{"camera": CAMERA, "environment": SKY, **rest})
+
+
+def drink() -> tl.Scene:
+    """Wine in a glass: their surfaces coincide, the glass displaces the wine."""
+    cup, fill = (tl.load_mesh(mesh_path(name)) for name in ("goblet", "wine"))
+    camera = tl.Camera.look_at((0.0, 0.20, 0.62), (0.0, 0.1, 0.0), fov_y=22.0)
+    glass = tl.Object(cup, tl.Medium(absorption=5.0, ior=1.54), priority=1)
+    wine = tl.Object(fill, tl.Medium(absorption=80.0, ior=1.34))
+    return seen(glass, wine, camera=camera, overlap="priority")
+
+
+def knot() -> tl.Scene:
+    return tl.showcase(tl.load_mesh(mesh_path("knot")), tl.Medium(absorption=9.0, ior=1.5), SIZE, environment=SKY)
+
+
+SCENES: dict[str, Callable[[], tl.Scene]] = {
+    "ball": lambda: seen(tl.Object(BALL, GLASS)),
+    "knot": lambda: dataclasses.replace(knot(), environment=SKY),
+    "drink": drink,
+    "film on a ball": lambda: seen(tl.Object(BALL, GLASS), tl.Object(BALL, FILM, sheet_thickness=1e-3)),
+    "open ball": lambda: seen(tl.Object(OPEN, GLASS), tl.Object(CORE, RED)),
+    "dispersion": lambda: seen(tl.Object(BALL, GLASS, surface=tl.Surface(dispersion=0.5))),
+    "rough, from inside": lambda: seen(
+        tl.Object(BALL, GLASS, surface=tl.Surface(roughness=0.3)),
+        tl.Object(RING, RED, at(0.2, 0, -3.0)),
+        camera=tl.Camera.look_at((0.0, 0.1, 0.2), (0.3, 0, -1), fov_y=60.0),
+    ),
+    "stage that mirrors": lambda: tl.showcase(BALL, tl.Medium(ior=1.5), SIZE),
+    "tiny and far": lambda: seen(
+        *(tl.Object(BALL, GLASS, at(40.0 * i, -30.0, 5.0 * i, by=10.0**-i)) for i in range(4)),
+        camera=tl.Camera.look_at((80.0, -30.0, 10.1), (80.0, -30.0, 10.0), fov_y=20.0),
+    ),
+}
+
+
+def rendered(renderer: tl.Renderer, scene: tl.Scene, hits: str, samples: int = 1) -> tl.Frame:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", tl.TranslucentWarning)  # of pixels that are not valid
+        return renderer.render(scene, SIZE, samples=samples, interfaces=tl.TracedInterfaces(12, 2, hits=hits))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_embree_makes_the_picture_of_opengl(renderer: tl.Renderer, name: str) -> None:
+    """Both round to float32: a path differs by 1e-7 of the body or so, and a ray at an edge may hit its neighbor."""
+    scene = SCENES[name]()
+    ours, theirs = (rendered(renderer, scene, hits) for hits in ("embree", "gl"))
+    assert (ours.plan.hits, theirs.plan.hits) == ("embree", "gl")
+    assert ours.provenance["hits"].startswith("Embree ")
+    assert theirs.provenance["hits"] == "OpenGL"
+    off = np.abs(ours.radiance - theirs.radiance).max(axis=2)[theirs.coverage]
+    assert off.size >= 100
+    assert off.mean() <= 1e-4
+    assert (off > 1e-2).mean() <= 2e-3
+    assert (ours.valid != theirs.valid).mean() <= 2e-3
+    assert theirs.valid.all() == (name != "open ball")
+
+
+@pytest.mark.parametrize("name", ["drink", "dispersion", "stage that mirrors"])
+def test_pictures_are_the_same_to_the_last_bit_in_any_portions(
+    renderer: tl.Renderer, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, made = SCENES[name](), []
+    for most in (ray_generations.MOST_BYTES, ray_generations.MOST_BYTES, 200_000):
+        monkeypatch.setattr(ray_generations, "MOST_BYTES", most)
+        made.append(rendered(renderer, scene, "embree", samples=5))
+    for again in made[1:]:
+        np.testing.assert_array_equal(again.radiance, made[0].radiance)
+        np.testing.assert_array_equal(again.valid, made[0].valid)
+
+
+def test_portions_are_halved_where_rays_have_no_room(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = SCENES["dispersion"]()
+    whole, halves = rendered(renderer, scene, "embree"), []
+    made = ray_generations._halves
+    monkeypatch.setattr(ray_generations, "_halves", lambda rectangle: halves.append(rectangle) or made(rectangle))
+    monkeypatch.setattr(ray_generations, "PLACES", 1)
+    monkeypatch.setattr(ray_generations, "MORE_PLACES", 2)
+    np.testing.assert_array_equal(rendered(renderer, scene, "embree").radiance, whole.radiance)
+    assert halves
+
+
+def test_a_body_that_moves_is_hit_where_it_is(renderer: tl.Renderer) -> None:
+    for place in ((0.0, 0.0, 0.0), (0.4, -0.2, 0.3)):
+        scene = seen(tl.Object(BALL, GLASS, at(*place)), tl.Object(CORE, RED))
+        ours, theirs = (rendered(renderer, scene, hits) for hits in ("embree", "gl"))
+        assert np.abs(ours.radiance - theirs.radiance).mean() < 1e-4
+
+
+@pytest.fixture
+def crowd(monkeypatch: pytest.MonkeyPatch) -> Iterator[tl.Scene]:
+    """Bodies of all sizes and ways, of which some have Embree scenes of their own."""
+    monkeypatch.setattr(module, "OWN_SCENE", len(RING.faces))
+    monkeypatch.setattr(module, "MOST_OWN", 3)
+    rng = np.random.default_rng(5)
+    objects = []
+    for number in range(9):
+        turned = np.eye(4)
+        turned[:3, :3] = 10.0 ** rng.uniform(-2, 0) * np.linalg.qr(rng.normal(size=(3, 3)))[0] @ np.diag((1, -1, 0.6))
+        turned[:3, 3] = 3.0 * rng.normal(size=3)
+        objects.append(tl.Object((RING, BALL)[number % 2], GLASS, turned))
+    return seen(*objects)
+
+
+def test_random_rays_hit_what_they_hit_in_each_mesh(crowd: tl.Scene) -> None:
+    hits = EmbreeHits(crowd, scene_center(crowd))
+    origins, directions = random_rays(crowd, 40_000, np.random.default_rng(7))
+    away = np.arange(len(origins)) % 5 == 0
+    origins[away] -= 1e4 * directions[away]
+    ours = embree_hits(crowd, hits, origins, directions)
+    near = ~away
+    alike = agreeing(crowd, ours, embree_nearest(crowd, origins, directions))
+    assert (ours.object >= 0).mean() > 0.3
+    assert (~alike[near]).mean() <= 1e-4
+    assert (~alike[away]).mean() <= 1e-2  # float32 has no finer origins so far away
+
+
+def test_what_cannot_be_had_is_refused_or_told(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, software = SCENES["ball"](), Capabilities(software=True)
+    assert tl.plan(scene, capabilities=software).hits == "embree"
+    assert tl.plan(scene, capabilities=Capabilities()).hits == "gl"
+    assert tl.plan(scene, capabilities=dataclasses.replace(software, shader_storage=False)).hits == "gl"
+    assert tl.plan(scene, interfaces=tl.ScreenInterfaces()).hits == ""
+    with pytest.raises(tl.InputError, match=r"no compute shaders, which came with 4\.3; leave hits out"):
+        tl.plan(scene, capabilities=Capabilities(shader_storage=False), interfaces=tl.TracedInterfaces(hits="embree"))
+    with pytest.raises(tl.InputError, match="this renderer has no OpenGL; leave hits out"):
+        tl.plan(scene, capabilities=Capabilities(opengl=False), interfaces=tl.TracedInterfaces(hits="gl"))
+    with pytest.raises(tl.InputError, match="TracedInterfaces hits 'cuda'; not a known one; use 'embree' or 'gl'"):
+        tl.TracedInterfaces(hits="cuda")
+    monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
+    told = tl.plan(scene, capabilities=software)
+    assert told.hits == "gl"
+    assert "embreex cannot be imported" in str(told)
+    assert "OpenGL finds what rays hit, in about twice the time" in str(told)
+    with pytest.raises(tl.InputError, match=r"embreex cannot be imported .*; pip install -U embreex, or leave"):
+        rendered(renderer, scene, "embree")
+    monkeypatch.undo()
+    monkeypatch.setattr("translucent.geometry.ray_caster.version", lambda name: "2.17.7")
+    assert "embreex is 2.17.7, older than 4.4" in str(tl.plan(scene, capabilities=software))
+
+
+def test_a_shader_that_fails_in_mid_frame_leaves_the_renderer_usable(
+    renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = SCENES["ball"]()
+    whole = rendered(renderer, scene, "embree")
+    made, calls = EmbreeHits.nearest, []
+
+    def fail(hits: EmbreeHits, *rays: Any) -> Any:
+        calls.append(rays)
+        if len(calls) == 3:
+            raise moderngl.Error("lost")
+        return made(hits, *rays)
+
+    monkeypatch.setattr(EmbreeHits, "nearest", fail)
+    with pytest.raises(moderngl.Error, match="lost"):
+        rendered(renderer, scene, "embree")
+    np.testing.assert_array_equal(rendered(renderer, scene, "embree").radiance, whole.radiance)

@@ -1,0 +1,264 @@
+"""Trees of rays by generations: the CPU finds what all rays of one hit, then a compute shader lets them interact.
+
+A generation has a list of live rays, in the order of their pixels. Each leaves up to two branches at places of its own,
+twice its number and one more, and the CPU lists those that are there. So pictures are the same each time: no result
+depends on the order in which threads run. A frame is traced in portions, which bound the memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from translucent.gpu.constants import STORAGE_BINDINGS
+from translucent.gpu.embree_hits import EmbreeHits, Floats, Hits
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.variants import ComputeVariants
+from translucent.gpu.placement import Part
+from translucent.gpu.shaders import set_used
+from translucent.gpu.uniforms import media_center
+
+#: Bytes of the buffers of rays, however large the frame is.
+MOST_BYTES = 80 << 20
+
+#: Places for rays to each pixel of a portion, of which live rays fill no more than half: about two rays of a pixel are
+#: alive at once, in bodies with many walls three.
+PLACES, MORE_PLACES = 3, 8
+
+#: Bytes of what a ray hits, of its light, and of the list of pixels.
+_LIVE_BYTES = 32 + 16 + 8
+
+#: What the pixel of a place without a ray is; and the bits of the others that are not the channel.
+_NO_RAY, _PIXEL = np.uint32(0xFFFFFFFF), np.uint32(0x3FFFFFFF)
+
+#: Column, row, width and height.
+Rectangle: TypeAlias = tuple[int, int, int, int]
+
+#: Columns and rows of a block of pixels, whose rays are computed together.
+_BLOCK = 4, 2
+
+
+class RayGenerations:
+    """Driver of the compute shaders that follow trees of rays; see ``shaders/transport/step_rays.comp``.
+
+    Parameters
+    ----------
+    gl : moderngl.Context
+    samplers : sequence of str
+        Names of the samplers of ``shaders/transport/ray_step.glsl``, each with its place for its texture unit.
+    free : int
+        Texture unit of the marks of unsettled pixels.
+    """
+
+    def __init__(self, gl: moderngl.Context, samplers: Sequence[str], free: int) -> None:
+        units = {name: unit for unit, name in enumerate(samplers)}
+        self._unsettled = free
+        self._begin = ComputeVariants(gl, "transport/begin_rays.comp", **units, unsettled=free)
+        self._step = ComputeVariants(gl, "transport/step_rays.comp", **units)
+        self._sum = ComputeVariants(gl, "transport/sum_ray_light.comp")
+
+    def trace(
+        self,
+        job: FrameJob,
+        part: Part,
+        mask: str,
+        switches: Mapping[str, bool | int],
+        values: Mapping[str, Any],
+    ) -> None:
+        """Sum up the light of the rays of some pixels, in the buffer that ``traced_interfaces.frag`` reads.
+
+        Parameters
+        ----------
+        job : FrameJob
+        part : Part
+            Of the frame, whose row 0 is the top one.
+        mask : str
+            Target with the pixels that need more samples, where a job is bending.
+        switches, values
+            Of the shaders, whose textures are bound.
+        """
+        width, height = job.targets.size
+        programs = (
+            self._begin.program(**switches),
+            *(self._step.program(**switches, MISSES=misses) for misses in (False, True)),
+            self._sum.program(),
+        )
+        hierarchies = job.resources.hierarchies.of(job.scene, textured=job.features.textured)
+        room = _Room(job, part, switches, hierarchies.first_triangles)
+        for program in programs:
+            set_used(program, {**values, "ray_words": room.words, "live_room": room.live + 1, "columns": width})
+        if job.bending:
+            job.targets[mask].color_attachments[0].use(self._unsettled)
+        hits = job.resources.ray_hits.of(job.scene, media_center(job.scene))
+        job.targets.buffers.get("traced_light", 16 * width * height).bind_to_storage_buffer(
+            STORAGE_BINDINGS["traced_light"]
+        )
+        job.gl.memory_barrier()  # light that is drawn by now may not be read yet
+        waiting = room.rectangles(part)[::-1]
+        while waiting:
+            rectangle = waiting.pop()
+            if not self._trace_rectangle(rectangle, room, hits, *programs):
+                waiting += _halves(rectangle)[::-1]
+
+    def _trace_rectangle(
+        self,
+        rectangle: Rectangle,
+        room: _Room,
+        hits: EmbreeHits,
+        begin: moderngl.ComputeShader,
+        step: moderngl.ComputeShader,
+        leave: moderngl.ComputeShader,
+        sum_up: moderngl.ComputeShader,
+    ) -> bool:
+        """Trace the rays of a rectangle; returns False if there is no room for them all."""
+        places = _places(rectangle)
+        set_used(begin, {"rectangle": rectangle, "places": places})
+        room.bind_branches()
+        self._begin.run(begin, places)
+        filled = places * room.channels
+        while count := len((live := room.turn(filled)).places):
+            if count > room.live:
+                return False
+            found, pixels = room.put(live, hits.nearest(live.origins, live.directions))
+            filled = 2 * found
+            set_used(step, {"live_count": found})
+            set_used(leave, {"first_number": found, "live_count": count})
+            set_used(sum_up, {"pixel_count": pixels})
+            room.bind()
+            self._step.run(step, found)
+            self._step.run(leave, count - found)
+            room.bind_sums()
+            self._sum.run(sum_up, pixels)
+        return True
+
+
+class _Live(NamedTuple):
+    """Live rays of a generation: their places, pixels, origins and directions."""
+
+    places: npt.NDArray[np.intp]
+    pixels: npt.NDArray[np.uint32]
+    origins: Floats
+    directions: Floats
+
+
+class _Room:
+    """Buffers of the rays of two generations, and of what rays of one hit and of their light."""
+
+    def __init__(
+        self,
+        job: FrameJob,
+        part: Part,
+        switches: Mapping[str, bool | int],
+        first_triangles: npt.NDArray[np.int32],
+    ) -> None:
+        self.channels = 3 if switches["DISPERSION"] else 1
+        self.words = _words(switches)
+        branch = 4 * (self.words + 7)
+        width, height = part.scissor[2:]
+        most = MOST_BYTES // (2 * branch + _LIVE_BYTES // 2)
+        self.places = min(MORE_PLACES * self.channels * _places((0, 0, width, height)), most)
+        self.live = self.places // 2
+        storage = job.resources.rays
+        self._rays, self._branches = (
+            tuple(
+                storage.get(f"{name} {side}", size * self.places)
+                for name, size in (("records", 4 * self.words), ("segments", 24), ("pixels", 4))
+            )
+            for side in range(2)
+        )
+        self._live, self._light, self._sums = (
+            storage.get(name, size * (self.live + 1)) for name, size in (("live", 32), ("light", 16), ("sums", 8))
+        )
+        self._first_triangles = first_triangles
+
+    def rectangles(self, part: Part) -> list[Rectangle]:
+        """Rectangles of pixels: column, row, width and height, each with rays that there is room for at first."""
+        left, top, width, height = part.scissor
+        blocks = -(-width // _BLOCK[0])
+        rows = max(self.places // (PLACES * self.channels * 8 * blocks), 1) * _BLOCK[1]
+        return [(left, top + begin, width, min(rows, height - begin)) for begin in range(0, height, rows)]
+
+    def bind_branches(self) -> None:
+        """Bind the buffers that rays are written to."""
+        for name, buffer in zip(("branches", "branch_segments", "branch_pixels"), self._branches, strict=True):
+            buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
+
+    def bind(self) -> None:
+        """Bind the buffers of a step."""
+        self.bind_branches()
+        read = {"rays": self._rays[0], "ray_segments": self._rays[1], "live_rays": self._live, "ray_light": self._light}
+        for name, buffer in read.items():
+            buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
+
+    def bind_sums(self) -> None:
+        """Bind the lists of the rays of pixels."""
+        self._sums.bind_to_storage_buffer(STORAGE_BINDINGS["pixel_rays"])
+
+    def turn(self, places: int) -> _Live:
+        """Make rays of the branches in the first so many places; returns those that are there."""
+        self._rays, self._branches = self._branches, self._rays
+        _, segments, pixels = self._rays
+        # OpenGL reads no 0 bytes.
+        words = np.frombuffer(pixels.read(4 * max(places, 1)), np.uint32)[:places]
+        found = np.flatnonzero(words != _NO_RAY)
+        ends = np.frombuffer(segments.read(24 * max(places, 1)), np.float32).reshape(-1, 6).take(found, axis=0)
+        return _Live(found, words.take(found), ends[:, :3], ends[:, 3:])
+
+    def put(self, live: _Live, hits: Hits) -> tuple[int, int]:
+        """Write what rays hit, first those that hit anything, and the lists of the rays of pixels.
+
+        Returns
+        -------
+        found : int
+            Number of the rays that hit anything.
+        pixels : int
+            Number of the pixels.
+        """
+        found, missed = np.flatnonzero(hits.object >= 0), np.flatnonzero(hits.object < 0)
+        order = np.concatenate([found, missed])
+        objects = hits.object.take(found)
+        triangles = hits.triangle.take(found) + self._first_triangles.take(objects)
+        weights = (part.take(found) for part in hits.weights)
+        places = live.places.take(order).astype(np.int32)
+        rows = (
+            order.astype(np.int32),
+            places,
+            live.pixels.take(order),
+            hits.path.take(found),
+            objects,
+            triangles,
+            *weights,
+        )
+        for number, row in enumerate(rows):
+            self._live.write(row, offset=4 * (self.live + 1) * number)
+        pixels = live.pixels & _PIXEL
+        first = np.concatenate([[0], np.flatnonzero(pixels[1:] != pixels[:-1]) + 1, [len(pixels)]])
+        self._sums.write(np.stack([first, pixels.take(first, mode="clip")], axis=1).astype(np.uint32))
+        return len(found), len(first) - 1
+
+
+def _words(switches: Mapping[str, bool | int]) -> int:
+    """Words of the record of a ray in ``shaders/transport/stored_rays.glsl``."""
+    interior = 1 if switches["ONE_OBJECT"] else 4
+    outwards = 3 if switches["LAYERED"] or switches["DIFFUSED"] else 0
+    return 5 + interior + 2 * switches["MICROFACETS"] + outwards + 12 * switches["FOOTPRINTS"]
+
+
+def _places(rectangle: Rectangle) -> int:
+    """Number of pixels in the whole blocks of a rectangle."""
+    columns, rows = _BLOCK
+    return -(-rectangle[2] // columns) * -(-rectangle[3] // rows) * columns * rows
+
+
+def _halves(rectangle: Rectangle) -> list[Rectangle]:
+    """Two halves of a rectangle, its first rows or columns first."""
+    left, top, width, height = rectangle
+    if height > 1:
+        half = height // 2
+        return [(left, top, width, half), (left, top + half, width, height - half)]
+    half = width // 2
+    return [(left, top, half, height), (left + half, top, width - half, height)]
