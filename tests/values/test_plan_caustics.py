@@ -90,6 +90,21 @@ def test_fog_that_photons_do_not_light_is_told() -> None:
     assert "directions in which 'box' scatters caustics: alike in all" in str(ahead)
 
 
+def test_a_plan_names_the_option_that_shows_the_light_in_a_shadow() -> None:
+    """Where a light, a clear body that bends it and something to receive it are there, and photons are not."""
+    offered = "the bright spot in the shadow of 'box': --caustics (tl.Caustics()) shows it"
+    assert offered in [str(note) for note in plan(scene()).unmodelled]
+    others = [
+        scene(lights=()),
+        scene(body()),
+        scene(body(tl.Medium(1.0)), body(None, 3.0)),
+        scene(body(tl.Medium(1.0, 50.0, ior=1.4)), body(None, 3.0)),
+        scene(body(sheet_thickness=0.01), body(None, 3.0)),
+    ]
+    assert not any("bright spot" in str(plan(other)) for other in others)
+    assert "bright spot" not in str(plan(scene(), caustics=FEW))
+
+
 def test_nobody_gets_caustics_unasked() -> None:
     found = plan(scene())
     assert not found.has(PassName.CAUSTICS)

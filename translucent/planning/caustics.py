@@ -193,6 +193,23 @@ def _check_paths(scene: Scene, lit: tuple[int, ...]) -> None:
         raise InputError("caustics", found, "give it an inside, or no roughness")
 
 
+def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
+    """Note on light that clear bodies gather in their shadows, which photons would show; empty without such light."""
+    clear = [
+        body
+        for body in scene.bodies
+        if _redirects_light(body)
+        and body.sheet_thickness is None
+        and body.density is None
+        and body.medium is not None
+        and not body.medium.scatters
+    ]
+    if not clear or not scene.lights or not scene.opaque:
+        return ()
+    text = f"the bright spot in the shadow of {object_names(clear)}: --caustics (tl.Caustics()) shows it"
+    return (Note(NoteKind.CAUSTICS, text),)
+
+
 def caustics_left_out(scene: Scene, lit: tuple[int, ...], fogs: tuple[int, ...], opengl: bool) -> tuple[Note, ...]:
     """Notes on light that photons do not carry."""
     texts = ["caustics of light of the environment"]

@@ -27,6 +27,7 @@ from translucent.planning.bodies import (
 from translucent.planning.caustics import (
     Caustics,
     caustics_left_out,
+    caustics_to_request,
     check_caustics,
     lit_by_photons,
     opaque_to_shadows,
@@ -151,6 +152,8 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
     found = replace(found, request=request, unmodelled=unmodelled, remarks=(*found.remarks, *remarks(scene)))
     if request.caustics is not None:
         found = _with_caustics(found, scene, request.caustics, machine)
+    elif paths is None:
+        found = replace(found, unmodelled=(*found.unmodelled, *caustics_to_request(scene)))
     found = _with_textures(found, machine)
     return found if found.traced else _with_shadows(found, scene, machine)
 
