@@ -8,10 +8,11 @@
 #include "lib/color.glsl"
 
 uniform sampler2D bent_light;      // sum over the samples that hit an interface; alpha: how many of them there are so far
-uniform sampler2D bent_spread;     // r: sum of squared luminance
+uniform sampler2D bent_spread;     // r: sum of squared luminance; alpha: of the fractions that can be trusted
 uniform sampler2D average_light;   // sum over the samples that hit no interface; alpha: how many these are
 uniform float samples;             // of a pixel
 uniform float contrast;            // largest range of light near a pixel that one sample is enough for, as a fraction of its mean
+uniform float much_lost;           // fraction of a pixel's light whose loss makes it invalid whatever other samples find
 uniform float error;               // largest standard error that is as good as none, likewise
 uniform int first;                 // 1: there is one sample so far
 
@@ -21,6 +22,8 @@ void main() {
     ivec2 here = ivec2(gl_FragCoord.xy), last = ivec2(frame_size.xy) - 1;
     float beside = texelFetch(average_light, here, 0).a, taken = texelFetch(bent_light, here, 0).a;
     if (taken >= (MIRROR == 1 ? beside : samples - beside)) { discard; }
+    float lost = (MIRROR == 1 ? 0.0 : taken) - texelFetch(bent_spread, here, 0).a;
+    if (lost > much_lost * max(taken, samples / 16.0)) { discard; }
     unsettled = 1.0;
     if (taken == 0.0 || (MIRROR == 0 && beside > 0.0)) { return; }
     int reach = first == 1 ? 2 : 1;

@@ -28,6 +28,11 @@ CONTRAST, ERROR = 0.1, 0.01
 #: smooth but for the mirror image, so that less of an error shows.
 MIRROR_CONTRAST, MIRROR_ERROR = 0.01, 0.003
 
+#: Fractions of a pixel's light that rays lose, as in open meshes, from which on it is not worth more samples: of
+#: interfaces, so that one sample of 16 makes the pixel invalid (`renderer.MOST_LOST`) whatever the others find; and of
+#: what a ground mirrors, so that as many lost by the others do.
+MUCH_LOST, MIRROR_LOST = 0.1, 0.005
+
 #: Passes of a sample whose results are there, or are not read, when rays are traced from its interfaces.
 _DONE = (PassName.BACKDROP, PassName.CAUSTICS)
 _NEEDED = (PassName.SHADOW_MAPS, PassName.OPAQUE, PassName.INTERFACES, PassName.TRACED)
@@ -101,10 +106,10 @@ class AdaptiveSampling:
         if not job.covered:
             return 0
         whole = Part(0, 0, *job.targets.size)
-        left = self._mark_unsettled(job, samples, taken, ("bent", "unsettled"), (CONTRAST, ERROR), whole)
+        left = self._mark_unsettled(job, samples, taken, ("bent", "unsettled"), (CONTRAST, ERROR, MUCH_LOST), whole)
         if job.mirror is not None:
             part, names = mirrored_part(job, job.mirror), ("mirrored", "mirror_unsettled")
-            left += self._mark_unsettled(job, samples, taken, names, (MIRROR_CONTRAST, MIRROR_ERROR), part)
+            left += self._mark_unsettled(job, samples, taken, names, (MIRROR_CONTRAST, MIRROR_ERROR, MIRROR_LOST), part)
         return left
 
     def _mark_unsettled(
@@ -113,10 +118,10 @@ class AdaptiveSampling:
         samples: int,
         taken: int,
         names: tuple[str, str],
-        most: tuple[float, float],
+        most: tuple[float, float, float],
         part: Part,
     ) -> int:
-        """Mark the pixels of a part whose range or standard error of light is larger than that."""
+        """Mark the pixels of a part whose range or standard error is larger than that, unless more light is lost."""
         source, mask = (job.targets[name] for name in names)
         mask.clear()
         light, spread = source.color_attachments
@@ -125,6 +130,7 @@ class AdaptiveSampling:
         program = self._unsettled.program(MIRROR=names[0] == "mirrored")
         finer = min(16.0 / samples, 1.0) ** 0.5
         values = {"samples": samples, "contrast": most[0] * finer, "error": most[1] * finer, "first": taken == 1}
+        values["much_lost"] = most[2]
         set_used(program, values)
         self._gl.enable_only(moderngl.NOTHING)
         with self._left:
