@@ -5,10 +5,16 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import translucent as tl
+import translucent.gpu.renderer as renderer_module
 from translucent.geometry.solids import Box, Sphere
+from translucent.gpu.job import FrameJob
+from translucent.gpu.targets import read_floats
+
+Floats = npt.NDArray[np.float32]
 
 SIZE = (40, 32)
 CAMERA = tl.Camera.look_at((0.3, 0.4, 5.0), (0, 0, 0), fov_y=30.0)
@@ -51,6 +57,55 @@ def test_a_smooth_interior_is_traced_once(renderer: tl.Renderer) -> None:
     few, every = (renderer.render(scene, SIZE, samples=16, adaptive=adaptive) for adaptive in (True, False))
     assert few.provenance["traced_samples"] == "1.0 of 16"
     np.testing.assert_allclose(few.radiance, every.radiance, rtol=5e-3)
+
+
+def on_a_polished_ground() -> tl.Scene:
+    corners = np.array([(-9.0, -1.05, -9.0), (9.0, -1.05, -9.0), (9.0, -1.05, 9.0), (-9.0, -1.05, 9.0)])
+    coat = tl.Surface(color=(0.02, 0.02, 0.02), roughness=0.25, double_sided=False)
+    ground = tl.Object(tl.Mesh(corners, np.array([(0, 2, 1), (0, 3, 2)], np.int32)), surface=coat, shadow_catcher=True)
+    camera = tl.Camera.look_at((0.3, 0.4, 7.0), (0, -0.7, 0), fov_y=30.0)
+    return dataclasses.replace(ball(), objects=[*ball().objects, ground], camera=camera)
+
+
+def test_what_a_ground_mirrors_is_that_of_all_samples(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In few of them: the ground is dark, so that a third of its light is the mirror image of the ball."""
+    scene, taken = on_a_polished_ground(), []
+    read = renderer_module.read_averages
+
+    def counted(job: FrameJob, samples: int) -> tuple[Floats, Floats, Floats]:
+        taken.append(read_floats(job.targets["mirrored"], 0, 4)[..., 3] if job.bent_apart else None)
+        return read(job, samples)
+
+    monkeypatch.setattr(renderer_module, "read_averages", counted)
+    few, every = (renderer.render(scene, SIZE, samples=16, adaptive=adaptive) for adaptive in (True, False))
+    beside = ~every.coverage
+    mean = every.radiance[beside].mean()
+    off = (few.radiance - every.radiance)[beside]
+    assert np.sqrt(np.square(off, dtype=np.float64).mean()) < 0.005 * mean
+    assert np.abs(off).max() < 0.05 * mean
+    plain = dataclasses.replace(scene, objects=[scene.objects[0], _without_a_coat(scene.objects[1])])
+    unmirrored = renderer.render(plain, SIZE, samples=16).radiance
+    assert np.abs(every.radiance - unmirrored)[beside].max() > 0.2 * mean  # there is a mirror image
+    assert taken[0] is not None
+    assert taken[0][taken[0] > 0].mean() < 13.0
+
+
+def _without_a_coat(ground: tl.Object) -> tl.Object:
+    assert ground.surface is not None
+    return dataclasses.replace(ground, surface=dataclasses.replace(ground.surface, ior=1.0))
+
+
+@pytest.mark.filterwarnings("ignore:.*not valid")
+def test_pixels_whose_light_is_lost_take_no_further_samples(renderer: tl.Renderer) -> None:
+    """Of an open box of glass that is viewed from above: nobody knows how rays go on that leave through its hole."""
+    faces = Box((-1, -1, -1), (1, 1, 1)).tessellate(1)
+    below = faces.face_normals[:, 1] > -0.5
+    box = tl.Mesh(faces.vertices, faces.faces[below])
+    scene = tl.Scene([tl.Object(box, GLASS)], tl.Camera.look_at((0.3, 5, 0.4), (0, 0, 0), fov_y=40.0), environment=SKY)
+    few, every = (renderer.render(scene, SIZE, samples=16, adaptive=adaptive) for adaptive in (True, False))
+    np.testing.assert_array_equal(few.valid, every.valid)
+    assert (every.coverage & ~every.valid).mean() > 0.1
+    assert traced(few) < 6.0
 
 
 def test_the_edge_of_a_body_takes_all_samples(renderer: tl.Renderer) -> None:
