@@ -192,6 +192,7 @@ def test_links_lead_somewhere(page: str) -> None:
             continue
         file = ((ROOT / page).parent / path).resolve() if path else ROOT / page
         assert file.exists(), target
+        assert page == "README.md" or file.is_relative_to(ROOT / "docs"), f"{target} is not a part of the site"
         if anchor:
             assert anchor in [name for _, name in headings(file.relative_to(ROOT).as_posix())], target
 
