@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError, TranslucentError
+from translucent.units import metres_in
 
 T = TypeVar("T")
 
@@ -66,7 +67,14 @@ def _checked(function: Any, title: str, module: str, but: tuple[str, ...] = ()) 
         for name, value in (*zip(names, args, strict=False), *kwargs.items()):
             test = test_of(name)
             if test is not None and (found := test.wrong(value)):
-                return InputError(f"{title} {name} {brief(value)}", found, f"give {test.give}")
+                do = f"give {test.give}"
+                if (
+                    isinstance(value, str)
+                    and test.give.startswith("a number")
+                    and (metres := metres_in(value)) is not None
+                ):
+                    do = f"give metres: {metres:g}"
+                return InputError(f"{title} {name} {brief(value)}", found, do)
         return None
 
     def converted(name: str, value: Any) -> Any:

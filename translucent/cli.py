@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import warnings
+from itertools import pairwise
 
 import click
 
@@ -35,13 +36,19 @@ def main(arguments: list[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     warnings.showwarning = lambda message, *_, **__: echo(f"warning: {message_of(str(message))}", err=True)
     try:
+        _require_values(given)
         cli.main(args=given, prog_name="translucent", standalone_mode=False)
     except click.exceptions.Abort:
         return _failed("interrupted", 130)
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         command = context.command_path if context else "translucent"
-        message = _below_zero(error, given) or _dashed_file(error, given) or error.format_message().rstrip(".")
+        message = (
+            _below_zero(error, given)
+            or _two_words(given)
+            or _dashed_file(error, given)
+            or error.format_message().rstrip(".")
+        )
         return _failed(f"{message}{_quoting(error)}; see '{command} --help'", 2)
     except TranslucentError as error:
         if "--debug" in given:
@@ -57,6 +64,33 @@ def main(arguments: list[str] | None = None) -> int:
             return _failed(message_of("memory", found, "ask for less at a time, or raise its limit (ulimit -v)"), 1)
         return _failed(f"unexpected {type(error).__name__}; {error or 'no details'}; --debug shows where", 1)
     return 0
+
+
+def _require_values(given: list[str]) -> None:
+    """Raise where an option that takes a value stands before another option: that would be taken for the value."""
+    verb = cli.commands.get(given[0]) if given else None
+    if verb is None or isinstance(verb, click.Group):
+        return
+    options = [one for one in verb.params if isinstance(one, click.Option)]
+    names = {name for one in options for name in (*one.opts, *one.secondary_opts) if name.startswith("--")}
+    valued = {
+        name for one in options if not one.is_flag and not getattr(one, "_flag_needs_value", False) for name in one.opts
+    }
+    for word, after in pairwise(given):
+        if word == "--":
+            return
+        if word in valued and after in names:
+            raise InputError(word, f"the next word is the option {after}", f"give {word} a value before it")
+
+
+def _two_words(given: list[str]) -> str | None:
+    """The message for a length in two words, as ``1 cm``."""
+    from translucent.units import METRES_PER_UNIT
+
+    for option, number, unit in zip(given, given[1:], given[2:], strict=False):
+        if option.startswith("--") and re.fullmatch(r"[\d.]+", number) and unit in METRES_PER_UNIT:
+            return f"{option} {number} {unit}; two words; write {number}{unit}"
+    return None
 
 
 def _out_of_memory(error: Exception) -> bool:

@@ -59,6 +59,14 @@ def parse_length(text: str, default_unit: str = "m") -> float:
     return metres
 
 
+def metres_in(text: str) -> float | None:
+    """Metres of a length with a unit; None of a text that is none."""
+    match = _LENGTH.fullmatch(text)
+    if match is None or match[2].replace("µ", "u") not in METRES_PER_UNIT:
+        return None
+    return float(match[1]) * metres_per_unit(match[2])
+
+
 def length_text(metres: float) -> str:
     """Length in words, with three digits, in the largest of m, mm, µm and nm that it exceeds."""
     scale, name = next((one for one in _WORDS if metres >= one[0]), _WORDS[-1])

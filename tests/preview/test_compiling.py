@@ -376,7 +376,7 @@ def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierar
     mesh = work.loaded.scene.objects[0].mesh
     work.do(ChoosePreset("merlot"))
     view.draw(work, SIZE)
-    assert "until rays can be traced" in view.quality.notes[0]
+    assert "Preparing reflections in the mesh" in view.quality.notes[0]
     assert isinstance(view.quality.request.interfaces, tl.ScreenInterfaces)
     assert not has_packed(mesh)
     near.set()
@@ -416,7 +416,7 @@ def test_where_no_process_can_draw_the_window_compiles_by_itself(
     told = [message.text for message in work.messages if "shaders are compiled in the window" in message.text]
     assert len(told) == 1
     assert "status 9" in told[0]
-    assert "since it could not be solved for" in view.quality.notes[1]  # nor is the window to run out of memory
+    assert "has failed: first guess" in view.quality.notes[1]  # nor is the window to run out of memory
     messages = len(work.messages)
     work.do(SetField("display.method", "depth-peeling"))
     finish(view, work)

@@ -81,7 +81,7 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     for _ in range(2):
         work.do(OrbitBy(20.0, 10.0))
         assert view.draw(work, SIZE)
-        assert ("interfaces in screen space while the picture moves" in view.simpler) is slow
+        assert ("Rough reflections while the picture moves" in view.simpler) is slow
     assert [plan.interfaces for plan in drawn] == 2 * [tl.ScreenInterfaces() if slow else usual]
     finish(view, work)
     assert (view.simpler, view.plans[0].interfaces) == ("", usual)
@@ -114,7 +114,7 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(view: ViewportRenderer, work
     view.preparing = 1e9  # what is solved for in a frame is drawn in it
     work.do(ChoosePreset("whole_milk"))
     assert view.draw(work, SIZE)
-    assert "until its diffusion is solved for" in view.quality.notes[1]
+    assert "Softening light in the " in view.quality.notes[1]
     assert view.plans[0] is not None
     assert view.plans[0].treated(Treatment.LAYER) == (0,)
     finish(view, work)
@@ -127,7 +127,7 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(view: ViewportRenderer, work
     assert np.abs(pixels(view) - frame.to_srgb8().astype(int)).mean() < 1.0
     work.do(SetField("look.light", True))
     finish(view, work)
-    for action, told in ((OrbitBy(20.0, 10.0), ""), (SetField("look.light_yaw", 3.0), "on a small grid")):
+    for action, told in ((OrbitBy(20.0, 10.0), ""), (SetField("look.light_yaw", 3.0), "rough preview")):
         work.do(action)
         view.draw(work, SIZE)
         assert (told in view.quality.notes[1]) if told else not view.quality.notes[1]
@@ -204,7 +204,7 @@ def test_light_that_cannot_be_solved_for_is_told_once(
     monkeypatch.setattr(view.renderer.gpu.diffusion, "solve", fail)
     work.do(ChoosePreset("whole_milk"))
     finish(view, work)
-    assert "since it could not be solved for" in view.quality.notes[1]
+    assert "has failed: first guess" in view.quality.notes[1]
     assert [message.kind for message in work.messages] == ["error"]
     assert view.plans[0] is not None
     assert view.plans[0].treated(Treatment.LAYER) == (0,)

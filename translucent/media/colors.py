@@ -173,6 +173,7 @@ QUOTE_HINT = "a shell takes #... for a comment: quote it, '#7b1e3a', or leave th
 
 _BARE_HEX = re.compile(r"\s*[0-9a-fA-F]{6}\s*")
 _FUNCTION = re.compile(r"\s*(srgb|linear)\s*\(([^()]*)\)\s*", re.IGNORECASE)
+_BYTES = re.compile(r"\s*\(?\s*(\d{1,3})\s*[, ]\s*(\d{1,3})\s*[, ]\s*(\d{1,3})\s*\)?\s*")
 _PIXEL = re.compile(r"(.+)@\s*(\d+)\s*,\s*(\d+)\s*")
 
 
@@ -227,6 +228,9 @@ def _parse_text(text: str) -> Array:
     try:
         rgb = ImageColor.getrgb(f"#{text.strip()}" if _BARE_HEX.fullmatch(text) else text.strip())
     except ValueError:
+        if (eight := _BYTES.fullmatch(text)) is not None:
+            found = "three numbers of 0 to 255"
+            raise InputError(f"color {text!r}", found, f"write {hex_of_bytes(map(float, eight.groups()))!r}") from None
         raise InputError(
             f"color {text!r}",
             "neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)",
@@ -239,6 +243,14 @@ def _finite(triple: Array, text: str) -> Array:
     if not np.isfinite(triple).all():
         raise InputError(f"color {text}", "a channel is not finite", "give numbers")
     return triple
+
+
+def hex_of_bytes(values: Iterable[float]) -> str:
+    """Hex color of three numbers of 0 to 255; empty if they are none, or all within 0 to 1."""
+    channels = list(values)
+    if len(channels) != 3 or not all(0 <= one <= 255 and one == int(one) for one in channels) or max(channels) <= 1:
+        return ""
+    return "#" + "".join(f"{int(one):02x}" for one in channels)
 
 
 def reflectance(color: ColorLike, name: str) -> Array:

@@ -15,7 +15,8 @@ from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.formulas.phase import HenyeyGreenstein, PhaseFunction
 from translucent.media import conversion
-from translucent.media.colors import parse_color
+from translucent.media.colors import hex_of_bytes, parse_color
+from translucent.units import metres_in
 
 Channels = npt.ArrayLike
 
@@ -98,19 +99,24 @@ class Medium(Frozen):
             distance is not positive.
         """
         triple = parse_color(color)
+        bytes_of_color = hex_of_bytes(triple.tolist())
         for channel, value in zip(("red", "green", "blue"), triple, strict=True):
             if not 0 < value <= 1:
                 raise InputError(
                     f"color {color!r}" if isinstance(color, str) else f"color {tuple(triple.tolist())}",
                     f"{channel} = {value:g} is not in 0 < t <= 1",
                     "no finite extinction gives 0 or above 1; use for example 0.001 for nearly black"
-                    if value <= 0
+                    if value <= 0 and not bytes_of_color
+                    else f"write {bytes_of_color!r} for these numbers of 0 to 255"
+                    if bytes_of_color
                     else "a medium cannot add light; scale the color to at most 1",
                 )
         try:
             metres = float(distance)
         except (TypeError, ValueError):
             metres = np.nan
+        if isinstance(distance, str) and (stated := metres_in(distance)) is not None:
+            raise InputError(f"distance {distance!r}", "a text with a unit", f"give the metres: {stated:g}")
         if not metres > 0:
             raise InputError(f"distance {distance!r}", "not above 0", "give the distance in metres, for example 0.02")
         with np.errstate(over="ignore", under="ignore"):

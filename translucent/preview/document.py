@@ -491,12 +491,13 @@ look.light_pitch = Direction of the light above the horizon in degrees. Typical:
 look.light_irradiance = Irradiance of the light in W/m2 (intensity of KHR_lights_punctual, lx there). Typical: 3
     is as bright as white surroundings.
 display.method = How thickness is found; auto: the cheapest method that is exact for the scene.
-display.method_b = The method right of the split, to be compared with the one on its left.
+display.method_b = The other method, whose picture is right of the line.
 display.scattering = Light scattered many times: it diffuses in the body, leaves as from a flat layer, or is
     left out; auto: what the body needs.
 display.mode = Quantity on show: the picture, thickness along the view ray in false colors, transmittance, or
     where numbers can be trusted.
-display.compare = What is right of the split: another method, the float64 reference, or the error of thickness.
+display.compare = What is seen right of the line in the picture: another method, the float64 reference, or the error of
+    thickness.
 display.split = Position of the split, 0 to 1 from the left. Or drag the line.
 display.inset = The float64 reference as a small picture in the corner, while the view is still. It has straight
     rays, diffuse bases and opaque surfaces with their textures, and the holes of leaves; nothing mirrors there, and

@@ -71,7 +71,7 @@ def untraceable(scene: Scene, pool: Pool, lane: Lane, *, embree: bool) -> str:
     if not missing:
         return ""
     if any(lane.failed(ref(mesh)) for mesh in missing):
-        return "interfaces in screen space, since the mesh could not be prepared for rays"
+        return "Rough reflections: the mesh could not be prepared for exact ones"
     mesh = missing[0]
 
     def prepare(task: Task) -> None:
@@ -81,8 +81,8 @@ def untraceable(scene: Scene, pool: Pool, lane: Lane, *, embree: bool) -> str:
         if embree:
             mesh_scene(mesh)
 
-    lane.request(ref(mesh), "preparing rays", prepare)
-    return "interfaces in screen space, until rays can be traced through the mesh"
+    lane.request(ref(mesh), "preparing reflections", prepare)
+    return "Preparing reflections in the mesh: rough preview"
 
 
 def make_normals(task: Task, pool: Pool, mesh: Mesh) -> None:

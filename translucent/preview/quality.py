@@ -255,13 +255,14 @@ class InteractiveQuality:
             return plan.request.scattering
         at_surfaces = bool(plan.treated(Treatment.DIFFUSION))
         instead: Scattering = ScatteringLayer() if at_surfaces else SingleScattering()
-        simply = "as of flat layers" if at_surfaces else "once alone"
+        where = f"Softening light in the {workspace.document.material.preset.replace('_', ' ') or 'model'}"
+        roughly = "first guess" if at_surfaces else "no more than what is scattered once"
         key, lane = diffusion_key(plan), workspace.lanes["diffuse"]
         moves, self._last = key != self._last, key
         if cache.has(key):
             return plan.request.scattering
         if lane.failed(key):
-            self.notes[1] = f"light that is scattered many times {simply}, since it could not be solved for"
+            self.notes[1] = f"{where} has failed: {roughly}"
             return instead
         small = _on_small_grid(scene, plan)
         bodies = None if small is None else _bodies(small)
@@ -273,10 +274,10 @@ class InteractiveQuality:
             solve_aside(task, workspace.pool, cache, plan)
 
         if not moves:
-            lane.request(key, "diffusing light", solve)
+            lane.request(key, "softening light", solve)
         if small is not None and self._knows(small, bodies, cache):
-            simply, instead = f"on a small grid, {SMALL} for {plan.diffusion}", SMALL
-        self.notes[1] = f"light that is scattered many times {simply}, until its diffusion is solved for"
+            roughly, instead = "rough preview", SMALL
+        self.notes[1] = f"{where}: {roughly}"
         return instead
 
     def _knows(self, small: RenderPlan, bodies: Hashable, cache: DiffusionCache) -> bool:

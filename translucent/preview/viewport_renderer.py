@@ -249,9 +249,9 @@ class ViewportRenderer:
         self._finish(0, plan, factor, begun)
         self.state = "moving" if factor == 1.0 else f"moving, {1 / factor:.0%} of the resolution"
         if request.interfaces is not self.quality.request.interfaces:
-            self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
+            self.simpler = "Rough reflections while the picture moves"
         elif shadows is not None:
-            self.simpler = f"shadows from {shadows.directions} directions of the environment while the picture moves"
+            self.simpler = "Rough shadows while the picture moves"
         self.presenter.shown = ()
         return True
 
@@ -260,7 +260,7 @@ class ViewportRenderer:
         stride, plan = self._strides.of[side], self.plans[side]
         samples = samples_of(stride, antialias)
         drawn, whole = self.viewport.steps(side), stride * stride
-        self.state = "sharpening" if drawn + 1 < whole else f"full picture, {max(drawn // whole, 1)} samples"
+        self.state = "sharpening" if drawn + 1 < whole else f"full picture, {_samples(max(drawn // whole, 1))}"
         if plan is None or drawn >= whole * (1 + samples):
             return False
         self.simpler, begun = "", time.perf_counter()
@@ -349,7 +349,7 @@ class ViewportRenderer:
         assert compiler is not None
         assert isinstance(scene, Scene)
         self._postponed, self._rendered = target, ()
-        self.state = "the last picture, until the new one is prepared"
+        self.state = "preparing the new picture: this is the last one"
         if self._requested is not None and self._requested.cancelled:
             # The user does not wait, so that the window does the work.
             self._requested = None
@@ -425,6 +425,10 @@ class ViewportRenderer:
             self._release()
         if self._own is not None:
             self._own.gl.release()
+
+
+def _samples(count: int) -> str:
+    return "1 sample" if count == 1 else f"{count} samples"
 
 
 class Presenter:

@@ -142,9 +142,9 @@ def method_panel(state: WindowState) -> None:
         ui.choice(state, "method", "display.method", METHOD_NAMES)
         ui.choice(state, "scattering", "display.scattering", (AUTO, *SCATTERINGS))
         ui.choice(state, "show", "display.mode", get_args(Mode))
-        ui.choice(state, "right of split", "display.compare", get_args(Compare))
+        ui.choice(state, "compare with", "display.compare", get_args(Compare))
         if display.compare == "method":
-            ui.choice(state, "method there", "display.method_b", METHOD_NAMES)
+            ui.choice(state, "other method", "display.method_b", METHOD_NAMES)
         if display.compare != "off":
             ui.slider(state, "split", "display.split", 0.0, 1.0, "%.2f")
         ui.check(state, "reference inset", "display.inset")
@@ -156,7 +156,7 @@ def method_panel(state: WindowState) -> None:
         imgui.end_table()
     for side, (plan, timing) in enumerate(zip(state.view.plans, state.view.timings, strict=True)):
         if plan is not None:
-            imgui.separator_text("Plan" if side == 0 else "Plan right of the split")
+            imgui.separator_text("Plan" if side == 0 else "Plan of the other method")
             _plan(plan, timing)
     imgui.separator_text("Against the float64 reference")
     _errors(state)
