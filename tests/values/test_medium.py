@@ -114,7 +114,7 @@ def test_tiny_and_huge_distances_are_fine_while_the_extinction_is_finite() -> No
         (JADE, -0.02, "distance -0.02; not above 0"),
         (JADE, -INF, "distance -inf; not above 0"),
         (JADE, NAN, "distance nan; not above 0"),
-        (JADE, "2cm", "distance '2cm'; not above 0; give the distance in metres"),
+        (JADE, "2cm", "distance '2cm'; a text with a unit; give the metres: 0.02"),
         (JADE, None, "distance None; not above 0"),
         (JADE, 1e-309, "distance 1e-309 m; so short that the extinction overflows"),
         ((1e-300,) * 3, 1e-306, "so short that the extinction overflows"),

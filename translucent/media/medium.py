@@ -115,7 +115,7 @@ class Medium(Frozen):
             metres = float(distance)
         except (TypeError, ValueError):
             metres = np.nan
-        if isinstance(distance, str) and (stated := metres_in(distance)) is not None:
+        if (stated := metres_in(str(distance))) is not None:
             raise InputError(f"distance {distance!r}", "a text with a unit", f"give the metres: {stated:g}")
         if not metres > 0:
             raise InputError(f"distance {distance!r}", "not above 0", "give the distance in metres, for example 0.02")
