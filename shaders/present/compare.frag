@@ -32,7 +32,8 @@ bool has(vec4 trust, float flag) {
     return mod(floor(trust.r / flag), 2.0) == 1.0;
 }
 
-vec3 view_color(ivec2 texel, sampler2D light, vec4 depths, vec4 trust) {
+// Of summed light with the number of its samples, which some modes do not read.
+vec3 view_color(vec4 summed, vec4 depths, vec4 trust) {
     bool covered = has(trust, FLAG_COVERED), valid = has(trust, FLAG_VALID);
 #if MODE == 1
     float fraction = clamp(depths.a / thickest, 0.0, 1.0) * 255.0;
@@ -41,7 +42,6 @@ vec3 view_color(ivec2 texel, sampler2D light, vec4 depths, vec4 trust) {
 #elif MODE == 2
     return linear_to_srgb(exp(-min(depths.rgb, 80.0)));
 #else
-    vec4 summed = texelFetch(light, texel, 0);
     vec3 picture = develop(summed.rgb / max(summed.a, 1.0), stops);
 #if MODE == 3
     vec3 dimmed = vec3(0.35 * luminance(picture));
@@ -90,10 +90,10 @@ void main() {
 #if RIGHT == 2
         encoded = vec4(difference(depths, trust, other, other_trust), 1.0);
 #else
-        encoded = vec4(view_color(there, light_b, other, other_trust), 1.0);
+        encoded = vec4(view_color(texelFetch(light_b, there, 0), other, other_trust), 1.0);
 #endif
         return;
     }
 #endif
-    encoded = vec4(view_color(here, light_a, depths, trust), 1.0);
+    encoded = vec4(view_color(texelFetch(light_a, here, 0), depths, trust), 1.0);
 }

@@ -1,6 +1,10 @@
 // Fraction of the light of the environment that bodies take from the points of a ground, by channel: that of one of the directions,
 // to be added up.
 
+#if SHADOW_MAPS < 1
+#error bodies are in shadow maps: SHADOW_MAPS is 1
+#endif
+
 #include <constants>
 #include <Lights>
 #include "shade/shadows.glsl"

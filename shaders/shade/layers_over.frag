@@ -2,6 +2,10 @@
 // they leave; SHARE: that fraction; DEPTH: minus its logarithm; SUM: what there is now, to be averaged over samples.
 // Row 0 of the output is the top row.
 
+#if !(RADIANCE || SHARE || DEPTH || SUM)
+#error one of RADIANCE, SHARE, DEPTH and SUM is 1
+#endif
+
 #include <constants>
 #include <View>
 

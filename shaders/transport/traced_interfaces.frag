@@ -4,6 +4,13 @@
 // are worth it; with the square of their luminance in place of the transmittance. DEEP: more than 16 interfaces. GENERATIONS: the light
 // of the rays has been summed up, see step_rays.comp. Row 0 of the output is the top row.
 
+#if (MIRROR || ROUGH) && !MICROFACETS
+#error rough interfaces and mirrors of the ground take random microfacets: MICROFACETS is 1
+#endif
+#if MIRROR && !OPAQUE
+#error the ground is an opaque object: OPAQUE is 1
+#endif
+
 #include <constants>
 #include <View>
 #include <Environment>

@@ -1,5 +1,12 @@
 // Sorts the crossings on the ray of each texel of a view from a light, and notes what is behind each.
 
+#if GRADIENT < 1
+#error nodes keep a gradient: GRADIENT is 1
+#endif
+#if SCATTER > 0
+#error it makes what SCATTER reads: SCATTER is 0
+#endif
+
 #include <constants>
 #include <View>
 #include "intervals/lists.glsl"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from functools import partial
 
@@ -25,7 +26,17 @@ def test_without_a_name_all_are_listed_with_their_switches(run: Run) -> None:
     assert list(rows) == shader_names()
     assert rows["thickness/signed_depth.frag"] == ["OPAQUE", "SPECTRAL"]
     assert rows["lib/optics.glsl"] == []
-    assert {row["name"]: row["switches"] for row in strict_json(run("--json").out)["shaders"]} == rows
+    listed = strict_json(run("--json").out)["shaders"]
+    assert {row["name"]: row["switches"] for row in listed} == rows
+    sets = {row["name"]: row["valid_sets"] for row in listed}
+    assert sets["lib/optics.glsl"] == [{}]
+    assert sets["thickness/signed_depth.frag"][:2] == [{"OPAQUE": 0, "SPECTRAL": 0}, {"OPAQUE": 1, "SPECTRAL": 0}]
+    assert {"MODE": 3, "RIGHT": 0, "TONE": 0} in sets["present/compare.frag"]
+    # Nodes of lists of lights keep a gradient, and what SCATTER reads is made here.
+    assert {(one["GRADIENT"], one["SCATTER"]) for one in sets["volume/light_lists.frag"]} == {(1, 0)}
+    # The mirror of the ground needs the ground, and microfacets.
+    mirrors = [one for one in sets["transport/traced_interfaces.frag"] if one["MIRROR"]]
+    assert [(one["OPAQUE"], one["MICROFACETS"]) for one in mirrors] == [(1, 1)]
 
 
 def test_a_name_prints_one_text(run: Run) -> None:
@@ -106,3 +117,13 @@ def test_values_that_a_shader_refuses_are_told_in_its_words(run: Run) -> None:
 
 def test_help_has_an_example(run: Run) -> None:
     assert "Example: translucent shader" in run("--help").out
+
+
+def test_the_set_that_a_message_advises_is_accepted(run: Run) -> None:
+    advice = one_error_line(run("light_lists.frag"))
+    options = re.findall(r"--define \w+=\d+", advice)
+    done = run("light_lists.frag", *" ".join(options).split())
+    assert done.code == 0
+    assert "#version 430" in done.out
+    refused = one_error_line(run("light_lists.frag", *" ".join(options).replace("GRADIENT=1", "GRADIENT=0").split()))
+    assert "GRADIENT is 1" in refused

@@ -19,11 +19,11 @@ from tests import webgpu
 from tests.hosts import BODY, RESOLVE, SUM, Host
 from tests.probe import signatures
 from tests.twins import ARGUMENTS, assert_equals_twin
-from translucent.assets import shader_library
+from translucent.assets import shader_library, shader_names
 from translucent.commands.shader import NAGA, Language, translate
 from translucent.gpu import lifting
 from translucent.gpu.layout import BLOCKS
-from translucent.gpu.lifting import lift
+from translucent.gpu.lifting import WITH_STORAGE, lift, valid_sets
 
 #: The passes that make thickness of faces, and transmittance of thickness: whose texts an engine needs.
 STAGES = {
@@ -250,3 +250,22 @@ def test_a_part_of_stages_is_refused() -> None:
         tl.InputError, match=r"part of stages, and asks them for .*; take a stage \(.vert, .frag\), a file"
     ):
         translate("transport/hierarchy.glsl", {"ONE_OBJECT": 1}, "hlsl")
+
+
+def test_all_stages_compile_for_vulkan_with_their_switches_off_or_as_few_on_as_they_need(tmp_path: Path) -> None:
+    """And some with each value of each switch: functions of theirs took samplers, or one needed another."""
+    compiler = glslang()
+    every = ("present/compare.frag", "shade/layers_over.frag", "shade/ground_shadows.frag")
+    refused = {}
+    for name in (name for name in shader_names() if not name.endswith(".glsl")):
+        sets = valid_sets(name)
+        for values in sets if name in every else sets[:1]:
+            if lift(name, values).version == WITH_STORAGE:
+                continue
+            text = lift(name, values, "vulkan").text
+            stage = "vert" if name.endswith(".vert") else "frag"
+            command = [compiler, "--stdin", "-V", "-S", stage, "-o", str(tmp_path / "shader.spv")]
+            done = subprocess.run(command, input=text, capture_output=True, encoding="utf-8")
+            if done.returncode:
+                refused[name, *values.items()] = done.stdout
+    assert refused == {}

@@ -19,6 +19,7 @@ SHADERS = sorted(path.relative_to(FOLDER).as_posix() for path in FOLDER.rglob("*
 SETTLED = {"UNION": 0, "SLOTS": 2}
 SETTLED_IN = {
     "shade/backdrop.frag": {"INFINITE": 0},
+    "shade/ground_shadows.frag": {"SHADOW_MAPS": 1},
     "shade/layers_over.frag": {"SHARE": 1},
     "volume/light_lists.frag": {"GRADIENT": 1, "SCATTER": 0, "MARCH": 0},
 }

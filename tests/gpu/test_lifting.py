@@ -14,7 +14,7 @@ from translucent.frames.frame import ARRAYS
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import shaders
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.lifting import ES, PLAIN, VULKAN, WITH_STORAGE, Dialect, find_shader, lift, switches
+from translucent.gpu.lifting import ES, PLAIN, VULKAN, WITH_STORAGE, Dialect, find_shader, lift, switches, valid_sets
 from translucent.gpu.shaders import Gathered, ShaderSource
 
 SIZE = (24, 18)
@@ -34,7 +34,7 @@ def moved(x: float) -> np.ndarray:
 
 def values(name: str) -> dict[str, int]:
     """All switches off, as far as the shader allows that."""
-    return {key: int(key == "SLOTS") for key in switches(name)}
+    return valid_sets(name)[0]
 
 
 # Of each kind of shader one: sums, lists with lights, peeling, and interfaces before an opaque body.

@@ -99,7 +99,7 @@ def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Languag
     """Print the shader NAME as one text, with its constants and includes in place and without what it does not use.
 
     NAME is a file under shaders/, or its name alone where no other has it. Without NAME, all are listed, with the
-    switches that they ask for.
+    switches that they ask for; --json adds sets of values that each accepts.
 
     glsl is that of OpenGL 3.3, webgl2 that of WebGL2 and OpenGL ES 3.0, vulkan that of Vulkan. hlsl, msl (Metal) and
     wgsl (WebGPU) are made from the last by translators, which have to be installed: glslang and SPIRV-Cross, or naga.
@@ -144,11 +144,13 @@ def _placed(block: UniformBlock) -> dict[str, object]:
 
 def _list(as_json: bool) -> None:
     from translucent.assets import shader_names
-    from translucent.gpu.lifting import switches
+    from translucent.gpu.lifting import switches, valid_sets
 
     found = {name: switches(name) for name in shader_names()}
     if as_json:
-        rows = [{"name": name, "switches": requested} for name, requested in found.items()]
+        rows = [
+            {"name": name, "switches": requested, "valid_sets": valid_sets(name)} for name, requested in found.items()
+        ]
         return echo(json.dumps({"shaders": rows}))
     wide = max(map(len, found))
     for name, requested in found.items():

@@ -14,8 +14,10 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain, combinations
 from typing import Literal, get_args
 
 from translucent.assets import shader_names
@@ -26,6 +28,9 @@ from translucent.gpu.shaders import Gathered, gather
 
 #: GLSL of desktops, that of WebGL2, which is GLSL ES 3.00, and that of Vulkan.
 Dialect = Literal["glsl", "webgl2", "vulkan"]
+
+#: Switches that a value of another one needs, at most.
+MOST_RAISED = 2
 
 #: Identifiers that need a newer GLSL version.
 _STORAGE = re.compile(r"\bstd430\b|\batomic\w+\s*\(")
@@ -301,7 +306,14 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
     if unknown := sorted(defines.keys() - gathered.switches):
         known = ", ".join(sorted(gathered.switches)) or "it has none"
         raise InputError(f"shader {name!r}", f"no switch {', '.join(unknown)} is in it", f"switches: {known}")
-    parts = list(_parts(_decided(name, gathered, defines)))
+    missing: set[str] = set()
+    parts = list(_parts(_decided(name, gathered, defines, missing)))
+    if missing:
+        least = _raised(name, gathered, dict.fromkeys(gathered.switches, 0) | dict(defines), frozenset(defines))
+        least = least or dict.fromkeys(missing, 1)
+        options = " ".join(f"--define {key}={least[key]}" for key in sorted(missing))
+        count = f"{len(missing)} {'switch' if len(missing) == 1 else 'switches'}"
+        raise InputError(f"shader {name!r}", f"it asks for {count} more", f"add {options}, or other values")
     kept = _reached(parts)
     used = set().union(*(part.names for part in kept))
     texts = [part.text.strip("\n") for part in kept]
@@ -317,9 +329,12 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
     return Lifted(name, target, version, decided, files, blocks, text)
 
 
-def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Iterator[tuple[int, str]]:
-    """Lines that remain after preprocessing the switches, each with the number of its file."""
-    file, missing = 0, set[str]()
+def _decided(name: str, gathered: Gathered, defines: Mapping[str, int], missing: set[str]) -> Iterator[tuple[int, str]]:
+    """Lines that remain after preprocessing the switches, each with the number of its file.
+
+    Switches that conditions ask for and nobody has decided go into `missing`: lines are not to be used then.
+    """
+    file = 0
     live, done = [True], [True]  # for each nested condition: whether we are in, and whether a branch has been taken
     for line in gathered.lines:
         if match := _LINE.match(line):
@@ -347,12 +362,43 @@ def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Itera
             raise InputError(f"shader {name!r}", rest, "give other values")
         elif live[-1] and not word:
             yield file, line
-    if missing:
-        # The smallest value that the shader accepts.
-        least = {key: int(any(re.match(rf"\s*#if {key} < 1$", line) for line in gathered.lines)) for key in missing}
-        options = " ".join(f"--define {key}={value}" for key, value in sorted(least.items()))
-        count = f"{len(missing)} {'switch' if len(missing) == 1 else 'switches'}"
-        raise InputError(f"shader {name!r}", f"it asks for {count} more", f"add {options}, or other values")
+
+
+def valid_sets(name: str) -> list[dict[str, int]]:
+    """Sets of switches that a shader accepts, each with a value for all of them.
+
+    The first has as many of them off as the shader allows. Each other one has another value of one switch, and raises
+    only what that value needs.
+    """
+    gathered = gather(name)
+    conditions = [match[2] for line in gathered.lines if (match := _DIRECTIVE.match(line))]
+    choices = {
+        key: sorted({0, 1, *(int(n) for text in conditions for n in re.findall(rf"\b{key} == (\d+)", text))})
+        for key in sorted(gathered.switches)
+    }
+    least = _raised(name, gathered, dict.fromkeys(choices, 0), frozenset())
+    found = [least] if least is not None else []
+    for key, value in ((key, value) for key, values in choices.items() for value in values):
+        if least is not None and value != least[key]:
+            found += filter(None, [_raised(name, gathered, least | {key: value}, frozenset([key]))])
+    return found
+
+
+def _raised(name: str, gathered: Gathered, values: Mapping[str, int], kept: frozenset[str]) -> dict[str, int] | None:
+    """Values that a shader accepts, with as few others at 1 as it takes; None if a few do not suffice."""
+    others = [key for key, value in values.items() if value == 0 and key not in kept]
+    tried = (combinations(others, count) for count in range(MOST_RAISED + 1))
+    sets = ({**values, **dict.fromkeys(raised, 1)} for raised in chain.from_iterable(tried))
+    return next((one for one in sets if _accepted(name, gathered, one)), None)
+
+
+def _accepted(name: str, gathered: Gathered, values: Mapping[str, int]) -> bool:
+    """True if no line of a shader that is left with these values refuses them."""
+    try:
+        deque(_decided(name, gathered, values, set()), maxlen=0)
+    except InputError:
+        return False
+    return True
 
 
 def _evaluated(node: ast.expr, defines: Mapping[str, int]) -> int:
