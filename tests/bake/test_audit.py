@@ -35,13 +35,17 @@ def model(
     mesh: trimesh.Trimesh = BALL,
     node: Json | None = None,
     material: Json | None = None,
+    uv: np.ndarray | None = None,
     **volume: Any,
 ) -> Path:
     """One body with this thickness; the default file is right."""
     writer = Writer()
     extensions = glass(thickness=thickness, ior=1.5, **{**DENSE, **volume})
     known = {"name": "Glass", "pbrMetallicRoughness": MATT, "extensions": extensions, **(material or {})}
-    writer.mesh(writer.primitive(mesh, material=writer.material(**known)))
+    primitive = writer.primitive(mesh, material=writer.material(**known))
+    if uv is not None:
+        primitive["attributes"]["TEXCOORD_0"] = writer.accessor(uv)
+    writer.mesh(primitive)
     bounds = {"min": mesh.vertices.min(axis=0).tolist(), "max": mesh.vertices.max(axis=0).tolist()}
     writer.tree["accessors"][1] |= bounds
     writer.tree["extensionsUsed"] = sorted(known["extensions"])
@@ -111,6 +115,25 @@ def test_a_wrong_factor_is_found_and_mended(tmp_path: Path, run: Run, factor: fl
     assert material.attenuation_distance == 0.02
     assert material.thickness == pytest.approx(0.0133, rel=0.06)
     assert after.resource({}).startswith(before.resource({}))  # what was there keeps its bytes
+
+
+@pytest.mark.filterwarnings("ignore::translucent.errors.TranslucentWarning")  # of the bake
+@pytest.mark.parametrize(("shrunk", "code"), [(1.0, 0), (1e-4, 1)])
+def test_a_map_in_which_faces_have_no_texels_is_an_error(tmp_path: Path, run: Run, shrunk: float, code: int) -> None:
+    """All UVs in a spot: the bake has one texel for all faces, and no success is reported."""
+    soup = BALL.copy()
+    soup.unmerge_vertices()
+    cells = np.stack(np.divmod(np.arange(len(soup.faces)), 18), axis=-1)[:, None] + [[0.1, 0.1], [0.9, 0.1], [0.1, 0.9]]
+    uv = np.empty((len(soup.vertices), 2))
+    uv[soup.faces] = cells / 18
+    path, out = model(tmp_path / "ball.glb", 0.2, soup, uv=0.5 + shrunk * (uv - 0.5)), tmp_path / "out.glb"
+    found = run("material", "check", path, "--fix", "-o", out, "--size", "64", "--rays", "8", "--json")
+    assert found.code == code
+    told = [(one["severity"], one["code"]) for one in strict_json(found.out)["fixed"]["findings"]]
+    assert (("error", "map-without-texels") in told) == bool(code)
+    if code:
+        assert "100% of the faces have no texel" in found.out or "99% of the faces have no texel" in found.out
+        assert "unwrap the mesh" in found.err
 
 
 def test_thickness_zero_shows_none_of_the_attenuation(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections import defaultdict
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,10 @@ BAKED = frozenset(
 )
 
 WRITTEN = frozenset({"metal", "double-sided"})
+
+#: Fraction of faces without a texel of their own from which on a baked map is not one of the body, if it has this many
+#: texels for each face.
+MOST_HIDDEN, ENOUGH_TEXELS = 0.5, 4
 
 
 @checked
@@ -223,13 +228,32 @@ def fix_materials(
     for material in {one.material for one in found.findings if one.code in WRITTEN}:
         _mend(builder, material)
     keys = {one.place for one in found.findings if one.code in BAKED and one.place in closed}
+    hidden: list[MaterialFinding] = []
     if keys:
         targets = {target.key: target for target in find_targets(builder, size=size, only=keys)}
         results = {key: _bake_target(target, settings, threads) for key, target in targets.items()}
         write_maps(builder, output, results, targets=targets, about={"model": str(path), "model_unit": "m"})
+        hidden = [wrong for one in found.findings if one.place in results for wrong in _hidden(one, results[one.place])]
     else:
         write_gltf(builder.file(), output)
-    return check_materials(output)
+    left = check_materials(output)
+    findings = [*{one.place: one for one in hidden}.values(), *left.findings]
+    findings.sort(key=lambda one: SEVERITIES.index(one.severity))
+    return dataclasses.replace(left, findings=tuple(findings))
+
+
+def _hidden(before: MaterialFinding, baked: ThicknessMap) -> Iterator[MaterialFinding]:
+    """Finding about a body whose faces have hardly any texels of their own in the map that was baked for it."""
+    faces = len(baked.mesh.faces)
+    fraction = baked.report.faces_without_texel / faces
+    if fraction < MOST_HIDDEN or baked.values.size < ENOUGH_TEXELS * faces:
+        return
+    text = (
+        f"{fraction:.0%} of the faces have no texel in the map that was baked: they are too small in UV, or lie below "
+        "others there, and show the thickness of those"
+    )
+    do = "unwrap the mesh so that each face has an area of its own in UV, or give it no UVs: --fix makes them then"
+    yield dataclasses.replace(before, severity="error", code="map-without-texels", text=text, do=do)
 
 
 def _mend(builder: GlbBuilder, index: int) -> None:
