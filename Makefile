@@ -59,7 +59,7 @@ docs: ## build the site of docs/ into out/docs/, with the pictures of examples/
 	@rm -rf docs/generated
 	$(BIN)/python -m sphinx -W --keep-going -q docs out/docs
 
-gallery: ## draw the pictures of docs/gallery and the contact sheets of docs/presets; it takes half an hour without a GPU
+gallery: ## draw the pictures of docs/gallery and docs/pictures, and the contact sheets of docs/presets; it takes half an hour without a GPU
 	$(BOOTSTRAP)
 	$(BIN)/python tools/gallery.py
 	$(BIN)/python tools/preset_sheets.py

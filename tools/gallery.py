@@ -59,7 +59,9 @@ def draw(name: str, command: str) -> None:
         if translucent([*shlex.split(command), *SMALL]) != 0:
             raise click.ClickException(f"{name}: {command} failed")
         with Image.open(f"{name}.png") as picture:
-            picture.convert("RGB").save(folder / f"{name}.jpg", quality=88, optimize=True)
+            shown = picture.convert("RGBA")  # what is transparent, over a white page
+            page = Image.alpha_composite(Image.new("RGBA", shown.size, "white"), shown)
+            page.convert("RGB").save(folder / f"{name}.jpg", quality=88, optimize=True)
         os.chdir(ROOT)
 
 
