@@ -1,8 +1,8 @@
 """Grid of a body in which light diffuses: cells that its surface cuts, sample points on the surface, and densities.
 
-Cells and samples are in world coordinates. Where the density varies, lengths count for as much as the density on them:
-in metres that are stretched so, D and sigma_a are those of the medium, and the one-dimensional solutions below the
-surface hold as they are, however the density varies with depth.
+Cells and samples are in the coordinates that the body's transform leads to. Where the density varies, lengths count for
+as much as the density on them: in metres that are stretched so, D and sigma_a are those of the medium, and the
+one-dimensional solutions below the surface hold as they are, however the density varies with depth.
 """
 
 from __future__ import annotations
@@ -190,7 +190,7 @@ class Probe:
 
 @dataclass(frozen=True, eq=False)
 class BodyGrid:
-    """Cells of a body and sample points on its surface, in world coordinates.
+    """Cells of a body and sample points on its surface, in the coordinates that its transform leads to.
 
     Attributes
     ----------

@@ -92,7 +92,7 @@ TOLERANCE = 1e-4
 ROUGH = 1e-3
 
 #: The same at first, while it is not known what falls on the body again; and as a fraction of the change of that.
-FIRST, OF_CHANGE = 5e-3, 0.05
+FIRST, OF_CHANGE = 1e-2, 0.1
 
 #: Steps after which conjugate gradients are given up.
 MOST_STEPS = 4000
@@ -427,21 +427,30 @@ class _ChannelSystem:
 
         Light of the body falls on it again until little changes.
         """
-        flux, steps = entering, 0
-        cells: Array | None = None
-        before, tolerance = np.zeros_like(entering), FIRST if from_itself.nnz else TOLERANCE
         inside = self._albedo * (power + emission * self._emitted_cells) + straight.power
         emitted = self._albedo * emission * self._emitted_near + straight.near
-        for _ in range(MOST_BOUNCES):
-            source = self._diffuse.power(self._grid, self._all, flux) + inside
-            near = None if warm_starts else self._cells.even(source) if cells is None else cells
-            cells, taken = self._cells.solved(source, near, tolerance)
-            steps += taken
-            fluence = np.maximum((self._read @ cells) * self._attenuated + self._diffuse.near * flux + emitted, 0.0)
-            fluence *= self._correction
+
+        def source(flux: Array) -> Array:
+            return np.asarray(self._diffuse.power(self._grid, self._all, flux) + inside)
+
+        def at_surface(cells: Array, flux: Array) -> Array:
+            fluence = (self._read @ cells) * self._attenuated + self._diffuse.near * flux + emitted
+            return np.asarray(np.maximum(fluence, 0.0) * self._correction)
+
+        def received(fluence: Array, flux: Array) -> Array:
             # What the surface mirrors goes on as if it was diffuse.
             leaving = self._exit_fraction * fluence + self._mirrored * flux + straight.mirrored
-            change = entering + from_itself @ leaving - flux
+            return np.asarray(entering + from_itself @ leaving)
+
+        near, flux, steps = self._cells.even(source(entering)), entering, 0
+        before, tolerance = np.zeros_like(entering), TOLERANCE
+        if from_itself.nnz:
+            flux, tolerance = received(at_surface(near, entering), entering), FIRST
+        for _ in range(MOST_BOUNCES):
+            near, taken = self._cells.solved(source(flux), None if warm_starts else near, tolerance)
+            steps += taken
+            fluence = at_surface(near, flux)
+            change = received(fluence, flux) - flux
             # Fraction of the last change that returns now. In a hollow it is nearly all, and always the same: so much
             # is still to come.
             returned = float(change @ before) / max(float(before @ before), np.finfo(np.float64).tiny)
@@ -453,5 +462,4 @@ class _ChannelSystem:
                 break
             tolerance = min(max(OF_CHANGE * largest / max(most, np.finfo(np.float64).tiny), TOLERANCE), FIRST)
             before = change if returned == 0.0 else np.zeros_like(entering)
-        assert cells is not None
-        return fluence, flux + straight.flux, np.maximum(cells, 0.0), steps
+        return fluence, flux + straight.flux, np.maximum(near, 0.0), steps
