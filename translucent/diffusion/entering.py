@@ -123,7 +123,7 @@ _CORRECTION = (0.5, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class Pose:
     """Rotation or reflection, and shift, of a body that is stretched along its own axes, to where it is in the world.
 
     Its light depends on the stretch, and on where what lights it is as seen from there.
@@ -138,8 +138,8 @@ class Placement:
     shift: Array
 
     @classmethod
-    def of(cls, matrix: Array) -> tuple[Placement, Array]:
-        """Placement by a transform (4, 4), and the stretch (4, 4) before it, the same for all rotations of a body."""
+    def of(cls, matrix: Array) -> tuple[Pose, Array]:
+        """Pose by a transform (4, 4), and the stretch (4, 4) before it, the same for all rotations of a body."""
         linear, stretch = matrix[:3, :3], np.eye(4)
         _, sizes, axes = np.linalg.svd(linear)
         if sizes[2] > _LEAST_STRETCH * sizes[0]:
@@ -174,9 +174,9 @@ class Occluders:
     opaque: RayCaster | None = None
 
     @cached_property
-    def placement(self) -> Placement:
+    def pose(self) -> Pose:
         """Of the body."""
-        return Placement.of(self.body.matrix)[0]
+        return Pose.of(self.body.matrix)[0]
 
     def nearest(self, origins: Array, directions: Array) -> tuple[Array, Array]:
         """Distance in metres at which rays (k, 3), (k, 3) hit the body, and at which anything opaque; inf for none."""
@@ -201,11 +201,11 @@ def opaque_surfaces(objects: Sequence[Object]) -> RayCaster | None:
     return RayCaster(Mesh(vertices, faces))
 
 
-def flux_of(photons: EnteringPhotons, grid: BodyGrid, placement: Placement) -> Array:
+def flux_of(photons: EnteringPhotons, grid: BodyGrid, pose: Pose) -> Array:
     """(s, 3): flux of photons at the samples of a surface: each counts at the nearest one."""
     flux = np.zeros((len(grid.points), 3))
     if len(photons.points):
-        sample = cKDTree(grid.points).query(placement.inwards(photons.points - placement.shift))[1]
+        sample = cKDTree(grid.points).query(pose.inwards(photons.points - pose.shift))[1]
         for channel in range(3):
             flux[:, channel] = np.bincount(sample, photons.power[:, channel], len(flux)) / grid.area
     return flux
@@ -387,9 +387,9 @@ def from_light(
 
     `stops` are surfaces of other bodies that none of it passes.
     """
-    placement = casters.placement
-    points = placement.outwards(grid.points) + placement.shift
-    all_normals, face_normals = placement.outwards(grid.normals), placement.outwards(grid.face_normals)
+    pose = casters.pose
+    points = pose.outwards(grid.points) + pose.shift
+    all_normals, face_normals = pose.outwards(grid.normals), pose.outwards(grid.face_normals)
     if isinstance(light, PositionalLight):
         towards = np.asarray(light.position) - points
         distance = np.linalg.norm(towards, axis=1)
@@ -418,7 +418,7 @@ def from_light(
     flux = np.asarray(light.irradiance_on(points[lit] - sunk, normals), np.float64) * gain[lit, None]
     if dimming:
         flux = flux * light_passed(dimming, start, towards, distance[lit])
-    refracted = placement.inwards(refracted_direction(-towards, normals, np.full(len(lit), ior)))
+    refracted = pose.inwards(refracted_direction(-towards, normals, np.full(len(lit), ior)))
     return EnteringRays(lit, refracted, (1.0 - reflected) * relative * flux, reflected * flux)
 
 

@@ -12,7 +12,7 @@ from scipy.ndimage import map_coordinates
 
 from translucent.arrays import Array
 from translucent.diffusion.entering import (
-    Placement,
+    Pose,
     dimming_bodies,
     environment_parts,
     flux_of,
@@ -184,12 +184,12 @@ class DiffusingBody:
         `photons` carry the light that other bodies, whose surfaces are `stops`, refract and reflect; none of it goes
         straight through these.
         """
-        dimming, grid, placement = dimming_bodies(scene, body), self._lit.grid, self._lit.placement
+        dimming, grid, pose = dimming_bodies(scene, body), self._lit.grid, self._lit.pose
         through = (self._medium.ior, self._roughness, tuple(map(dimming_key, dimming)), stops)
 
         def sky() -> tuple[Array, EnteringRays]:
             directions = self._lit.shape.sky.directions
-            return self._from_sky(environment_parts(scene.environment, directions, placement.turn), dimming)
+            return self._from_sky(environment_parts(scene.environment, directions, pose.turn), dimming)
 
         def rays_of(light: Light) -> tuple[Array, EnteringRays]:
             found = from_light(grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops)
@@ -199,12 +199,12 @@ class DiffusingBody:
         entering, bright = kept(arriving, (environment_key(scene.environment), through), sky, most)
         rays, inside = [bright], np.zeros((grid.count, 3))
         for light in scene.lights:
-            if isinstance(light, PositionalLight) and (cell := _cell_at(grid, placement, light.position)) >= 0:
+            if isinstance(light, PositionalLight) and (cell := _cell_at(grid, pose, light.position)) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
                 rays.append(kept(arriving, (light_key(light), through), partial(rays_of, light), most)[1])
         if photons is not None:
-            entering = entering + flux_of(photons, grid, placement)
+            entering = entering + flux_of(photons, grid, pose)
         found = self._system.solved(entering, self._entrance.itself, inside, rays)
         return _field(self._lit, self._medium, self._roughness, found)
 
@@ -233,9 +233,9 @@ class DiffusingBody:
         return sky_light(directions, received, radiances, self._lit.grid.normals, ior, mirrored)
 
 
-def _cell_at(grid: BodyGrid, placement: Placement, position: npt.ArrayLike) -> int:
+def _cell_at(grid: BodyGrid, pose: Pose, position: npt.ArrayLike) -> int:
     """Number of the cell at a position, -1 outside the body; in cells that are cut, the nearest sample decides."""
-    point = placement.inwards(np.asarray(position) - placement.shift)
+    point = pose.inwards(np.asarray(position) - pose.shift)
     place = np.floor((point - grid.cells.low) / grid.cells.step).astype(int)
     if (place < 0).any() or (place >= grid.number.shape).any():
         return -1
@@ -264,8 +264,8 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
         fluence=np.ascontiguousarray(volume[..., :3]),
         entering=np.ascontiguousarray(volume[..., 3:6]),
         scattered=np.where(volume[..., 6:] > 0.0, volume[..., 6:], np.float32(1.0)),
-        low=lit.placement.outwards(grid.cells.low) + lit.placement.shift,
-        turn=lit.placement.turn,
+        low=lit.pose.outwards(grid.cells.low) + lit.pose.shift,
+        turn=lit.pose.turn,
         step=grid.cells.step,
         albedo=albedo,
         conductance=interface.conductance,

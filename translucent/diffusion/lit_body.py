@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
-from translucent.diffusion.entering import BEFORE, Occluders, Placement, Sky, sky_of, sky_paths, transfer
+from translucent.diffusion.entering import BEFORE, Occluders, Pose, Sky, sky_of, sky_paths, transfer
 from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, Densities, body_grid, densities
 from translucent.formulas.diffuse_interface import diffuse_interface
@@ -182,9 +182,9 @@ class LitBody:
         return self.shape.grid
 
     @property
-    def placement(self) -> Placement:
+    def pose(self) -> Pose:
         """Where the body is."""
-        return self.casters.placement
+        return self.casters.pose
 
     def sky_paths(self, others: Sequence[Object]) -> list[sparse.csr_array]:
         """Metres in each of other bodies on paths to the sky, see `sky_paths`; the last ones are cached."""
@@ -205,14 +205,14 @@ class LitBody:
         visible = np.zeros((len(points[part]), len(sky.directions)), bool)
         seen = np.isinf(sky.distance) & ~self._hidden
         visible[nearest[sky.sample[seen]], sky.direction[seen]] = True
-        metres = sky_paths(body, self._starts[part], self.placement.outwards(sky.directions), visible)
+        metres = sky_paths(body, self._starts[part], self.pose.outwards(sky.directions), visible)
         return sparse.csr_array(metres[nearest])
 
     @cached_property
     def _starts(self) -> Array:
         """(s, 3): places above the samples, in the world."""
-        grid, placement = self.grid, self.placement
-        return placement.outwards(grid.points + BEFORE * grid.cells.step * grid.face_normals) + placement.shift
+        grid, pose = self.grid, self.pose
+        return pose.outwards(grid.points + BEFORE * grid.cells.step * grid.face_normals) + pose.shift
 
     @cached_property
     def _hidden(self) -> Mask:
@@ -221,7 +221,7 @@ class LitBody:
         hidden = np.zeros(len(sky.sample), bool)
         if opaque is None:
             return hidden
-        directions, (low, high) = self.placement.outwards(sky.directions), opaque.bounds
+        directions, (low, high) = self.pose.outwards(sky.directions), opaque.bounds
         away = ((starts.min(axis=0) > high) & (directions >= 0.0)) | ((starts.max(axis=0) < low) & (directions <= 0.0))
         pairs = np.flatnonzero(~away.any(axis=1)[sky.direction])
         distance = opaque.distances(starts, directions, sky.sample[pairs], sky.direction[pairs])
@@ -244,7 +244,7 @@ class LitBody:
 
 def own_frame(body: Object) -> Object:
     """The body as it is stretched, neither rotated nor moved."""
-    return replace(body, transform=Placement.of(body.matrix)[1])
+    return replace(body, transform=Pose.of(body.matrix)[1])
 
 
 def lit_body(body: Object, opaque: RayCaster | None, step: float, shape: BodyShape | None = None) -> LitBody:
