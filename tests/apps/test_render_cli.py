@@ -449,7 +449,7 @@ def test_no_unit_is_guessed_where_none_would_help(run: Run, tower: Path, tmp_pat
     for model in (["knot"], [tower, "--unit", "mm"]):
         told = run("render", *model, "-o", tmp_path / "a.png", *dense).err
         assert "is the file in" not in told
-        assert re.search(r"in a medium \d+ times as clear \(a color at a --distance so much longer\)", told)
+        assert re.search(r"with --dilute \d+, which makes the medium so many times as clear", told)
 
 
 def test_milk_gives_light_back_and_is_not_black(run: Run, tower: Path, tmp_path: Path) -> None:
@@ -484,3 +484,32 @@ def test_the_answer_comes_first_and_advice_last(run: Run, tmp_path: Path) -> Non
     told = run("render", "soap", "-o", output, "--color", "white", "--distance", "1", *SMALL)
     assert [line.split(" ")[:2] for line in told.err.splitlines()] == [["note:", "--color"], ["note:", "--distance"]]
     assert "--distance 1 is 1 m; lengths have a unit, as 1cm" in told.err
+
+
+def test_the_model_is_seen_from_around_and_fills_what_is_requested(run: Run, tmp_path: Path) -> None:
+    output, alone = tmp_path / "a.npz", ("--size", "64x64", "--samples", "1", "--stage", "none")
+    widths = {}
+    for orbit in ("0,0", "90,0"):  # the soap is 9 cm wide, and 6 cm deep
+        assert run("render", "soap", "-o", output, *alone, "--orbit", orbit, "--fit", "0.5").code == 0
+        with np.load(output) as arrays:
+            across = np.flatnonzero(arrays["coverage"].any(axis=0))
+            widths[orbit] = across[-1] - across[0] + 1
+    assert widths == {orbit: pytest.approx(32, abs=1) for orbit in widths}  # each fills half of the picture
+    for wrong, message in (
+        (("--orbit", "30"), "not two numbers"),
+        (("--orbit", "30,90"), "a pitch beyond -90 to 90"),
+        (("--eye", "0,0,1", "--fit", "0.5"), "--eye is given, too"),
+    ):
+        assert message in one_error_line(run("render", "soap", "-o", output, *wrong))
+
+
+def test_a_diluted_medium_is_so_many_times_as_clear(run: Run, tmp_path: Path) -> None:
+    output, alone = tmp_path / "a.npz", ("--size", "16x12", "--samples", "1", "--stage", "none")
+    depths = []
+    for dilute in ((), ("--dilute", "5.5")):
+        assert run("render", "wine", "-o", output, "--preset", "merlot", *alone, *dilute).code == 0
+        with np.load(output) as arrays:
+            depths.append(arrays["optical_depth"])
+    np.testing.assert_allclose(depths[0], 5.5 * depths[1], rtol=1e-5)
+    assert "black" not in run("explain", "wine", "--preset", "merlot", "--dilute", "5.5").out
+    assert "--dilute 5.5" in run("explain", "wine", "--preset", "merlot").out

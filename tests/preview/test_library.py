@@ -147,6 +147,10 @@ def test_a_material_is_saved_and_found(tmp_path: Path) -> None:
     found = own.find("my_marble")
     assert found is not None
     assert (found.medium, found.roughness, found.group) == (medium_of(material), 0.25, "own")
+    first = next(iter(own.groups().items()))
+    assert first == ("popular", [tl.preset(name) for name in ("jade", "wax", "whole_milk", "merlot", "bottle_glass")])
+    own.search = "wax"
+    assert next(iter(own.groups().values()))[0].name == "wax"
     own.search = "my marb"
     assert list(own.groups()) == ["own"]
     with pytest.raises(tl.InputError, match="one of the toolkit's has that name"):

@@ -207,3 +207,12 @@ def test_a_size_is_two_whole_numbers(size: Any) -> None:
 def test_a_frame_has_no_such_size(size: Any) -> None:
     with pytest.raises(tl.InputError, match=re.escape(f"frame size {size!r}; not ")):
         check_size(size)
+
+
+def test_framing_takes_the_part_of_the_picture_that_is_requested() -> None:
+    points = np.random.default_rng(3).normal(size=(50, 3))
+    for size, fit in (((64, 48), 0.8), ((48, 64), 0.5)):
+        camera = Camera.framing(points, size, fit=fit)
+        assert np.abs(_in_picture(camera, points, size)).max() == pytest.approx(fit, abs=1e-12)
+    with pytest.raises(tl.InputError, match=r"fit 1\.5; not above 0 and at most 1"):
+        Camera.framing(points, fit=1.5)

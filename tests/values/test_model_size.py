@@ -69,7 +69,7 @@ def test_bodies_of_many_mean_free_paths_look_opaque(times: float, said: bool) ->
     assert [note.kind for note in found] == [NoteKind.OPAQUE_BODIES] * said
     if said:
         assert "opaque at this size, as plastic: light turns back within 1 mm" in found[0]
-        assert "5 cm tall (--height 5cm) its thin parts glow" in found[0]
+        assert "5 cm tall (--height 5cm) its thin parts glow, and so they do diluted 4.2 times" in found[0]
 
 
 @pytest.mark.parametrize(("times", "said"), [(0.3, True), (0.4, False)])

@@ -96,6 +96,23 @@ def test_every_preset_has_a_group_and_a_search_finds_it() -> None:
     assert matching(tl.presets(), "measured estimated") == {}
 
 
+@pytest.mark.parametrize(
+    ("words", "first"),
+    [
+        ("wax", "wax"),
+        ("glass", "bottle_glass"),
+        ("milk", "skim_milk"),
+        ("whole milk", "whole_milk"),
+        ("jade", "jade"),
+    ],
+)
+def test_a_search_finds_names_before_groups(words: str, first: str) -> None:
+    found = list(matching(tl.presets(), words))
+    assert found[0] == first
+    named = [words.split()[0] in name for name in found]
+    assert named == sorted(named, reverse=True)
+
+
 def test_a_value_is_told_once_with_the_line_of_its_key(folder: Path) -> None:
     (folder / "a.toml").write_text(
         '[tea]\nkind = "estimated"\nsource = "me"\ncolor = [0.5, 0.4, 0.3]\ndistance = 0.01\nior = 1.3\n'

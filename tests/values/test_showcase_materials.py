@@ -9,7 +9,7 @@ import pytest
 
 import translucent as tl
 from translucent.geometry.solids import Box
-from translucent.scene.showcase import filled, with_ior
+from translucent.scene.showcase import filled, with_media
 
 BOX = Box((0, 0, 0), (0.1, 0.1, 0.1)).tessellate()
 
@@ -58,4 +58,5 @@ def test_objects_keep_the_ior_of_their_file_under_a_color() -> None:
     kept = filled(scene, solid, scene.objects, keeps_ior=True)
     assert [item.medium.ior for item in kept.objects if item.medium] == [1.33, 1.5]
     assert [item.medium.ior for item in filled(scene, solid, scene.objects).objects if item.medium] == [1.5, 1.5]
-    assert with_ior(kept, 1.0).objects[0].medium == dataclasses.replace(solid, ior=1.0)
+    thin = with_media(kept, lambda medium: medium.diluted(5.0)).objects[1].medium
+    assert thin == tl.Medium.from_color("#ace5c9", 1.25, ior=1.5)

@@ -59,7 +59,7 @@ def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
     requested = SceneRequest(
         medium=given.medium.read(),
         keeps_ior=given.medium.keeps_ior,
-        ior=given.medium.ior,
+        change=given.medium.change,
         file=given.file,
         environment_shadows=given.choices.environment_shadows,
         roughness=given.medium.surface_roughness(),

@@ -68,8 +68,8 @@ class SceneRequest:
         In all translucent objects; None: those of the file.
     keeps_ior : bool
         Objects of a file keep the index of refraction that it states.
-    ior : float, optional
-        Index of refraction of the media, in place of their own.
+    change : callable, optional
+        Change of all media but those of single objects.
     camera, file : CameraOptions, FileOptions
     size : (width, height)
         Of the picture that the scene is framed for.
@@ -88,7 +88,7 @@ class SceneRequest:
 
     medium: Medium | None = None
     keeps_ior: bool = False
-    ior: float | None = None
+    change: Callable[[Medium], Medium] | None = None
     camera: CameraOptions = field(default_factory=CameraOptions)
     file: FileOptions = field(default_factory=FileOptions)
     size: tuple[int, int] = (1280, 720)
@@ -110,7 +110,7 @@ def is_scene_file(model: str) -> bool:
 
 def read_scene(model: str, requested: SceneRequest) -> Scene:
     """The scene of a glTF file, or one mesh on show, as it is requested."""
-    from translucent.scene.showcase import framing, objects_named, with_ior, with_roughness
+    from translucent.scene.showcase import framing, objects_named, with_media, with_roughness
     from translucent.scene.stages import staged, upright
 
     options, (stage, turn) = requested.camera, _turned(requested.stage)
@@ -121,7 +121,9 @@ def read_scene(model: str, requested: SceneRequest) -> Scene:
     scene, chosen = (_file_scene if is_scene_file(model) else _mesh_scene)(model, requested, stage)
     named = {id(item) for one in requested.media for item in objects_named(scene, one.name)}
     others = [item for item in scene.objects if id(item) not in named]
-    scene = with_ior(with_roughness(scene, requested.roughness, others), requested.ior, others)
+    scene = with_roughness(scene, requested.roughness, others)
+    if requested.change is not None:
+        scene = with_media(scene, requested.change, [item for item in scene.objects if id(item) not in named])
     for one in requested.media:
         scene = with_roughness(scene, one.roughness, objects_named(scene, one.name))
     for line in _textured_roughness(scene, requested):
@@ -132,7 +134,9 @@ def read_scene(model: str, requested: SceneRequest) -> Scene:
         scene = upright(scene, read_vector("--up", options.up or DEFAULT_UP))
         if options.eye is None and not getattr(scene, "has_camera", False):
             fov = DEFAULT_FOV if options.fov is None else options.fov
-            scene = dataclasses.replace(scene, camera=framing(scene.objects, requested.size, fov_y=fov, stage=chosen))
+            view = options.direction, options.fit
+            camera = framing(scene.objects, requested.size, fov, (0.0, 1.0, 0.0), chosen, *view)
+            scene = dataclasses.replace(scene, camera=camera)
         scene = staged(scene, chosen, requested.environment, turn)
     count = requested.environment_shadows
     return scene if count is None else dataclasses.replace(scene, environment_shadows=count)
@@ -296,7 +300,11 @@ def _defined_camera(scene: Scene, options: CameraOptions, size: tuple[int, int],
     if options.eye is None:
         if options.target is not None:
             raise InputError("--target", "--eye is missing", "give both, or neither")
-        return framing(scene.objects, size, fov_y=fov, up=up) if stage is None else scene.camera
+        view = options.direction, options.fit
+        return framing(scene.objects, size, fov, up, None, *view) if stage is None else scene.camera
+    for name, value in (("--orbit", options.orbit), ("--fit", options.fit)):
+        if value is not None:
+            raise InputError(f"{name} {value}", "--eye is given, too", "give one or the other")
     target = scene.bounds.mean(axis=0) if options.target is None else read_vector("--target", options.target)
     return Camera.look_at(read_vector("--eye", options.eye), target, up, fov_y=fov)
 
@@ -398,7 +406,9 @@ def read_objects(names: Sequence[str]) -> list[NamedMedium]:
         if (medium := given.read()) is None:
             do = "add --preset NAME, or --color C and --distance D, behind it"
             raise InputError(f"{_OBJECT} {name!r}", "no medium is named for it", do)
-        found.append(NamedMedium(name, medium, given.surface_roughness(given.roughness), given.keeps_ior))
+        found.append(
+            NamedMedium(name, given.changed(medium), given.surface_roughness(given.roughness), given.keeps_ior)
+        )
     return found
 
 

@@ -38,6 +38,7 @@ from translucent.planning.flags import Flags
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    from translucent.arrays import Array
     from translucent.media.medium import Medium
     from translucent.planning.interfaces import InterfaceMode
     from translucent.planning.methods import Method
@@ -288,8 +289,14 @@ class BodyOptions(AnyMediumOptions):
         f"{SCATTERING_IOR:g} of --scattering-color, or 1.5, that of glass.",
     )
 
+    dilute: float | None = option(
+        type=click.FloatRange(0.0, 1e12, min_open=True),
+        metavar="F",
+        help="Divide the coefficients of the medium by this: 5 makes it five times as clear.",
+    )
+
     def read(self, *, shows_scattering: bool = True) -> Medium | None:
-        """Medium that is chosen, if any; a color at a distance is that of a solid."""
+        """Medium that is chosen, if any, undiluted; a color at a distance is that of a solid."""
         from translucent.scene.showcase import SOLID_IOR
 
         medium = super().read(shows_scattering=shows_scattering)
@@ -300,6 +307,16 @@ class BodyOptions(AnyMediumOptions):
             advise(f"--color {self.color} takes no light away, so that it is clear glass; {do}")
         ior = self.ior or (SOLID_IOR if self.color is not None else medium.ior)
         return medium if ior == medium.ior else dataclasses.replace(medium, ior=ior)
+
+    def changed(self, medium: Medium) -> Medium:
+        """Medium as it is diluted, with the index of refraction that is requested."""
+        medium = medium if self.dilute is None else medium.diluted(self.dilute)
+        return medium if self.ior is None else dataclasses.replace(medium, ior=self.ior)
+
+    @property
+    def change(self) -> Callable[[Medium], Medium] | None:
+        """Change of media that is requested, if any."""
+        return None if self.dilute is None and self.ior is None else self.changed
 
     @property
     def keeps_ior(self) -> bool:
@@ -367,11 +384,43 @@ class CameraOptions:
     target: str | None = option(metavar="X,Y,Z", help="What the camera looks at. Default: the model's center.")
     up: str | None = option(metavar="X,Y,Z", help=f"What is up in the picture. Default: {DEFAULT_UP}.")
     fov: float | None = option(metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
+    orbit: str | None = option(
+        metavar="YAW,PITCH",
+        help="See the model from around it: degrees about +Y from the front, 90 from +X, and upwards: 30,15.",
+    )
+    fit: float | None = option(
+        type=click.FloatRange(0.0, 1.0, min_open=True),
+        metavar="F",
+        help="Let the model take this part of the picture's width or height, whichever is more: 0.8.",
+    )
+
+    @property
+    def direction(self) -> Array | None:
+        """(3,): direction of the view that `orbit` states, if any.
+
+        Raises
+        ------
+        InputError
+            If it is none.
+        """
+        from translucent.scene.camera import direction_from
+
+        if self.orbit is None:
+            return None
+        try:
+            yaw, pitch = (float(part) for part in self.orbit.split(","))
+        except ValueError:
+            raise InputError(f"--orbit {self.orbit!r}", "not two numbers", "write for example --orbit 30,15") from None
+        if not (abs(yaw) <= 1e6 and abs(pitch) < 90.0):
+            found = "a pitch beyond -90 to 90" if abs(yaw) <= 1e6 else "not finite"
+            raise InputError(f"--orbit {self.orbit}", found, "give degrees, such as 30,15")
+        return -direction_from(yaw, pitch)
 
     @property
     def defining(self) -> list[str]:
         """The options among these that define a camera, rather than choose one of the file."""
         options = {"--eye": self.eye, "--target": self.target, "--up": self.up, "--fov": self.fov}
+        options |= {"--orbit": self.orbit, "--fit": self.fit}
         return [name for name, value in options.items() if value is not None]
 
 

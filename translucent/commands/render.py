@@ -186,7 +186,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     requested = SceneRequest(
         medium=given.medium.read(),
         keeps_ior=given.medium.keeps_ior,
-        ior=given.medium.ior,
+        change=given.medium.change,
         camera=given.camera,
         file=given.file,
         size=pixels,
@@ -427,7 +427,7 @@ def black_text(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -> s
     tenth = thickness * math.log(10.0) / clearest if clearest > 0 else math.inf
     # How much clearer the medium would have to be for a fifth to pass.
     times = float(f"{clearest / math.log(5.0):.2g}")
-    clearer = f"in a medium {times:.3g} times as clear (a color at a --distance so much longer), a fifth would pass"
+    clearer = f"with --dilute {times:.3g}, which makes the medium so many times as clear, a fifth would pass"
     return (
         f"only {passed:.2%} of the light passes: the model is {extent_text(high - low)} and "
         f"{short_length(thickness)} thick at the median, and this medium leaves a tenth of the light after "

@@ -182,7 +182,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
     requested = SceneRequest(
         medium=given.medium.read(),
         keeps_ior=given.medium.keeps_ior,
-        ior=given.medium.ior,
+        change=given.medium.change,
         camera=given.camera,
         file=given.file,
         size=pixels,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -173,6 +173,22 @@ class Medium(Frozen):
             extinction = number_density * np.pi * radius * radius
             absorption, scattering = extinction * (1.0 - fractions), extinction * fractions
             return cls(absorption, scattering, absorption * _channels("glow", glow), anisotropy)
+
+    @checked
+    def diluted(self, times: float) -> Medium:
+        """Medium whose absorption, scattering and emission are so many times as small.
+
+        Raises
+        ------
+        InputError
+            If the number is not above 0.
+        """
+        if not (math.isfinite(times) and times > 0):
+            raise InputError(f"medium diluted {times:g} times", "not above 0 and finite", "give for example 5")
+        absorption, scattering, emission = (
+            np.asarray(one) / times for one in (self.absorption, self.scattering, self.emission)
+        )
+        return replace(self, absorption=absorption, scattering=scattering, emission=emission)
 
     @cached_property
     def extinction(self) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -108,11 +108,24 @@ def grouped(found: Mapping[str, Preset]) -> dict[str, list[Preset]]:
 
 
 def matching(found: Mapping[str, Preset], words: str) -> dict[str, Preset]:
-    """Presets whose names, aliases, groups, types, notes or sources have all of these words, or words that begin so."""
+    """Presets whose names, aliases, groups, types, notes or sources have all of these words, or words that begin so.
+
+    Those of that name come first, then names that have the words, then aliases, notes, and all others.
+    """
     searched = re.findall(r"\w+", words.lower().replace("_", " "))
-    return {
-        name: one for name, one in found.items() if all(any(w.startswith(x) for w in _words(one)) for x in searched)
-    }
+
+    def have(texts: Iterable[str]) -> bool:
+        begun = re.findall(r"\w+", " ".join(texts).lower().replace("_", " "))
+        return all(any(word.startswith(one) for word in begun) for one in searched)
+
+    def rank(one: Preset) -> int:
+        key = "_".join(searched)
+        named = key == one.name, key in one.aliases
+        where = (*named, *map(have, ([one.name], one.aliases, [one.note])))
+        return next((i for i, so in enumerate(where) if so), len(where))
+
+    matched = [one for one in found.values() if have([*_words(one)])]
+    return {one.name: one for one in sorted(matched, key=rank)}
 
 
 @checked

@@ -47,8 +47,8 @@ def _black_bodies(scene: Scene) -> tuple[Note, ...]:
     text = (
         f"{object_names(body for _, body in black)}: black: {passed:.1e} of white light passes "
         f"{_text(chord)}, the mean thickness{'' if len(black) == 1 else f' of {clearest.mesh.name!r}'}, and a "
-        f"fifth passes {_text(distance)}; a medium {chord / distance:.2g} times as dilute (a color at a distance so "
-        "much longer) shows its color"
+        f"fifth passes {_text(distance)}; diluted {chord / distance:.2g} times "
+        f"(--dilute {chord / distance:.2g}) it shows its color"
     )
     return (Note(NoteKind.BLACK, text),)
 
@@ -90,7 +90,8 @@ def _opaque_bodies(scene: Scene, known: set[NoteKind]) -> tuple[Note, ...]:
             NoteKind.OPAQUE_BODIES,
             f"{object_names(body for *_, body in bodies)}: opaque at this size, as plastic: light turns back within "
             f"{_text(free)} (the mean free path), {times:.0f} times in {short_length(_size(worst))}; "
-            f"{other_size(scene.shown_bounds, GLOWING / times)} its thin parts glow",
+            f"{other_size(scene.shown_bounds, GLOWING / times)} its thin parts glow, and so they do "
+            f"diluted {times / GLOWING:.2g} times (--dilute {times / GLOWING:.2g})",
         ),
     )
 

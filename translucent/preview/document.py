@@ -14,14 +14,13 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.tone import TONES
 from translucent.media.medium import MAX_COEFFICIENT, MAX_EMISSION, MAX_IOR, Medium
 from translucent.planning.flags import Flags
 from translucent.planning.methods import METHODS
 from translucent.planning.scattering import SCATTERINGS
-from translucent.scene.camera import MAX_COORDINATE, Camera, framing_directions
+from translucent.scene.camera import MAX_COORDINATE, Camera, direction_from, framing_directions
 from translucent.scene.environment import MAX_EXPOSURE
 from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.scene import Object
@@ -359,12 +358,6 @@ _STEP_BACK = 4.0
 
 #: Smallest and largest distance of zooming, in metres.
 _NEAREST, _FARTHEST = 1e-9, 1e12
-
-
-def direction_from(yaw: float, pitch: float) -> Array:
-    """(3,): unit vector towards a place around the origin: yaw about +Y from +Z, and pitch upwards, in degrees."""
-    yaw, pitch = math.radians(yaw), math.radians(pitch)
-    return np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
 
 
 def camera_of(orbit: Orbit) -> Camera:

@@ -25,7 +25,7 @@ from translucent.media.presets import preset
 from translucent.planning.caustics import Caustics
 from translucent.planning.flags import Flags
 from translucent.planning.request import RenderRequest
-from translucent.preview.document import AUTO, Document, Material, Orbit, camera_of, direction_from, length_text
+from translucent.preview.document import AUTO, Document, Material, Orbit, camera_of, length_text
 from translucent.preview.scenes import (
     Loaded,
     medium_of,
@@ -38,6 +38,7 @@ from translucent.preview.scenes import (
 from translucent.preview.tasks import Task
 from translucent.preview.worker import Pool, Urgency, report
 from translucent.renderer import Renderer
+from translucent.scene.camera import direction_from
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene
 from translucent.scene.showcase import SOLID_IOR

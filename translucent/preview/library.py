@@ -48,6 +48,9 @@ from translucent.version import VERSION
 #: Seconds between checks whether files of own presets have changed.
 WATCH = 1.0
 
+#: Presets that people look for first, and their heading.
+FIRST, POPULAR = ("jade", "wax", "whole_milk", "merlot", "bottle_glass"), "popular"
+
 #: Source of presets that are saved here.
 SAVED = "saved in the previewer"
 
@@ -108,10 +111,20 @@ class Library:
         self._files: object = None
 
     def groups(self) -> dict[str, list[Preset]]:
-        """Presets with the words of the search, by their groups; own ones are read again when their files change."""
+        """Presets with the words of the search, by their groups; own ones are read again when their files change.
+
+        Without a search, those that people look for first come first, and once more in their groups.
+        """
         self._refresh()
         if self._searched != self.search:
-            self._found, self._searched = grouped(matching(self._own | presets(), self.search)), self.search
+            known = self._own | presets()
+            if self.search.strip():
+                self._found = {}
+                for one in matching(known, self.search).values():  # the best match first, and its group
+                    self._found.setdefault(one.group or OWN, []).append(one)
+            else:
+                self._found = {POPULAR: [known[name] for name in FIRST], **grouped(known)}
+            self._searched = self.search
         return self._found
 
     def find(self, name: str) -> Preset | None:

@@ -36,7 +36,6 @@ from translucent.preview.document import (
     Model,
     Orbit,
     camera_of,
-    direction_from,
     framed,
     medium_fields,
     orbit_of,
@@ -44,7 +43,7 @@ from translucent.preview.document import (
 )
 from translucent.preview.tasks import Lane, Task
 from translucent.preview.worker import Pool, Urgency
-from translucent.scene.camera import Camera
+from translucent.scene.camera import Camera, direction_from
 from translucent.scene.environment import Environment, filtered
 from translucent.scene.environment_files import READERS
 from translucent.scene.lights import DirectionalLight, PositionalLight, SphereLight
@@ -162,7 +161,7 @@ def rescaled(loaded: Loaded, model: Model) -> Loaded:
     """Loaded model by another unit of its coordinates: of its meshes, all that takes time is kept."""
     factor = metres_per_unit(model.unit) / metres_per_unit(loaded.model.unit)
     scene, scale = loaded.scene, np.diag([factor, factor, factor, 1.0])
-    media = {id(item.medium): _diluted(item.medium, factor) for item in scene.objects if item.medium is not None}
+    media = {id(item.medium): item.medium.diluted(factor) for item in scene.objects if item.medium is not None}
     objects = [
         dataclasses.replace(
             item,
@@ -179,14 +178,6 @@ def rescaled(loaded: Loaded, model: Model) -> Loaded:
     lights = [_farther(light, factor) for light in scene.lights]
     scene = dataclasses.replace(scene, objects=objects, camera=camera, lights=lights)
     return Loaded(model, scene, material_of(scene))
-
-
-def _diluted(medium: Medium, factor: float) -> Medium:
-    """Medium that looks the same in a body so many times as large."""
-    absorption, scattering, emission = (
-        np.asarray(one) / factor for one in (medium.absorption, medium.scattering, medium.emission)
-    )
-    return dataclasses.replace(medium, absorption=absorption, scattering=scattering, emission=emission)
 
 
 def _farther(light: Light, factor: float) -> Light:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from translucent.arrays import Array, Frozen
 from translucent.errors import InputError
 from translucent.geometry.grouping import extent
 
-#: Factor by which a picture is larger than the objects that it frames.
+#: Factor by which a picture is larger than the objects that it frames, unless stated otherwise.
 FRAMING_MARGIN = 1.12
 
 #: Direction in which a camera that frames something looks, if none is given.
@@ -115,8 +116,9 @@ class Camera(Frozen):
         direction: npt.ArrayLike = FRAMED_FROM,
         fov_y: float = 30.0,
         up: npt.ArrayLike = (0.0, 1.0, 0.0),
+        fit: float | None = None,
     ) -> Camera:
-        """Perspective camera that frames all points, looking along `direction`, with a small margin.
+        """Perspective camera that frames all points, looking along `direction`.
 
         Parameters
         ----------
@@ -130,14 +132,18 @@ class Camera(Frozen):
             Full vertical angle of view in degrees.
         up : array_like (3,)
             Upwards in the picture.
+        fit : float, optional
+            Fraction of the picture's width or height that the points take, whichever is more. Default: a small margin.
         """
+        if fit is not None and not 0.0 < fit <= 1.0:
+            raise InputError(f"camera framing fit {fit}", "not above 0 and at most 1", "give for example 0.8")
         framed = np.asarray(points, dtype=np.float64)
         if framed.ndim != 2 or framed.shape[1] != 3 or not len(framed):
             raise InputError(f"camera framing points of shape {framed.shape}", "no points", "give an array (n, 3)")
         size = check_size(size)
         low, high = extent(framed)
         reach = float(np.linalg.norm(high - low)) or 1.0
-        pose, half, axes = _framing_axes(size, direction, fov_y, up)
+        pose, half, axes = _framing_axes(size, direction, fov_y, up, fit)
         middle, farthest = 0.5 * (low + high), np.full(5, -np.inf)
         for begin in range(0, len(framed), FRAMED_AT_ONCE):  # millions of points would take room
             part = (framed[begin : begin + FRAMED_AT_ONCE] - middle) @ axes
@@ -239,7 +245,7 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
 
 
 def _framing_axes(
-    size: tuple[int, int], direction: npt.ArrayLike, fov_y: float, up: npt.ArrayLike
+    size: tuple[int, int], direction: npt.ArrayLike, fov_y: float, up: npt.ArrayLike, fit: float | None
 ) -> tuple[Array, Array, Array]:
     """Pose at the origin, half the picture's width and height at distance 1, and axes (3, 5) along which the farthest
     points decide where a camera has to be.
@@ -247,9 +253,16 @@ def _framing_axes(
     axis = np.asarray(direction, dtype=np.float64)
     pose = Camera(_look_at(-axis, np.zeros(3), up), fov_y=fov_y).pose
     aside, back = pose[:3, :2], pose[:3, 2:3]
-    half = np.tan(np.radians(fov_y) / 2) * np.array([size[0] / size[1], 1.0]) / FRAMING_MARGIN
+    half = np.tan(np.radians(fov_y) / 2) * np.array([size[0] / size[1], 1.0])
+    half = half / (FRAMING_MARGIN if fit is None else 1.0 / fit)
     # Each point asks for |x - cx| <= half (distance - z): the two sides of the picture meet where both are tight.
     return pose, half, np.concatenate([half * back + aside, half * back - aside, back], axis=1)
+
+
+def direction_from(yaw: float, pitch: float) -> Array:
+    """(3,): unit vector towards a place around the origin: yaw about +Y from +Z, and pitch upwards, in degrees."""
+    yaw, pitch = math.radians(yaw), math.radians(pitch)
+    return np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
 
 
 def framing_directions(
@@ -257,9 +270,10 @@ def framing_directions(
     direction: npt.ArrayLike = FRAMED_FROM,
     fov_y: float = 30.0,
     up: npt.ArrayLike = (0.0, 1.0, 0.0),
+    fit: float | None = None,
 ) -> Array:
     """Directions (11, 3) for which `Camera.framing` needs the farthest points alone."""
-    return np.concatenate([np.eye(3), -np.eye(3), _framing_axes(size, direction, fov_y, up)[2].T])
+    return np.concatenate([np.eye(3), -np.eye(3), _framing_axes(size, direction, fov_y, up, fit)[2].T])
 
 
 def _look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -183,18 +183,24 @@ def framing(
     fov_y: float = 30.0,
     up: npt.ArrayLike = (0.0, 1.0, 0.0),
     stage: Stage | None = None,
+    direction: npt.ArrayLike | None = None,
+    fit: float | None = None,
 ) -> Camera:
-    """Camera of `Camera.framing` that sees all of these objects, on a stage with room for their shadows."""
-    if stage is None:
-        points = farthest_vertices(objects, framing_directions(size, FRAMED_FROM, fov_y, up))
-        return Camera.framing(points, size, fov_y=fov_y, up=up)
-    lights, directions = stage_lights(stage), framing_directions(size, stage.view, fov_y, up)
+    """Camera of `Camera.framing` that sees all of these objects, on a stage with room for their shadows.
+
+    With a `fit`, the objects alone take that fraction of the picture, whatever of their shadows is seen.
+    """
+    along = direction if direction is not None else FRAMED_FROM if stage is None else stage.view
+    if stage is None or fit is not None:
+        points = farthest_vertices(objects, framing_directions(size, along, fov_y, up, fit))
+        return Camera.framing(points, size, along, fov_y, up, fit)
+    lights, directions = stage_lights(stage), framing_directions(size, along, fov_y, up)
     # A shadow is a linear map of its points: one map for each light, applied to unit vectors.
     maps = with_shadows(np.eye(4, 3, -1), lights).reshape(-1, 4, 3)[:, 1:]
     points = farthest_vertices(objects, (directions @ maps.transpose(0, 2, 1)).reshape(-1, 3))
     points = with_shadows(points, lights)
     middle = extent(points).mean(axis=0)
-    return Camera.framing(middle + ROOM * (points - middle), size, stage.view, fov_y, up)
+    return Camera.framing(middle + ROOM * (points - middle), size, along, fov_y, up)
 
 
 def with_roughness(scene: AnyScene, roughness: float | None, among: Sequence[Object] | None = None) -> AnyScene:
@@ -211,12 +217,10 @@ def with_roughness(scene: AnyScene, roughness: float | None, among: Sequence[Obj
     return dataclasses.replace(scene, objects=[surfaced(item) for item in scene.objects])
 
 
-def with_ior(scene: AnyScene, ior: float | None, among: Sequence[Object] | None = None) -> AnyScene:
-    """Scene with this index of refraction in all media, or in those of some objects; the scene itself for None."""
-    if ior is None:
-        return scene
+def with_media(scene: AnyScene, change: Callable[[Medium], Medium], among: Sequence[Object] | None = None) -> AnyScene:
+    """Scene with all of its media changed, or with those of some objects."""
     chosen = set(map(id, scene.objects if among is None else among))
-    media = {id(item.medium): dataclasses.replace(item.medium, ior=ior) for item in scene.objects if item.medium}
+    media = {id(item.medium): change(item.medium) for item in scene.objects if item.medium is not None}
     objects = [
         dataclasses.replace(item, medium=media[id(item.medium)])
         if item.medium is not None and not item.covers and id(item) in chosen

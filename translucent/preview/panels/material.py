@@ -259,7 +259,9 @@ def library_panel(state: WindowState) -> None:
     if imgui.begin_child("##presets", ImVec2(0.0, -ui.em(3.6))):
         for group, members in groups.items():
             imgui.separator_text(f"{group} ({len(members)})")
+            imgui.push_id(group)  # a preset may be in two of them
             ui.draw_cards(state, members, CARD, 1.0, card, lambda one: state.choose_preset(one.name), lines=2)
+            imgui.pop_id()
     imgui.end_child()
     imgui.separator()
     imgui.set_next_item_width(-ui.em(6.2))
