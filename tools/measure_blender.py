@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -170,7 +171,8 @@ def main() -> None:
                 mean, error, seen = (np.array(one[key]) for key in ("truth", "error", "cycles"))
                 ratio, doubt = np.round(seen / mean, 3), np.round(error / mean, 4)
                 print(f"{name:18} {environment:7} {ratio} +- {doubt} {np.round(mean, 4)}", flush=True)
-            data = {"materials": {name: found[name] for name in known if name in found}}
+            kept = {name: found[name] for name in known if name in found}
+            data = {"written": date.today().isoformat(), "materials": kept}
             write_text_atomically(FILE, json.dumps(data, indent=1) + "\n")
 
 

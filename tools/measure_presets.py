@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from datetime import date
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -116,7 +117,8 @@ def main() -> None:
             old = known[one.name]["colors"] if asked.drawn else None
             known[one.name] = {"numbers": numbers_of(one), "colors": measure(renderer, one, environments, old)}
             kept = {name: known[name] for name in tl.presets() if name in known}
-            data = {"renderer": renderer.provenance["renderer"], "side": SIDE, "presets": kept}
+            day = date.today().isoformat()
+            data = {"written": day, "renderer": renderer.provenance["renderer"], "side": SIDE, "presets": kept}
             FILE.parent.mkdir(exist_ok=True)
             write_text_atomically(FILE, json.dumps(data, indent=1) + "\n")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,9 @@ if TYPE_CHECKING:
 
 #: Largest deviation of a channel that passes, of our pictures and of those of Blender.
 MOST, MOST_BLENDER = 0.1, 0.05
+
+#: What measures each file.
+TOOLS = {"measured": "measure_presets.py", "blender": "measure_blender.py"}
 
 
 def rows(measured: dict[str, Any], what: str = "drawn", most: float = MOST) -> list[str]:
@@ -45,8 +49,12 @@ def write_tables(app: Sphinx) -> None:
         ("presets", "measured", "presets", "drawn", MOST),
         ("blender", "blender", "materials", "cycles", MOST_BLENDER),
     ):
-        measured = json.loads((source / "presets" / f"{file}.json").read_text(encoding="utf-8"))[key]
-        (folder / f"{name}.md").write_text("\n".join(rows(measured, what, most)) + "\n", encoding="utf-8")
+        data = json.loads((source / "presets" / f"{file}.json").read_text(encoding="utf-8"))
+        day = date.fromisoformat(data["written"])
+        machine = f", on: {data['renderer']}" if "renderer" in data else ""
+        origin = f"*Last measured on {day.day} {day:%B %Y}, by `python tools/{TOOLS[file]}`{machine}.*"
+        lines = [*rows(data[key], what, most), "", origin]
+        (folder / f"{name}.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
