@@ -150,6 +150,8 @@ def main() -> None:
         write_example()
         if arguments.types:
             _run("npx", "tsc", "-p", ".")
+        else:
+            print("web/dist has no declarations of types: `make web` writes them, and `npm pack` in web/ does")
     except InputError as error:
         raise SystemExit(f"error: {error}") from None
 

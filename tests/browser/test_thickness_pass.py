@@ -319,6 +319,55 @@ def test_what_has_no_inside_is_refused(three_page: WebPage) -> None:
     assert "call render(scene, camera) first" in told["unread"]
 
 
+MISTAKES = """() => tools.withRenderer([16, 16], (renderer) => {
+    const { THREE, ExactThicknessPass } = translucentThree;
+    const told = (use) => { try { use(); } catch (error) { return `${error.name}: ${error.message}`; } };
+    const made = (options) => told(() => new ExactThicknessPass(renderer, options));
+    const mesh = new THREE.Mesh(new THREE.SphereGeometry(), new THREE.MeshBasicMaterial());
+    mesh.name = "ball";
+    const camera = new THREE.PerspectiveCamera();
+    const pass = new ExactThicknessPass(renderer, { bodies: [mesh], exits: undefined });
+    const cut = new THREE.Plane(new THREE.Vector3(0, 1, 0), 0);
+    const found = {
+        one: made({ bodies: mesh }), unknown: made({ body: [mesh] }), list: made({ opaque: [mesh, {}] }),
+        size: made({ size: 64 }), exits: made({ exits: "yes" }), precision: made({ precision: "double" }),
+        none: made(null), array: told(() => pass.render(mesh, new THREE.ArrayCamera([camera]))),
+        right: made({ bodies: [mesh], opaque: [], size: [8, 8], precision: "float16", exits: false }),
+    };
+    pass.options.size = [0, 0];
+    found.later = told(() => pass.render(mesh, camera));
+    pass.options.size = undefined;
+    renderer.clippingPlanes = [cut];
+    found.planes = told(() => pass.render(mesh, camera));
+    renderer.clippingPlanes = [];
+    mesh.material.clippingPlanes = [cut];
+    found.disabled = told(() => pass.render(mesh, camera));
+    renderer.localClippingEnabled = true;
+    found.local = told(() => pass.render(mesh, camera));
+    return found;
+})"""
+
+
+def test_options_and_views_that_cannot_be_followed_are_refused(three_page: WebPage) -> None:
+    told = three_page.run(MISTAKES)
+    start = "TranslucentError: option"
+    of = "of ExactThicknessPass"
+    assert told["one"].startswith(f"{start} bodies {of}; it is one Mesh; give a list of objects, as [mesh]")
+    known = "bodies, opaque, size, precision, opticalDepth, exits"
+    assert told["unknown"] == f"{start} body {of}; there is no such option; use one of {known}"
+    assert told["list"].startswith(f"{start} opaque {of}; it is a list with an object in it; give a list of objects")
+    assert told["size"] == f"{start} size {of}; it is 64; give [width, height] in pixels"
+    assert told["exits"] == f'{start} exits {of}; it is "yes"; give "auto", true, false, or leave it out'
+    assert told["precision"] == f'{start} precision {of}; it is "double"; give "float32", "float16", or leave it out'
+    assert "they are null; give an object" in told["none"]
+    assert "an ArrayCamera; it has several pictures" in told["array"]
+    assert "option size" in told["later"]
+    assert "renderer.clippingPlanes; the pass measures whole bodies" in told["planes"]
+    assert 'clippingPlanes of Mesh "ball"; the pass measures whole bodies' in told["local"]
+    assert told["right"] is None
+    assert told["disabled"] is None
+
+
 DEPTHS = """({ ball, wall, camera, size }) => {
     const { THREE, ExactThicknessPass } = translucentThree;
     const measured = (options, change) => tools.withRenderer(size, (renderer) => {

@@ -87,3 +87,38 @@ def test_a_ball_of_glass_turns_the_world_upside_down(pictures: list[Any], three_
     # What it leaves out is light that is mirrored inside, and the horizon that maps of three.js blur.
     assert errors[0] < 0.15 * truth[inside].mean()
     assert errors[1] > 3.0 * errors[0]
+
+
+UNMEASURED = """() => tools.withRenderer([16, 16], (renderer) => {
+    const { THREE, ExactThicknessPass, TranslucentMaterial } = translucentThree;
+    const told = (use) => { try { use(); } catch (error) { return error.message; } };
+    const pass = new ExactThicknessPass(renderer);
+    const heard = [], warn = console.warn;
+    console.warn = (text) => heard.push(text);
+    const material = new TranslucentMaterial({ pass, name: "wine" });
+    const mesh = new THREE.Mesh(new THREE.SphereGeometry(), material);
+    const camera = new THREE.PerspectiveCamera();
+    camera.position.z = 5;
+    camera.updateMatrixWorld();
+    renderer.render(mesh, camera);
+    renderer.render(mesh, camera);
+    const before = heard.splice(0);
+    mesh.material = material.clone();
+    pass.render(mesh, camera);
+    renderer.render(mesh, camera);
+    console.warn = warn;
+    const refused = [{}, { pass: {} }].map((given) => told(() => new TranslucentMaterial(given)));
+    return { before, after: heard, refused };
+})"""
+
+
+def test_a_material_whose_pass_never_ran_says_so_once(three_page: WebPage) -> None:
+    told = three_page.run(UNMEASURED)
+    (warning,) = told["before"]
+    assert warning.startswith('TranslucentMaterial "wine"; its pass has measured nothing')
+    assert "call pass.render(scene, camera) before renderer.render" in warning
+    assert told["after"] == []
+    for refused in told["refused"]:
+        assert refused.startswith(
+            "TranslucentMaterial; it has no pass; give one: { pass: new ExactThicknessPass(renderer) }"
+        )

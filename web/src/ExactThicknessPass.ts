@@ -20,6 +20,7 @@ import type { Camera, Material, Object3D, Texture, WebGLRenderer } from "three";
 import { StandIn, checkBody, visibleMeshes } from "./bodies.js";
 import { TranslucentError } from "./errors.js";
 import { extinctionOf } from "./extinction.js";
+import { checkOptions, checkView } from "./options.js";
 import { COVERAGE_FLOOR, NOTHING, OPEN_WEIGHTS, ROUNDING } from "./generated/shaders.js";
 import { expectedCount, place, seesFrom } from "./placement.js";
 import type { DepthRange, View } from "./placement.js";
@@ -91,6 +92,7 @@ export class ExactThicknessPass {
     if (!(renderer as { isWebGLRenderer?: boolean }).isWebGLRenderer) {
       throw new TranslucentError("ExactThicknessPass", "the renderer is no WebGLRenderer", "use three's WebGLRenderer, on WebGL2");
     }
+    checkOptions(options);
     this.renderer = renderer;
     this.options = options;
     void this.precision; // refuses a renderer that can add up nothing
@@ -140,9 +142,11 @@ export class ExactThicknessPass {
     const { renderer } = this;
     const gl = renderer.getContext() as WebGL2RenderingContext;
     if (gl.isContextLost()) return false;
+    checkOptions(this.options);
     if (scene.matrixWorldAutoUpdate) scene.updateMatrixWorld();
     if (camera.parent === null && camera.matrixWorldAutoUpdate) camera.updateMatrixWorld();
     const [bodies, opaque] = this.sort(scene, camera);
+    checkView(renderer, camera, [...bodies, ...opaque].map((one) => one.mesh));
     const [width, height] = this.size();
     const subpixel = 0.5 ** (gl.getParameter(gl.SUBPIXEL_BITS) as number);
     const view = seesFrom(camera, width, height, subpixel);

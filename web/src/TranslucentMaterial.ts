@@ -2,6 +2,7 @@
 import { MeshPhysicalMaterial, Vector3 } from "three";
 import type { Camera, IUniform, MeshPhysicalMaterialParameters, Texture, WebGLRenderer } from "three";
 import type { ExactThicknessPass } from "./ExactThicknessPass.js";
+import { TranslucentError } from "./errors.js";
 import { extinctionOf } from "./extinction.js";
 import { library } from "./generated/shaders.js";
 
@@ -164,13 +165,23 @@ export class TranslucentMaterial extends MeshPhysicalMaterial {
     exactUse: { value: [false, false, false] },
   };
 
+  private warned = false;
+
   constructor({ pass, ...others }: TranslucentMaterialParameters) {
+    if (typeof pass?.render !== "function") {
+      throw new TranslucentError("TranslucentMaterial", "it has no pass", "give one: { pass: new ExactThicknessPass(renderer) }");
+    }
     super({ transmission: 1, roughness: 0, metalness: 0, ...others });
     this.pass = pass;
   }
 
   override onBeforeRender(_renderer: WebGLRenderer, _scene: unknown, _camera: Camera): void {
     const { exact, pass } = this;
+    if (pass.texture === null && !this.warned) {
+      this.warned = true; // once: a context may be lost for some frames
+      const name = this.name ? `"${this.name}"` : "without a name";
+      console.warn(`TranslucentMaterial ${name}; its pass has measured nothing, so that its thickness stands in; call pass.render(scene, camera) before renderer.render`);
+    }
     exact.exactPath.value = pass.texture;
     exact.exactOpticalDepth.value = pass.opticalDepth;
     exact.exactExits.value = pass.exits;
