@@ -36,9 +36,11 @@ void main() {
     if (adaptive == 1) { is_traced = is_traced && texelFetch(unsettled, here, 0).r > 0.0; }
 #if DISPERSION
     for (int channel = 0; channel < 3; ++channel) {
-        store(3 * place + channel, ray, is_traced && (mirrored == 0 || channel == 1) ? packed_pixel(here, channel) : NO_RAY);
+        branch_pixels[3 * place + channel] = is_traced && (mirrored == 0 || channel == 1) ? packed_pixel(here, channel) : NO_RAY;
+        if (is_traced) { store(3 * place + channel, ray); }
     }
 #else
-    store(place, ray, is_traced ? packed_pixel(here, 1) : NO_RAY);
+    branch_pixels[place] = is_traced ? packed_pixel(here, 1) : NO_RAY;
+    if (is_traced) { store(place, ray); }
 #endif
 }

@@ -14,10 +14,14 @@ struct Pixel {
     vec3 direction;
 };
 
+uvec2 pixel_number(ivec2 here) {
+    return uvec2(vec2(here) + 0.5 + beyond.xy);
+}
+
 Pixel pixel_at(ivec2 here) {
     vec2 center = vec2(here) + 0.5;
     vec2 sampled = center + frame_size.zw;
-    return Pixel(here, ivec2(center.x, frame_size.y - center.y), uvec2(center + beyond.xy), sampled,
+    return Pixel(here, ivec2(center.x, frame_size.y - center.y), pixel_number(here), sampled,
         normalize(view_ray(sampled, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz)));
 }
 

@@ -34,9 +34,14 @@ void main() {
         intBitsToFloat(ivec2(live_rays[6 * live_room + at], live_rays[7 * live_room + at])));
     const int known = HITS;
 #endif
-    vec4 front;
-    float variance;
-    PrimaryHit primary = primary_hit(pixel_at(pixel_of(word)), front, variance);
+    PrimaryHit primary = PrimaryHit(AIR, vec3(0.0), vec3(0.0), 0.0, 0.0, vec3(0.0), 0.0, uvec2(0u));
+    primary.pixel = pixel_number(pixel_of(word));
+    // Loops in place of branches: processors that draw compute both sides of a branch for all rays, and leave a loop that none needs.
+    for (bool begins = depth_of(ray) == 0; begins; begins = false) {
+        vec4 front;
+        float variance;
+        primary = primary_hit(pixel_at(pixel_of(word)), front, variance);
+    }
     Ray weaker;
     int goes_on = follow(ray, weaker, hit, primary, channel, known);
     vec4 light = vec4(traced_radiance, traced_lost);
@@ -45,7 +50,11 @@ void main() {
 #endif
     ray_light[number] = light;
 #if !MISSES
-    store(2 * at, ray, goes_on == NONE ? NO_RAY : word);
-    store(2 * at + 1, weaker, goes_on == BOTH ? word : NO_RAY);
+    branch_pixels[2 * at] = goes_on == NONE ? NO_RAY : word;
+    branch_pixels[2 * at + 1] = goes_on == BOTH ? word : NO_RAY;
+    for (int branch = 0; branch < goes_on; ++branch) {
+        store(2 * at + branch, ray);
+        ray = weaker;
+    }
 #endif
 }

@@ -43,9 +43,7 @@ uvec4 unpacked_interior(uint count) {
     return uvec4(greaterThan(uvec4(count), uvec4(0, 2, 4, 6))) | uvec4(greaterThan(uvec4(count), uvec4(1, 3, 5, 7))) << 16;
 }
 
-void store(int place, Ray ray, uint pixel) {
-    branch_pixels[place] = pixel;
-    if (pixel == NO_RAY) { return; }
+void store(int place, Ray ray) {
     for (int axis = 0; axis < 3; ++axis) {
         branch_segments[6 * place + axis] = ray.origin[axis];
         branch_segments[6 * place + 3 + axis] = ray.direction[axis];

@@ -19,8 +19,8 @@ from translucent.assets import mesh_path
 from translucent.geometry.ray_caster import embree_refusal
 from translucent.geometry.solids import Sphere, Torus
 from translucent.gpu import embree_hits as module
-from translucent.gpu import ray_generations
 from translucent.gpu.embree_hits import EmbreeHits
+from translucent.gpu.passes import ray_generations
 from translucent.planning.render_plan import Capabilities
 
 SIZE = (40, 30)

@@ -14,9 +14,9 @@ from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
+from translucent.gpu.passes.ray_generations import RayGenerations
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches
 from translucent.gpu.placement import Part, extents, part_of
-from translucent.gpu.ray_generations import RayGenerations
 from translucent.gpu.shaders import set_used
 from translucent.gpu.targets import SHADER_STORAGE
 from translucent.gpu.uniforms import media_center

@@ -23,7 +23,7 @@ from translucent.gpu.shaders import set_used
 from translucent.gpu.uniforms import media_center
 
 #: Bytes of the buffers of rays, however large the frame is.
-MOST_BYTES = 80 << 20
+MOST_BYTES = 64 << 20
 
 #: Places for rays to each pixel of a portion, of which live rays fill no more than half: about two rays of a pixel are
 #: alive at once, in bodies with many walls three.
