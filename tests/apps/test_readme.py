@@ -205,6 +205,14 @@ def test_headings_are_nested(page: str) -> None:
     assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_pages_are_short(page: str) -> None:
+    if page == "README.md":
+        assert len(PAGES[page].splitlines()) <= 100
+    elif page != "docs/api.md":
+        assert len(PAGES[page].split()) <= (900 if page.startswith("docs/guides/") else 1800)
+
+
 def test_all_pages_are_in_the_contents() -> None:
     trees = re.findall(r"```\{toctree\}\n(.*?)```", PAGES["docs/index.md"], re.DOTALL)
     listed = [f"docs/{name}.md" for tree in trees for name in re.findall(r"(?m)^([\w/-]+)$", tree)]
