@@ -276,6 +276,7 @@ def test_a_limit_ends_measuring_and_what_was_not_measured_is_named(
     result = run("knot", "bear", "shell", "-o", tmp_path, "--limit", "0.5", *SMALL)
     assert result.code == 0
     assert result.err.splitlines() == [
+        "preparing the report: the first measurement takes a while",
         *(f"reading {name}" for name in ("knot", "bear", "shell")),
         "measuring 1 of 3: case model knot",
         "measuring 2 of 3: case model bear",

@@ -359,7 +359,11 @@ def _bake_scatter(job: ScatterJob, given: BakeOptions, as_json: bool) -> None:
         found, description = check_scatter_output(job.output, results), "baked, diffused in pictures, difference"
         checks = _check_report(found, job.output, write_scatter_picture, description)
     reported = {"output": str(job.output), "record": record, **checks}
-    _print(reported, [*_scatter_lines(job, record), *checks.get("lines", [])], as_json)
+    lines = [*_scatter_lines(job, record), *checks.get("lines", [])]
+    if assumes_metres(str(job.model), given.file):
+        reported["size"] = size_note(next(iter(results.values())).body, "m")
+        lines.append(f"size: {reported['size']}")
+    _print(reported, lines, as_json)
 
 
 def _scatter_lines(job: ScatterJob, record: dict[str, Any]) -> list[str]:

@@ -124,7 +124,8 @@ def _measured(
     models: tuple[str, ...], medium: Medium | None, given: ReportOptions, parts: tuple[Part, ...], base: Report | None
 ) -> Report:
     """Measure a report with progress on stderr; each finished scene is in ``report.json`` at once."""
-    echo("preparing the report: the first measurement takes a while", err=True)
+    if base is None:
+        echo("preparing the report: the first measurement takes a while", err=True)
     from translucent.bench.cases import model_cases
     from translucent.bench.output import write_report
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
