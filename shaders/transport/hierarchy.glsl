@@ -34,7 +34,6 @@ ivec2 hierarchy_texel(int index) {
 
 // A ray in the coordinates of a hierarchy, whose bounds reach from -1 to 1.
 struct LocalRay {
-    vec3 origin;
     vec3 start;     // origin in steps of the grid
     vec3 inverse;   // of the direction, in steps
 };
@@ -47,7 +46,7 @@ LocalRay local_ray(vec3 origin, vec3 direction) {
     vec3 away = vec3(direction.x < 0.0 ? -1.0 : 1.0, direction.y < 0.0 ? -1.0 : 1.0, direction.z < 0.0 ? -1.0 : 1.0);
     // As a fraction of the largest: in the coordinates of a huge mesh all are small.
     vec3 inverse = away / max(abs(direction), vec3(1e-12 * largest(abs(direction))));
-    return LocalRay(origin, (origin + 1.0) * HIERARCHY_STEPS, inverse / HIERARCHY_STEPS);
+    return LocalRay((origin + 1.0) * HIERARCHY_STEPS, inverse / HIERARCHY_STEPS);
 }
 
 // Order of nodes, one of eight, for the octant of a ray: nearer nodes come first, and so do their bounds.
@@ -71,23 +70,16 @@ vec3 triangle_corner(int triangle, int corner) {
     return uintBitsToFloat(texelFetch(hierarchy_triangles, hierarchy_texel(3 * triangle + corner), 0).xyz);
 }
 
-void intersect_triangle(int triangle, int object, vec3 origin, vec3 shear, int axis, float start, inout Hit hit) {
-    vec3 a = along_last(triangle_corner(triangle, 0) - origin, axis);
-    vec3 b = along_last(triangle_corner(triangle, 1) - origin, axis);
-    vec3 c = along_last(triangle_corner(triangle, 2) - origin, axis);
-    a.xy -= shear.xy * a.z;
-    b.xy -= shear.xy * b.z;
-    c.xy -= shear.xy * c.z;
-    // Of an edge both its triangles must find the same weight but for the sign, so no product may stay unrounded in a sum.
-    precise vec3 weights = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
-    float sum = weights.x + weights.y + weights.z;
-    if ((any(lessThan(weights, vec3(0.0))) && any(greaterThan(weights, vec3(0.0)))) || sum == 0.0) { return; }
-    float path = shear.z * dot(weights, vec3(a.z, b.z, c.z)) / sum;
-    if (path > start && path < hit.path) { hit = Hit(path, object, triangle, weights.yz / sum); }
-}
+// A ray in the coordinates of a mesh, as triangles are tested.
+struct MeshRay {
+    vec3 origin;
+    vec3 along;
+    float ahead;  // metres from where it starts to its origin
+    vec3 shear;
+    int axis;
+};
 
-void intersect_object(int object, vec3 origin, vec3 direction, float start, inout Hit hit) {
-    ObjectRow place = traced_body(object);
+MeshRay mesh_ray(ObjectRow place, vec3 origin, vec3 direction) {
     vec3 along = vec3(dot(place.local_x.xyz, direction), dot(place.local_y.xyz, direction), dot(place.local_z.xyz, direction));
     // From the middle of the mesh before anything is multiplied: near a tiny body far from the center little is rounded.
     vec3 offset = origin - vec3(place.local_x.w, place.local_y.w, place.local_z.w);
@@ -99,15 +91,50 @@ void intersect_object(int object, vec3 origin, vec3 direction, float start, inou
         ahead = max(-dot(local, scaled) / (dot(scaled, scaled) * most), 0.0);
         local += ahead * along;
     }
-    LocalRay ray = local_ray(local, along);
-    start -= ahead;
-    Hit own = Hit(hit.path - ahead, -1, -1, vec2(0.0));
     vec3 size = abs(along);
     int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
     vec3 turned = along_last(along, axis);
-    vec3 shear = vec3(turned.xy, 1.0) / turned.z;
+    return MeshRay(local, along, ahead, vec3(turned.xy, 1.0) / turned.z, axis);
+}
+
+// Weights of the corners of a triangle in the point where a ray passes its plane, not yet of sum 1, and the path there.
+vec3 weights_on_plane(int triangle, MeshRay ray, out float path) {
+    vec3 a = along_last(triangle_corner(triangle, 0) - ray.origin, ray.axis);
+    vec3 b = along_last(triangle_corner(triangle, 1) - ray.origin, ray.axis);
+    vec3 c = along_last(triangle_corner(triangle, 2) - ray.origin, ray.axis);
+    a.xy -= ray.shear.xy * a.z;
+    b.xy -= ray.shear.xy * b.z;
+    c.xy -= ray.shear.xy * c.z;
+    // Of an edge both its triangles must find the same weight but for the sign, so no product may stay unrounded in a sum.
+    precise vec3 weights = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
+    path = ray.shear.z * dot(weights, vec3(a.z, b.z, c.z)) / (weights.x + weights.y + weights.z);
+    return weights;
+}
+
+void intersect_triangle(int triangle, int object, MeshRay ray, float start, inout Hit hit) {
+    float path;
+    vec3 weights = weights_on_plane(triangle, ray, path);
+    float sum = weights.x + weights.y + weights.z;
+    if ((any(lessThan(weights, vec3(0.0))) && any(greaterThan(weights, vec3(0.0)))) || sum == 0.0) { return; }
+    if (path > start && path < hit.path) { hit = Hit(path, object, triangle, weights.yz / sum); }
+}
+
+// The hit on a triangle that a ray is known to hit.
+Hit known_hit(int object, int triangle, vec3 origin, vec3 direction) {
+    MeshRay ray = mesh_ray(traced_body(object), origin, direction);
+    float path;
+    vec3 weights = weights_on_plane(triangle, ray, path);
+    return Hit(path + ray.ahead, object, triangle, weights.yz / (weights.x + weights.y + weights.z));
+}
+
+void intersect_object(int object, vec3 origin, vec3 direction, float start, inout Hit hit) {
+    ObjectRow place = traced_body(object);
+    MeshRay turned = mesh_ray(place, origin, direction);
+    LocalRay ray = local_ray(turned.origin, turned.along);
+    start -= turned.ahead;
+    Hit own = Hit(hit.path - turned.ahead, -1, -1, vec2(0.0));
     int count = int(place.node_count.x) << 12 | int(place.node_count.y);
-    int node = (int(place.first_node.x) << 12 | int(place.first_node.y)) + octant_of(along) * count;
+    int node = (int(place.first_node.x) << 12 | int(place.first_node.y)) + octant_of(turned.along) * count;
     int end = node + count;
     while (node < end) {
         // All rays of a group look for their next leaf, and then test triangles together.
@@ -122,10 +149,10 @@ void intersect_object(int object, vec3 origin, vec3 direction, float start, inou
         int triangle = int(held & 0x0fffffffu);
         int last = held == 0u ? triangle - 1 : triangle + int(held >> 28 & 7u);
         for (; triangle <= last; ++triangle) {
-            intersect_triangle(triangle, object, ray.origin, shear, axis, start, own);
+            intersect_triangle(triangle, object, turned, start, own);
         }
     }
-    if (own.object >= 0) { hit = Hit(own.path + ahead, own.object, own.triangle, own.weights); }
+    if (own.object >= 0) { hit = Hit(own.path + turned.ahead, own.object, own.triangle, own.weights); }
 }
 
 // Whether an object stands in an interior list (see interior_list.glsl).

@@ -56,6 +56,17 @@ uvec4 left_interior(uvec4 interior, int object, out bool missing) {
 #endif
 }
 
+// The list of a ray through one body alone, which stands in it some times, as that number.
+uint packed_interior(uvec4 interior) {
+    uint count = 0u;
+    for (int word = 0; word < 4; ++word) { count += (interior[word] & 0xffffu) + (interior[word] >> 16); }
+    return count;
+}
+
+uvec4 unpacked_interior(uint count) {
+    return uvec4(greaterThan(uvec4(count), uvec4(0, 2, 4, 6))) | uvec4(greaterThan(uvec4(count), uvec4(1, 3, 5, 7))) << 16;
+}
+
 int effective_medium(uvec4 interior) {
 #if ONE_OBJECT
     return int(interior.x & 0xffffu) - 1;

@@ -5,7 +5,7 @@ uniform sampler2D known_spread;
 uniform ivec2 tile_origin;
 uniform uint first_path;
 
-#include "transport/path_state.glsl"
+#include "transport/path_textures.glsl"
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy) + tile_origin;

@@ -32,17 +32,6 @@ void take(inout int at, out uint word) { word = rays[at++]; }
 void take(inout int at, out float number) { number = uintBitsToFloat(rays[at++]); }
 void take(inout int at, out vec3 vector) { for (int axis = 0; axis < 3; ++axis) { vector[axis] = uintBitsToFloat(rays[at++]); } }
 
-// The interior list of rays through one body, which stands in it some times: that number.
-uint packed_interior(uvec4 interior) {
-    uint count = 0u;
-    for (int word = 0; word < 4; ++word) { count += (interior[word] & 0xffffu) + (interior[word] >> 16); }
-    return count;
-}
-
-uvec4 unpacked_interior(uint count) {
-    return uvec4(greaterThan(uvec4(count), uvec4(0, 2, 4, 6))) | uvec4(greaterThan(uvec4(count), uvec4(1, 3, 5, 7))) << 16;
-}
-
 void store(int place, Ray ray) {
     for (int axis = 0; axis < 3; ++axis) {
         branch_segments[6 * place + axis] = ray.origin[axis];

@@ -227,7 +227,7 @@ def test_loops_that_a_driver_cuts_short_are_gone_through_again(
 def test_paths_that_are_cut_short_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With a limit on the random numbers of a path that light in milk exceeds."""
     shutil.copytree(assets._folder("shaders"), tmp_path / "shaders")
-    file = tmp_path / "shaders" / "transport" / "path_trace.frag"
+    file = tmp_path / "shaders" / "transport" / "path_step.glsl"
     text = file.read_text()
     file.write_text(text.replace("MOST_DRAWN = 1u << 22", "MOST_DRAWN = 40u"))
     assert file.read_text() != text

@@ -139,3 +139,22 @@ def test_paths_are_counted_in_whole_numbers(paths: Any) -> None:
 def test_seeds_are_whole_numbers(seed: Any) -> None:
     with pytest.raises(tl.InputError, match="PathTraced seed"):
         tl.PathTraced(seed=seed)
+
+
+def test_embree_finds_hits_where_opengl_draws_on_processors_and_nothing_scatters() -> None:
+    software = tl.Capabilities(software=True)
+    clear = plan(scene(body(CLEAR)), METHOD, software)
+    assert clear.hits == "embree"
+    assert "Embree finds" in clear.passes[-1].reason
+    assert plan(scene(body(CLEAR)), METHOD).hits == "gl"
+    assert plan(scene(body(MILK)), METHOD, software).hits == "gl"
+    assert plan(scene(body(MILK)), replace(METHOD, hits="embree"), software).hits == "embree"
+    assert plan(scene(body(CLEAR)), replace(METHOD, hits="gl"), software).hits == "gl"
+    assert clear.passes[-1].cost < plan(scene(body(CLEAR)), METHOD).passes[-1].cost
+
+
+def test_hits_that_are_no_choice_are_refused() -> None:
+    with pytest.raises(tl.InputError, match="PathTraced hits 'optix'; not a known one"):
+        tl.PathTraced(hits="optix")
+    with pytest.raises(tl.InputError, match="no compute shaders"):
+        plan(scene(body(CLEAR)), replace(METHOD, hits="embree"), tl.Capabilities(shader_storage=False))

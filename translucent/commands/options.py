@@ -522,7 +522,7 @@ class ChoiceOptions:
         help="Of --interfaces traced: how often rays go on as the weaker of reflected and refracted light. Default: 2.",
     )
     interface_hits: str | None = option(
-        type=NamesOf("translucent.planning.interfaces", "HITS"),
+        type=NamesOf("translucent.planning.hits", "HITS"),
         help="Of --interfaces traced: what finds the surfaces that light meets, Embree or shaders. Default: Embree "
         "where OpenGL draws on the processors, too.",
     )

@@ -17,14 +17,8 @@ from translucent.planning.bodies import (
     sheets_of,
     solids_of,
 )
-from translucent.planning.interfaces import (
-    EMBREE_COST,
-    HITS,
-    InterfaceMode,
-    chosen_hits,
-    touching_interfaces,
-    with_interfaces,
-)
+from translucent.planning.hits import EMBREE_COST, HITS, chosen_hits
+from translucent.planning.interfaces import InterfaceMode, TracedInterfaces, touching_interfaces, with_interfaces
 from translucent.planning.limits import (
     AMBIENT,
     MAX_SCATTER_LIGHTS,
@@ -88,8 +82,9 @@ def assembled(
     passes = (*beside, *_light_views(scene, method), *own) if method.ordered else (*own, *beside)
     found = _interface_passes(scene, method, interfaces, instead)
     hits, slower = "", ""
-    if found and interfaces.traced:
-        hits, slower = chosen_hits(interfaces, capabilities.software, capabilities.shader_storage)
+    if found and isinstance(interfaces, TracedInterfaces):
+        machine = capabilities.software, capabilities.shader_storage
+        hits, slower = chosen_hits("TracedInterfaces", interfaces.hits, *machine)
         cost = found[1].cost * (EMBREE_COST if hits == "embree" else 1.0)
         found = found[0], replace(found[1], reason=f"{found[1].reason}; {HITS[hits]} finds what they hit", cost=cost)
     unlit = _unlit_passes(scene, spectral) if scatters(scene) and not capabilities.shader_storage else ()

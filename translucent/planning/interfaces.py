@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from translucent.arguments import brief, checked
+from translucent.arguments import checked
 from translucent.errors import InputError
-from translucent.geometry.ray_caster import embree_refusal
 from translucent.planning.bodies import indices, overlapping_pair
+from translucent.planning.hits import check_hits
 from translucent.planning.methods.base import check_count
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.rendered import Treatment, treatment_of
@@ -238,12 +238,6 @@ INTERIOR_SIZE = 8
 #: Largest number of forks: rays multiply with each.
 MAX_FORKS = 4
 
-#: What finds the surfaces that traced rays hit, by its names; and what plans call it.
-HITS = {"embree": "Embree", "gl": "OpenGL"}
-
-#: Time of tracing with Embree, as a fraction of that with shaders.
-EMBREE_COST = 0.5
-
 #: Time of tracing, in depth-only draws of the same geometry, on a software rasterizer: on polished bodies 45 to 185 in
 #: the published report, beside 8,000 to 41,000 triangles at 256 x 256; beside 90,000 at 512 x 512 that is about this.
 TRACE_COST = 50.0
@@ -278,10 +272,7 @@ class TracedInterfaces(InterfaceMode):
     hits: str | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        if self.hits is not None and self.hits not in HITS:
-            raise InputError(
-                f"TracedInterfaces hits {brief(self.hits)}", "not a known one", f"use {' or '.join(map(repr, HITS))}"
-            )
+        check_hits("TracedInterfaces", self.hits)
         check_count("TracedInterfaces depth", self.depth, MAX_DEPTH)
         check_count("TracedInterfaces forks", self.forks, MAX_FORKS, least=0, example=2)
 
@@ -337,34 +328,6 @@ class TracedInterfaces(InterfaceMode):
     @property
     def _count(self) -> str:
         return "1 interface" if self.depth == 1 else f"{self.depth} interfaces"
-
-
-def chosen_hits(mode: InterfaceMode, software: bool, shader_storage: bool) -> tuple[str, str]:
-    """What finds the surfaces that rays hit, as in `HITS`, and why it is not Embree where that would be faster.
-
-    Parameters
-    ----------
-    mode : InterfaceMode
-    software : bool
-        OpenGL draws on the processors.
-    shader_storage : bool
-        It has compute shaders that write to buffers.
-
-    Raises
-    ------
-    InputError
-        If Embree is requested and cannot be used.
-    """
-    requested = mode.hits if isinstance(mode, TracedInterfaces) else "gl"
-    if requested == "gl" or (requested is None and not (software and shader_storage)):
-        return "gl", ""
-    refusal = embree_refusal() if shader_storage else "this OpenGL has no compute shaders, which came with 4.3"
-    if not refusal:
-        return "embree", ""
-    if requested is not None:
-        do = "pip install -U embreex, or leave hits out" if shader_storage else "leave hits out"
-        raise InputError('TracedInterfaces(hits="embree")', refusal, do)
-    return "gl", f"{refusal}: OpenGL finds what rays hit, in about twice the time; pip install -U embreex"
 
 
 #: Names on the command line.

@@ -33,6 +33,7 @@ from translucent.planning.caustics import (
     opaque_to_shadows,
     passes_with_caustics,
 )
+from translucent.planning.hits import EMBREE_COST, HITS, chosen_hits
 from translucent.planning.interfaces import (
     USUAL_DEPTH,
     InterfaceMode,
@@ -140,13 +141,22 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
         scene, spheres = _with_point_lights(scene, straight_scene(scene))
         found = _thickness(straight_scene(scene), RenderRequest(), machine, ambient=False)
         everywhere = {i: Treatment.PATHS for i, item in enumerate(scene.objects) if item.medium is not None}
+        # Where media scatter, flights are short, and shaders look no farther.
+        scattering = any(body.medium is not None and body.medium.scatters for body in scene.bodies)
+        requested = paths.hits or ("gl" if scattering else None)
+        hits, slower = chosen_hits("PathTraced", requested, machine.software, machine.shader_storage)
+        (step,) = paths.passes(scene, "requested")
+        cost = step.cost * (EMBREE_COST if hits == "embree" else 1.0)
+        step = replace(step, reason=f"{step.reason}; {HITS[hits]} finds what they hit", cost=cost)
         found = replace(
             found,
             scene=rendered_scene(scene, Treatments(everywhere)),
-            passes=(*found.passes, *paths.passes(scene, "requested")),
+            passes=(*found.passes, step),
             limits=(*found.limits, *paths.limits(scene)),
             unmodelled=paths.unmodelled(scene),
             paths=paths,
+            hits=hits,
+            remarks=(Note(NoteKind.SLOW_HITS, slower),) if slower else (),
         )
     unmodelled = (*found.unmodelled, *spheres)
     found = replace(found, request=request, unmodelled=unmodelled, remarks=(*found.remarks, *remarks(scene)))

@@ -222,7 +222,11 @@ class InteractiveQuality:
         request = replace(requested, scattering=self._choose_scattering(workspace, scene, plan, renderer.gpu.diffusion))
         plan = renderer.plan_requested(scene, request)
         self._embree = plan.hits == "embree"
-        if self._embree and max(len(item.mesh.faces) for item in scene.objects) > MOST_EMBREE:
+        if (
+            self._embree
+            and plan.interfaces is not None
+            and max(len(item.mesh.faces) for item in scene.objects) > MOST_EMBREE
+        ):
             self._embree = False
             request = replace(request, interfaces=replace(cast(TracedInterfaces, plan.interfaces), hits="gl"))
         if plan.has(PassName.TRACED) and not self.traceable(workspace, scene):
@@ -332,7 +336,7 @@ def _solver() -> FieldCache:
 
 
 #: Method of a path traced picture; how many paths there are is seen as it goes on.
-PATHS = PathTraced(paths=2)
+PATHS = PathTraced(paths=2, hits="gl")
 
 #: Photons of a round, rounds after which they are first shown, and photons after which a picture is done.
 ROUND, FIRST_ROUNDS, MOST_PHOTONS = 1 << 14, 4, 1 << 26

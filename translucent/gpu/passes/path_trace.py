@@ -6,6 +6,7 @@ import time
 from collections.abc import Generator, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import moderngl
@@ -15,10 +16,11 @@ from translucent.errors import RenderError
 from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import interface_shadow_switches
+from translucent.gpu.passes.path_streams import PathStreams
 from translucent.gpu.passes.traced_interfaces import RAY_SAMPLERS, ray_switches, traced_scene
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches
 from translucent.gpu.shaders import set_uniform, set_used
-from translucent.gpu.targets import add_up
+from translucent.gpu.targets import Storage, add_up
 from translucent.planning.passes import PassSpec
 
 _STATE = ("path_origin", "path_direction", "path_light", "path_interior", "path_counts", "path_mean", "path_spread")
@@ -77,6 +79,7 @@ class PathTracer:
         self._begin = Variants(gl, vertex, "transport/path_begin.frag", "known_mean", "known_spread")
         self._trace = Variants(gl, vertex, "transport/path_trace.frag", *_SAMPLERS)
         self._end = Variants(gl, vertex, "transport/path_end.frag", "path_mean", "path_spread")
+        self._streams = PathStreams(gl, {name: self._trace.units[name] for name in _SAMPLERS if name not in _STATE})
         self._picture = Variants(gl, vertex, "transport/path_picture.frag", "path_mean", "straight_transmittance")
         self._unfinished = gl.query(samples=True)
         self._events = 4
@@ -105,13 +108,21 @@ class PathTracer:
         width, height = job.targets.size
         corners = [(x, y) for y in range(0, height, tile) for x in range(0, width, tile)]
         with ExitStack() as stack:
-            states = [self._state(stack, job, tile) for _ in range(2)]
+            by_embree = job.plan.hits == "embree"
+            states = [] if by_embree else [self._state(stack, job, tile) for _ in range(2)]
+            storage = Storage(self._gl, "random paths")
+            stack.callback(storage.release)
             textures, values = traced_scene(job, stack)
             assert job.plan.paths is not None
             values |= {"seed": job.plan.paths.seed, "spread": spread}
             for number, corner in enumerate(corners):
                 size = min(tile, width - corner[0]), min(tile, height - corner[1])
-                for part in self._tile(job, states, (textures, values), corner, size, last, seconds):
+                if by_embree:
+                    bind = partial(self._bind, job, textures)
+                    parts = self._streams.follow(job, storage, bind, _switches(job), values, corner, size, last)
+                else:
+                    parts = self._tile(job, states, (textures, values), corner, size, last, seconds)
+                for part in parts:
                     yield Progress((number + part) / len(corners), False)
             job.paths_traced = last
         yield Progress(1.0, True)
@@ -144,13 +155,14 @@ class PathTracer:
         begun = job.paths_traced
         self._start(job, states[1], corner, size)
         looked, fraction, number = time.perf_counter(), 0.0, 0
-        program = self._program(job)
+        program = self._trace.program(**_switches(job), GIVEN_HITS=False)
         while True:
             number += 1
             clock = time.perf_counter()
             into, source = states[(number + 1) % 2], states[number % 2]
             values = {"tile_origin": corner, "last_path": last, "events": self._events, "pass_number": float(number)}
-            self._bind(job, scene[0], source)
+            self._bind(job, scene[0])
+            self._trace.bind(**dict(zip(_STATE, source.color_attachments, strict=True)))
             set_used(program, {**scene[1], **values})
             self._aim(into, size)
             with self._unfinished:
@@ -219,29 +231,9 @@ class PathTracer:
             texture.filter = moderngl.NEAREST, moderngl.NEAREST
         return framebuffer
 
-    def _program(self, job: FrameJob) -> moderngl.Program:
-        scene, environment = job.scene, job.scene.environment
-        media = [body.medium for body in scene.bodies if body.medium is not None]
-        return self._trace.program(
-            FROM_EYE=job.placed.starts_inside,
-            **ray_switches(scene),
-            TEXTURED=job.features.textured,
-            SCATTER=any(medium.scatters for medium in media),
-            EMISSION=any(medium.emits for medium in media),
-            LIGHTS=bool(scene.lights),
-            ROUGH=any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies),
-            DISPERSION=False,
-            OPAQUE=job.features.has_opaque,
-            **interface_shadow_switches(job),
-            DIMMED=job.features.dims_interfaces,
-            **background_switches(environment),
-            **coat_switches(scene.objects),
-        )
-
-    def _bind(self, job: FrameJob, traced: dict[str, moderngl.Texture], source: moderngl.Framebuffer) -> None:
+    def _bind(self, job: FrameJob, traced: dict[str, moderngl.Texture]) -> None:
         environment, resources = job.scene.environment, job.resources
         textures = {
-            **dict(zip(_STATE, source.color_attachments, strict=True)),
             **traced,
             **resources.light_textures(environment),
             **resources.background_textures(environment),
@@ -250,6 +242,27 @@ class PathTracer:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets["opaque"].color_attachments
         self._trace.bind(**textures)
         resources.shadows.use(self._trace.units)
+
+
+def _switches(job: FrameJob) -> dict[str, bool | int]:
+    """Switches of ``shaders/transport/path_step.glsl``."""
+    scene, environment = job.scene, job.scene.environment
+    media = [body.medium for body in scene.bodies if body.medium is not None]
+    return {
+        "FROM_EYE": job.placed.starts_inside,
+        **ray_switches(scene),
+        "TEXTURED": job.features.textured,
+        "SCATTER": any(medium.scatters for medium in media),
+        "EMISSION": any(medium.emits for medium in media),
+        "LIGHTS": bool(scene.lights),
+        "ROUGH": any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies),
+        "DISPERSION": False,
+        "OPAQUE": job.features.has_opaque,
+        **interface_shadow_switches(job),
+        "DIMMED": job.features.dims_interfaces,
+        **background_switches(environment),
+        **coat_switches(scene.objects),
+    }
 
 
 class PathTracePass:

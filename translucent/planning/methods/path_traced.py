@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import indices, open_bodies
+from translucent.planning.hits import check_hits
 from translucent.planning.methods.base import Method, check_count
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.scene.scene import Object, Scene, object_names
@@ -35,6 +36,9 @@ class PathTraced(Method):
         Of each pixel, from 2 to 2^20.
     seed : int
         Of the random numbers, 0 to 2^32 - 1.
+    hits : {"embree", "gl"}, optional
+        What finds the surfaces that paths hit: Embree on the processors, or shaders. None lets the planner pick: Embree
+        where OpenGL draws on the processors, too, and no medium scatters, else shaders. The picture is the same.
 
     Raises
     ------
@@ -48,8 +52,10 @@ class PathTraced(Method):
 
     paths: int = 64
     seed: int = 0
+    hits: str | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
+        check_hits("PathTraced", self.hits)
         check_count("PathTraced paths", self.paths, MAX_PATHS, least=2, example=64)
         if not isinstance(self.seed, int) or isinstance(self.seed, bool) or not 0 <= self.seed < 1 << 32:
             raise InputError(
