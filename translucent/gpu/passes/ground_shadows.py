@@ -59,7 +59,8 @@ class GroundShadowsPass:
         """
         scene, views = job.scene, job.resources.shadows.views
         assert views is not None
-        center, (middle, axes) = media_center(scene), _frame(scene, ground)
+        center, bounds = media_center(scene), _bounds(scene, ground)
+        middle, axes = _frame(bounds, ground)
         cosines = {i: -float(ground.normal @ views.sky[i].camera.forward) for i in directions}
         lit = [i for i, cosine in cosines.items() if cosine > 0.0]
         side = min(job.plan.shadows.size // 2, MOST_TEXELS)
@@ -74,15 +75,19 @@ class GroundShadowsPass:
                 "ground_x": axes[0],
                 "ground_y": axes[1],
                 "ground_normal": ground.normal,
+                "box_low": bounds[0] - center,
+                "box_high": bounds[1] - center,
                 "all_light": np.array([cosines[i] for i in lit]) @ irradiance[lit],
             }
             set_used(program, {name: tuple(value.tolist()) for name, value in values.items()})
             set_uniform(program, "ground_texels", side)
             target.clear()
             add_up(self._gl)
+            radii = _cell_radii(np.array([view.camera.forward for view in views.sky]))
             for i in lit:
-                set_uniform(program, "number", i)
-                self._variants.draw_part(_footprint(views.sky[i].camera, ground, middle, axes, side), program, target)
+                set_used(program, {"number": i, "cell_radius": radii[i]})
+                part = _footprint(views.sky[i].camera, radii[i], ground, bounds, axes, side)
+                self._variants.draw_part(part, program, target)
             self._made_of = key
         rows = [(*row, float(row @ (center - middle))) for row in axes / np.square(axes).sum(axis=1, keepdims=True)]
         return GroundShadows(scene.objects.index(ground.ground), target.color_attachments[0], tuple(rows))
@@ -100,10 +105,23 @@ class GroundShadowsPass:
         return self._target
 
 
-def _frame(scene: Scene, ground: Mirror) -> tuple[Array, Array]:
-    """Middle (3,) of the map on the ground, and two vectors (2, 3) along it, as long as where squeezing begins."""
+def _bounds(scene: Scene, ground: Mirror) -> Array:
+    """(2, 3): bounds of all objects but the ground."""
     boxes = np.stack([item.bounds for item in scene.objects if item is not ground.ground])
-    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+
+def _cell_radii(directions: Array) -> Array:
+    """(n,): radii of discs as large as the cells of unit vectors (n, 3), in radians, as of a hexagonal grid."""
+    cosines = directions @ directions.T
+    np.fill_diagonal(cosines, -1.0)
+    apart = np.arccos(np.clip(cosines.max(axis=1), -1.0, 1.0))
+    return np.asarray(np.minimum(np.sqrt(np.sqrt(0.75) / np.pi) * apart, 0.5))
+
+
+def _frame(bounds: Array, ground: Mirror) -> tuple[Array, Array]:
+    """Middle (3,) of the map on the ground, and two vectors (2, 3) along it, as long as where squeezing begins."""
+    low, high = bounds
     middle, size = 0.5 * (low + high), REACH * 0.5 * float(np.linalg.norm(high - low)) or 1.0
     first = np.cross(ground.normal, np.eye(3)[int(np.abs(ground.normal).argmin())])
     first /= np.linalg.norm(first)
@@ -111,13 +129,18 @@ def _frame(scene: Scene, ground: Mirror) -> tuple[Array, Array]:
     return middle + (ground.height - middle @ ground.normal) * ground.normal, axes
 
 
-def _footprint(camera: Camera, ground: Mirror, middle: Array, axes: Array, side: int) -> Part:
-    """Texels of a map on which what a direction's camera sees has its shadow."""
+def _footprint(camera: Camera, radius: float, ground: Mirror, bounds: Array, axes: Array, side: int) -> Part:
+    """Texels of a map on which what a direction's camera sees has its shadow, with cells of that radius."""
+    middle, _ = _frame(bounds, ground)
     half_width, half_height = camera.half_extent((1, 1))
-    corners = np.array([(x, y) for x in (-1, 1) for y in (-1, 1)])
-    points = camera.eye + corners @ np.stack([half_width * camera.right, half_height * camera.up])
-    ahead = (ground.height - points @ ground.normal) / (camera.forward @ ground.normal)
-    points = points + ahead[:, None] * camera.forward
+    ends = np.stack([half_width * camera.right, half_height * camera.up])
+    for _ in range(2):  # the second time with what shadows are blurred by where they are longest
+        points = camera.eye + np.array([(x, y) for x in (-1, 1) for y in (-1, 1)]) @ ends
+        ahead = (ground.height - points @ ground.normal) / (camera.forward @ ground.normal)
+        points = points + ahead[:, None] * camera.forward
+        longest = float(((points - bounds.mean(axis=0)) @ camera.forward).max())
+        blur = radius * max(longest, 0.0)
+        ends = np.stack([(half_width + blur) * camera.right, (half_height + blur) * camera.up])
     at = (points - middle) @ axes.T / np.square(axes).sum(axis=1)
     size = np.abs(at)
     place = np.where(size > 1.0, np.sign(at) * (1.0 - 0.5 / np.maximum(size, 1.0)), 0.5 * at)
