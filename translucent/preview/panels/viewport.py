@@ -222,10 +222,11 @@ def _ruler(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
     _drawn_lines(over, camera, corner, room, np.stack([marks_on[[0, -1]], *np.stack([marks_on, inner], axis=1)]))
     places = places_on_screen(camera, marks_on, (room.x, room.y))
     if places is not None:
-        at = ImVec2(corner.x + places[-1, 0] + em(0.4), corner.y + places[-1, 1])
-        _label(over, at, f"{short_length(step * count)}, {short_length(step)} apart")
+        text = f"{short_length(step * count)}, {short_length(step)} apart"
+        right = corner.x + places[-1, 0] - imgui.calc_text_size(text).x
+        _label(over, ImVec2(right, corner.y + places[-1, 1] + em(0.5)), text)
     name, outline = reference_outline(wide)
-    around = outline + (high[0] + 0.1 * wide - outline[:, 0].min(), y, 0.5 * (low[2] + high[2]))
+    around = outline + (low[0] - outline[:, 0].min(), y, z + 0.1 * wide - outline[:, 2].min())
     _drawn_lines(over, camera, corner, room, np.stack([around, np.roll(around, -1, axis=0)], axis=1))
     places = places_on_screen(camera, around, (room.x, room.y))
     if places is not None:
