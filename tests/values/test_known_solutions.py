@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pytest
 from scipy import sparse
 
 import translucent as tl
+from translucent.diffusion import field
 from translucent.diffusion.field import DiffusingBody
+from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import body_grid
 from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import MOST, TOLERANCE, BodySystem, KnownSolutions
@@ -48,6 +53,32 @@ def test_solutions_depend_on_earlier_ones_only_with_warm_starts() -> None:
             same = [np.array_equal(a, b) for a, b in zip(before.volumes, after.volumes, strict=True)]
             assert all(same) is not warm
             assert (after.steps < 0.5 * before.steps) is warm
+
+
+def test_light_that_stays_arrives_as_it_did(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shadows of a light are found once, whatever happens to other lights and the sky, and again if it moves."""
+    found: list[object] = []
+    original = field.from_light
+
+    def counted(*given: Any) -> EnteringRays:
+        found.append(given[2])
+        return original(*given)
+
+    monkeypatch.setattr(field, "from_light", counted)
+    body = tl.Object(Sphere().tessellate(24), MILK)
+    diffusing = DiffusingBody(lit_body(body, None, 0.25), MILK, 0.0)
+    camera, white = tl.Camera.look_at((0, 0, 5), (0, 0, 0)), tl.Environment.constant((1, 1, 1))
+    black = tl.Environment.constant((0, 0, 0))
+    stays, first, moved = (tl.PointLight((x, 0, 1), 1.0) for x in (3, -3, -2))
+    scenes = [([stays, first], white), ([stays, first], black), ([stays, moved], black), ([stays, moved], white)]
+    for lights, around in scenes:
+        alone = DiffusingBody(lit_body(body, None, 0.25), MILK, 0.0)
+        scene = tl.Scene([body], camera, lights, around)
+        kept = diffusing.field(scene, 0)
+        asked = len(found)
+        assert np.array_equal(alone.field(scene, 0).fluence, kept.fluence)
+        del found[asked:]
+    assert found == [stays, first, moved]
 
 
 def test_many_lights_are_no_worse_than_none_before() -> None:
