@@ -1,8 +1,9 @@
 // The environment along rays that have left a body. Positions count from the center of the media. Needs <View>, <Surfaces>,
-// background.glsl and environment_light.glsl.
+// background.glsl and environment_light.glsl. CHECKERBOARD: the background is one.
 
 #include "shade/in_picture.glsl"
 
+#if CHECKERBOARD
 // The squares of a checkerboard, averaged over a box of this width in squares.
 float blurred_checkerboard_fraction(vec2 at, float tiles, float width) {
     vec2 cell = at * tiles;
@@ -11,13 +12,13 @@ float blurred_checkerboard_fraction(vec2 at, float tiles, float width) {
     vec2 wave = side * clamp(2.0 * to_edge / max(width, 1e-6), 0.0, 1.0) * clamp(2.0 - width, 0.0, 1.0);
     return 0.5 - 0.5 * wave.x * wave.y;
 }
+#endif
 
 // The environment along a ray that has left a body. A checkerboard stands behind the bodies as a wall across the view.
 vec3 environment_beyond(vec3 point, vec3 direction, float roughness) {
 #if SEEN_LIGHTS
     return environment_light(direction, roughness);
-#else
-    if (seen_kind != ENVIRONMENT_CHECKERBOARD) { return background_radiance(vec2(0.0), direction); }
+#elif CHECKERBOARD
     float towards = metres_ahead_of(direction);
     if (towards < 1e-2) { return seen_scale * mix(seen_first.rgb, seen_second.rgb, 0.5); }
     float path = max(surface_ahead.w - metres_ahead_of(point), 0.0) / towards;
@@ -26,6 +27,8 @@ vec3 environment_beyond(vec3 point, vec3 direction, float roughness) {
     float heights = roughness * roughness * path / (whole * length(surface_up.xyz) * (surface_right.w == 1.0 ? surface_ahead.w + surface_ahead.z : 1.0));
     float fraction = blurred_checkerboard_fraction(in_heights(wall.xy), seen_tiles, heights * seen_tiles);
     return seen_scale * mix(seen_first.rgb, seen_second.rgb, fraction);
+#else
+    return background_radiance(vec2(0.0), direction);
 #endif
 }
 

@@ -2,6 +2,15 @@
 // shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl, opaque_objects.glsl, textured_hit.glsl
 // and footprint.glsl.
 
+// The environment in a polished mirror: as it is defined, where it is no picture.
+vec3 polished_environment(vec3 direction) {
+#if FOOTPRINTS
+    return mirrored_environment(direction);
+#else
+    return mix(light_first.rgb, light_second.rgb, light_kind == ENVIRONMENT_GRADIENT ? gradient_share(direction) : 0.5);
+#endif
+}
+
 vec3 environment_radiance(vec3 point, vec3 direction, bool reflected, float blur) {
 #if MICROFACETS
     float roughness = sqrt(sqrt(min(blur, 1.0)));
@@ -9,7 +18,7 @@ vec3 environment_radiance(vec3 point, vec3 direction, bool reflected, float blur
 #elif SEEN_LIGHTS
     return mirrored_environment(direction);
 #else
-    return reflected ? mirrored_environment(direction) : environment_beyond(point, direction, 0.0);
+    return reflected ? polished_environment(direction) : environment_beyond(point, direction, 0.0);
 #endif
 }
 

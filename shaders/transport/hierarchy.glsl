@@ -136,21 +136,26 @@ void intersect_object(int object, vec3 origin, vec3 direction, float start, inou
     int count = int(place.node_count.x) << 12 | int(place.node_count.y);
     int node = (int(place.first_node.x) << 12 | int(place.first_node.y)) + octant_of(turned.along) * count;
     int end = node + count;
+    // Loops are left at the end of their bodies, too: before they find that all rays of a group are through, software rasterizers
+    // run a body to its end. (Not by `do` alone: of rays that are through before others Mesa then forgets what they have found.)
     while (node < end) {
         // All rays of a group look for their next leaf, and then test triangles together.
         uint held = 0u;
-        while (node < end && held == 0u) {
+        while (node < end) {
             uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
             bool entered = hits_bounds(found, ray, start, own.path);
             bool leaf = found.w >= 0x80000000u;
             held = leaf && entered ? found.w : 0u;
             node = leaf || entered ? node + 1 : int(found.w);
+            if (held != 0u || node >= end) { break; }
         }
         int triangle = int(held & 0x0fffffffu);
         int last = held == 0u ? triangle - 1 : triangle + int(held >> 28 & 7u);
-        for (; triangle <= last; ++triangle) {
+        while (triangle <= last) {
             intersect_triangle(triangle, object, turned, start, own);
+            if (++triangle > last) { break; }
         }
+        if (node >= end) { break; }
     }
     if (own.object >= 0) { hit = Hit(own.path + turned.ahead, own.object, own.triangle, own.weights); }
 }
@@ -172,15 +177,18 @@ Hit nearest_hit(vec3 origin, vec3 direction, float start, float end, uvec4 left_
     int node = octant_of(direction) * object_nodes;
     int last = node + object_nodes;
     while (node < last) {
-        uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
-        bool leaf = found.w >= 0x80000000u;
-        if (!hits_bounds(found, ray, start, hit.path)) {
-            node = leaf ? node + 1 : int(found.w);
-            continue;
+        int object = -1;
+        while (node < last) {
+            uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
+            bool entered = hits_bounds(found, ray, start, hit.path);
+            bool leaf = found.w >= 0x80000000u;
+            int number = int(found.w & 0x0fffffffu);
+            object = leaf && entered && !is_listed(left_out, number) ? number : -1;
+            node = leaf || entered ? node + 1 : int(found.w);
+            if (object >= 0 || node >= last) { break; }
         }
-        int object = int(found.w & 0x0fffffffu);
-        if (leaf && !is_listed(left_out, object)) { intersect_object(object, origin, direction, start, hit); }
-        ++node;
+        if (object >= 0) { intersect_object(object, origin, direction, start, hit); }
+        if (node >= last) { break; }
     }
 #endif
     return hit;

@@ -109,7 +109,7 @@ void escape(Ray ray, EscapedRay end) {
 
 // Adds the light at the ends of rays.
 void add_ends() {
-    for (; ends > 0; --ends) {
+    while (ends > 0) {
         EscapedRay end = first_end;
         vec3 throughput = first_throughput;
         if (ends == 2) {
@@ -117,6 +117,7 @@ void add_ends() {
             throughput = second_throughput;
         }
         traced_radiance += throughput * escaped_radiance(end);
+        if (--ends == 0) { break; }
     }
 }
 

@@ -47,7 +47,7 @@ void trace(Ray ray, PrimaryHit primary, float reach, int channel) {
     traced_lost = 0.0;
     Ray stack[MOST_STACKED], weaker;
     int stacked = 0, goes_on = ONE;
-    for (int segment = 0; goes_on != NONE && segment < MOST_SEGMENTS; ++segment) {
+    for (int segment = 0; segment < MOST_SEGMENTS; ++segment) {
         goes_on = follow(ray, weaker, first_hit(ray.origin, ray.direction, 0.0, reach), primary, channel, EITHER);
         reach = NOTHING;  // the rasterizer sees some edges a little elsewhere
         if (goes_on == BOTH) {
@@ -56,6 +56,7 @@ void trace(Ray ray, PrimaryHit primary, float reach, int channel) {
             ray = stack[--stacked];
             goes_on = ONE;
         }
+        if (goes_on == NONE) { break; }
     }
     // Not all has been followed, here or where a driver cuts long loops short: Mesa does after 65,535 iterations.
     if (goes_on != NONE) { traced_lost = 1.0; }

@@ -181,9 +181,13 @@ def look_switches(body: Object) -> dict[str, bool]:
 
 
 def background_switches(environment: Environment) -> dict[str, int]:
-    """Switches of shaders in which rays end at the environment: whether it is a picture, and the one that lights."""
+    """Switches of shaders in which rays end at the environment: what it is, and whether the background lights."""
     picture, lights = environment.seen.kind == "image", environment.seen is environment
-    return {"SEEN_MAP": picture + (picture and lights), "SEEN_LIGHTS": picture and lights}
+    return {
+        "SEEN_MAP": picture + (picture and lights),
+        "SEEN_LIGHTS": picture and lights,
+        "CHECKERBOARD": environment.seen.kind == "checkerboard",
+    }
 
 
 def coat_switches(objects: Iterable[Object]) -> dict[str, bool]:
