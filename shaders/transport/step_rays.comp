@@ -16,22 +16,23 @@ layout(local_size_x = COMPUTE_GROUP) in;
 layout(std430, binding = LIVE_RAYS_BINDING) readonly buffer LiveRays { int live_rays[]; };   // rows: number, place, pixel; path, object, triangle, weights of the hit
 layout(std430, binding = RAY_LIGHT_BINDING) writeonly buffer RayLight { vec4 ray_light[]; };  // and fraction that is lost
 
-uniform int first_number, live_count, live_room;
+uniform int first_number, live_count;
+uniform int live_rows;     // their length
 
 void main() {
     int at = first_number + int(gl_GlobalInvocationID.x);
     if (at >= live_count) { return; }
     read_bodies();
     int number = live_rays[at];
-    Ray ray = stored_ray(live_rays[live_room + at]);
-    uint word = uint(live_rays[2 * live_room + at]);
+    Ray ray = stored_ray(live_rays[live_rows + at]);
+    uint word = uint(live_rays[2 * live_rows + at]);
     int channel = channel_of(word);
 #if MISSES
     Hit hit = Hit(NOTHING, -1, -1, vec2(0.0));
     const int known = LEAVES;
 #else
-    Hit hit = Hit(intBitsToFloat(live_rays[3 * live_room + at]), live_rays[4 * live_room + at], live_rays[5 * live_room + at],
-        intBitsToFloat(ivec2(live_rays[6 * live_room + at], live_rays[7 * live_room + at])));
+    Hit hit = Hit(intBitsToFloat(live_rays[3 * live_rows + at]), live_rays[4 * live_rows + at], live_rays[5 * live_rows + at],
+        intBitsToFloat(ivec2(live_rays[6 * live_rows + at], live_rays[7 * live_rows + at])));
     const int known = HITS;
 #endif
     PrimaryHit primary = PrimaryHit(AIR, vec3(0.0), vec3(0.0), 0.0, 0.0, vec3(0.0), 0.0, uvec2(0u));

@@ -29,8 +29,9 @@ MOST_BYTES = 64 << 20
 #: alive at once, in bodies with many walls three.
 PLACES, MORE_PLACES = 3, 8
 
-#: Bytes of what a ray hits, of its light, and of the list of pixels.
-_LIVE_BYTES = 32 + 16 + 8
+#: Rows of the lists of live rays and what they hit; bytes of these, of light, and of the list of pixels, for each ray.
+_ROWS = 8
+_LIVE_BYTES = 4 * _ROWS + 16 + 8
 
 #: What the pixel of a place without a ray is; and the bits of the others that are not the channel.
 _NO_RAY, _PIXEL = np.uint32(0xFFFFFFFF), np.uint32(0x3FFFFFFF)
@@ -90,7 +91,7 @@ class RayGenerations:
         hierarchies = job.resources.hierarchies.of(job.scene, textured=job.features.textured)
         room = _Room(job, part, switches, hierarchies.first_triangles)
         for program in programs:
-            set_used(program, {**values, "ray_words": room.words, "live_room": room.live + 1, "columns": width})
+            set_used(program, {**values, "ray_words": room.words, "columns": width})
         if job.bending:
             job.targets[mask].color_attachments[0].use(self._unsettled)
         hits = job.resources.ray_hits.of(job.scene, media_center(job.scene))
@@ -125,8 +126,8 @@ class RayGenerations:
                 return False
             found, pixels = room.put(live, hits.nearest(live.origins, live.directions))
             filled = 2 * found
-            set_used(step, {"live_count": found})
-            set_used(leave, {"first_number": found, "live_count": count})
+            set_used(step, {"live_count": found, "live_rows": count})
+            set_used(leave, {"first_number": found, "live_count": count, "live_rows": count})
             set_used(sum_up, {"pixel_count": pixels})
             room.bind()
             self._step.run(step, found)
@@ -171,7 +172,8 @@ class _Room:
             for side in range(2)
         )
         self._live, self._light, self._sums = (
-            storage.get(name, size * (self.live + 1)) for name, size in (("live", 32), ("light", 16), ("sums", 8))
+            storage.get(name, size * (self.live + 1))
+            for name, size in (("live", 4 * _ROWS), ("light", 16), ("sums", 8))
         )
         self._first_triangles = first_triangles
 
@@ -220,21 +222,12 @@ class _Room:
         """
         found, missed = np.flatnonzero(hits.object >= 0), np.flatnonzero(hits.object < 0)
         order = np.concatenate([found, missed])
-        objects = hits.object.take(found)
-        triangles = hits.triangle.take(found) + self._first_triangles.take(objects)
-        weights = (part.take(found) for part in hits.weights)
-        places = live.places.take(order).astype(np.int32)
-        rows = (
-            order.astype(np.int32),
-            places,
-            live.pixels.take(order),
-            hits.path.take(found),
-            objects,
-            triangles,
-            *weights,
-        )
-        for number, row in enumerate(rows):
-            self._live.write(row, offset=4 * (self.live + 1) * number)
+        rows, hit = np.empty((_ROWS, len(order)), np.int32), len(found)
+        rows[0], rows[1], rows[2] = order, live.places.take(order), live.pixels.take(order).view(np.int32)
+        rows[3, :hit], rows[4, :hit] = hits.path.take(found).view(np.int32), hits.object.take(found)
+        rows[5, :hit] = hits.triangle.take(found) + self._first_triangles.take(rows[4, :hit])
+        rows[6:, :hit] = hits.weights.take(found, axis=1).view(np.int32)
+        self._live.write(rows)
         pixels = live.pixels & _PIXEL
         first = np.concatenate([[0], np.flatnonzero(pixels[1:] != pixels[:-1]) + 1, [len(pixels)]])
         self._sums.write(np.stack([first, pixels.take(first, mode="clip")], axis=1).astype(np.uint32))

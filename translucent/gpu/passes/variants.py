@@ -152,6 +152,8 @@ class ComputeVariants:
 
     def run(self, program: moderngl.ComputeShader, count: int) -> None:
         """Run one of the shaders for so many invocations, which see the results of all runs before."""
+        if not count:
+            return
         program.run(-(-count // COMPUTE_GROUP))
         self._gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
 
