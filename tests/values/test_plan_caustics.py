@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+import numpy as np
 import pytest
 
 import translucent as tl
@@ -39,6 +40,22 @@ def test_photons_land_on_the_picture_of_what_is_opaque() -> None:
     assert len(notes) == 2
     milk = plan(scene(body(tl.Medium(1.0, 50.0, ior=1.4)), body(None, 3.0)), caustics=FEW)
     assert "caustics in media that scatter: 'box'" in str(milk)
+
+
+def test_photons_that_read_no_textures_are_told() -> None:
+    """Those into media, and those of a renderer without OpenGL; what lands on a picture of OpenGL knows textures."""
+    mesh = body().mesh
+    unwrapped = tl.Mesh(mesh.vertices, mesh.faces, uv=mesh.vertices[:, :2])
+    painted = tl.Object(unwrapped, CLEAR, surface=tl.Surface(color_texture=tl.Texture(np.full((1, 1, 3), 0.5))))
+    fog = tl.Object(Box((-9, -9, -9), (9, 9, 9)).tessellate(), tl.Medium(scattering=0.1))
+    for objects, machine, told in (
+        ([painted, body(None, 3.0)], Capabilities(), False),
+        ([painted, body(None, 3.0)], Capabilities(shader_storage=False, opengl=False, scattering=False), True),
+        ([painted, fog], Capabilities(), True),
+        ([body(), fog], Capabilities(), False),
+    ):
+        notes = plan(scene(*objects), capabilities=machine, caustics=FEW).unmodelled
+        assert any("textures of interfaces" in str(note) for note in notes) == told
 
 
 def test_photons_light_fog() -> None:

@@ -17,6 +17,7 @@ from translucent.planning.bodies import count_of, indices
 from translucent.planning.methods import Method
 from translucent.planning.methods.base import check_count
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
+from translucent.planning.surface_textures import varies_at_hits
 from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Object, Scene, object_names
 
@@ -224,6 +225,9 @@ def caustics_left_out(scene: Scene, lit: tuple[int, ...], fogs: tuple[int, ...],
         texts.append("photons that media scatter")
     if aside := tuple(i for i in fogs if i in uneven):
         texts.append(f"directions in which {_names(scene, aside)} scatters caustics: alike in all")
+    textured = indices(scene, lambda body: body.has_interface and varies_at_hits(body))
+    if textured and (fogs or not opengl):
+        texts.append(f"textures of interfaces, where the CPU follows photons: {_names(scene, textured)}")
     return tuple(Note(NoteKind.CAUSTICS, text) for text in texts)
 
 
