@@ -19,6 +19,7 @@ uniform vec3 all_light;     // irradiance of all directions where nothing shadow
 uniform float ground_texels; // along a side
 uniform vec3 box_low;        // bounds of all that throws shadows, from the center of the media
 uniform vec3 box_high;
+uniform int order;           // number among those that are drawn
 uniform float cell_radius;   // of the cell of the direction, in radians
 
 const int TAPS = 6;
@@ -36,7 +37,7 @@ vec3 cell_through(ShadowView view, vec3 point) {
     float radius = cell_radius * metres_to_box(point, -view.ahead.xyz);
     vec3 sum = vec3(0.0);
     for (int i = 0; i < TAPS; ++i) {
-        float angle = GOLDEN_ANGLE * float(i + TAPS * number);
+        float angle = GOLDEN_ANGLE * float(i + TAPS * order);
         vec2 aside = radius * sqrt((float(i) + 0.5) / float(TAPS)) * vec2(cos(angle), sin(angle));
         sum += light_through(view, point, ground_normal, true, aside, 0.5);
     }

@@ -61,7 +61,8 @@ class GroundShadowsPass:
         assert views is not None
         center, bounds = media_center(scene), _bounds(scene, ground)
         middle, axes = _frame(bounds, ground)
-        cosines = {i: -float(ground.normal @ views.sky[i].camera.forward) for i in directions}
+        ahead = {i: views.sky[i].camera.forward for i in directions}
+        cosines = {i: -float(ground.normal @ forward) for i, forward in ahead.items()}
         lit = [i for i, cosine in cosines.items() if cosine > 0.0]
         side = min(job.plan.shadows.size // 2, MOST_TEXELS)
         target = self._sized(side)
@@ -83,9 +84,9 @@ class GroundShadowsPass:
             set_uniform(program, "ground_texels", side)
             target.clear()
             add_up(self._gl)
-            radii = _cell_radii(np.array([view.camera.forward for view in views.sky]))
-            for i in lit:
-                set_used(program, {"number": i, "cell_radius": radii[i]})
+            radii = dict(zip(ahead, _cell_radii(np.array(list(ahead.values()))).tolist(), strict=True))
+            for order, i in enumerate(lit):
+                set_used(program, {"number": i, "order": order, "cell_radius": radii[i]})
                 part = _footprint(views.sky[i].camera, radii[i], ground, bounds, axes, side)
                 self._variants.draw_part(part, program, target)
             self._made_of = key
