@@ -226,7 +226,7 @@ def _ruler(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
         right = corner.x + places[-1, 0] - imgui.calc_text_size(text).x
         _label(over, ImVec2(right, corner.y + places[-1, 1] + em(0.5)), text)
     name, outline = reference_outline(wide)
-    around = outline + (low[0] - outline[:, 0].min(), y, z + 0.1 * wide - outline[:, 2].min())
+    around = outline + (low[0] + 0.35 * wide, y, z + 0.1 * wide - outline[:, 2].min())
     _drawn_lines(over, camera, corner, room, np.stack([around, np.roll(around, -1, axis=0)], axis=1))
     places = places_on_screen(camera, around, (room.x, room.y))
     if places is not None:
