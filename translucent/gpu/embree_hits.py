@@ -54,7 +54,7 @@ def has_mesh_scene(mesh: Mesh) -> bool:
     return mesh in _scenes or len(mesh.faces) < OWN_SCENE
 
 
-class Hits(NamedTuple):
+class RayHits(NamedTuple):
     """Nearest surfaces on rays.
 
     Attributes
@@ -76,7 +76,7 @@ class Hits(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _EmbreePart:
     """Embree scene of some objects, whose geometries they are, in coordinates of its own from -1 to 1 or about that.
 
     These are `scale` times `linear` (3, 3), where that is not None, times what rays are off `middle` (3,).
@@ -88,7 +88,7 @@ class _Part:
     linear: Floats | None
     middle: Floats
 
-    def nearest(self, origins: Floats, directions: Floats, reach: Floats | None) -> Hits:
+    def nearest(self, origins: Floats, directions: Floats, reach: Floats | None) -> RayHits:
         """Nearest surfaces, of those within some metres where `reach` is given."""
         with np.errstate(under="ignore", over="ignore", invalid="ignore"):
             # From the middle before anything is multiplied: near a tiny body far from the center little is rounded.
@@ -107,7 +107,7 @@ class _Part:
             path = (found["tfar"] + ahead) / self.scale
         path[missed] = _NOTHING
         objects = np.where(missed, np.int32(-1), self.objects.take(found["geomID"], mode="clip"))
-        return Hits(path, objects, found["primID"], np.stack([found["u"], found["v"]]))
+        return RayHits(path, objects, found["primID"], np.stack([found["u"], found["v"]]))
 
     def _turned(self, vectors: Floats) -> Floats:
         """Vectors (n, 3) in the axes of the part. Threads of BLAS would wait for more in a busy loop."""
@@ -143,16 +143,16 @@ class EmbreeHits:
         # Two are most often one core, where two threads together take no less time, and more of it on both.
         self._threads = max(processors // 2, 1)
 
-    def nearest(self, origins: Floats, directions: Floats) -> Hits:
+    def nearest(self, origins: Floats, directions: Floats) -> RayHits:
         """Nearest surfaces on rays from origins (n, 3) along directions (n, 3)."""
         rows = _chunks(len(origins), self._threads)
         if len(rows) == 1:
             return self._nearest(origins, directions)
         with ThreadPoolExecutor(len(rows)) as pool:
             found = list(pool.map(lambda own: self._nearest(origins[own], directions[own]), rows))
-        return Hits(*(np.concatenate(parts, axis=-1) for parts in zip(*found, strict=True)))
+        return RayHits(*(np.concatenate(parts, axis=-1) for parts in zip(*found, strict=True)))
 
-    def _nearest(self, origins: Floats, directions: Floats) -> Hits:
+    def _nearest(self, origins: Floats, directions: Floats) -> RayHits:
         hits = self._parts[0].nearest(origins, directions, None)
         for part in self._parts[1:]:
             found = part.nearest(origins, directions, hits.path)
@@ -194,7 +194,7 @@ def _geometry(mesh: Mesh, center: Array, linear: Array, moved: Array) -> tuple[F
     return vertices, mesh.faces[packed_mesh(mesh).faces]
 
 
-def _own_part(scene: Scene, number: int, center: Array) -> _Part:
+def _own_part(scene: Scene, number: int, center: Array) -> _EmbreePart:
     body = scene.objects[number]
     packed, linear = packed_mesh(body.mesh), body.matrix[:3, :3]
     middle = point_from(packed.center, body.matrix, center).astype(np.float32)
@@ -202,10 +202,10 @@ def _own_part(scene: Scene, number: int, center: Array) -> _Part:
     size = float(np.abs(inverse).max())
     turned = None if np.array_equal(inverse, size * np.eye(3)) else (inverse / size).astype(np.float32)
     scale = np.float32(packed.scale * size)
-    return _Part(mesh_scene(body.mesh), np.array([number], np.int32), scale, turned, middle)
+    return _EmbreePart(mesh_scene(body.mesh), np.array([number], np.int32), scale, turned, middle)
 
 
-def _common_part(scene: Scene, numbers: Sequence[int], center: Array) -> _Part:
+def _common_part(scene: Scene, numbers: Sequence[int], center: Array) -> _EmbreePart:
     # Lengths in a power of two of metres, which rounds nothing.
     scale = 2.0 ** -float(np.round(np.log2(scene.diagonal)))
     geometries = []
@@ -214,4 +214,4 @@ def _common_part(scene: Scene, numbers: Sequence[int], center: Array) -> _Part:
         middle = point_from(body.mesh.center, body.matrix, center)
         geometries.append(_geometry(body.mesh, body.mesh.center, scale * body.matrix[:3, :3], scale * middle))
     objects, nowhere = np.array(numbers, np.int32), np.zeros(3, np.float32)
-    return _Part(embree_scene(*geometries), objects, np.float32(scale), None, nowhere)
+    return _EmbreePart(embree_scene(*geometries), objects, np.float32(scale), None, nowhere)

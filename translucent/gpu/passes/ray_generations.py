@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.gpu.constants import STORAGE_BINDINGS
-from translucent.gpu.embree_hits import EmbreeHits, Floats, Hits
+from translucent.gpu.embree_hits import EmbreeHits, Floats, RayHits
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import ComputeVariants
 from translucent.gpu.placement import Part
@@ -210,7 +210,7 @@ class _Room:
         ends = np.frombuffer(segments.read(24 * max(places, 1)), np.float32).reshape(-1, 6).take(found, axis=0)
         return _Live(found, words.take(found), ends[:, :3], ends[:, 3:])
 
-    def put(self, live: _Live, hits: Hits) -> tuple[int, int]:
+    def put(self, live: _Live, hits: RayHits) -> tuple[int, int]:
         """Write what rays hit, first those that hit anything, and the lists of the rays of pixels.
 
         Returns
