@@ -14,6 +14,7 @@ layout(local_size_x = COMPUTE_GROUP) in;
 #include "transport/stored_rays.glsl"
 
 layout(std430, binding = TRACED_LIGHT_BINDING) writeonly buffer TracedLight { vec4 traced_light[]; };
+uniform int summed_row;      // first row of the frame that is there
 
 uniform sampler2D unsettled;
 uniform ivec4 rectangle;    // first column and row, and how many there are
@@ -27,7 +28,7 @@ void main() {
     ivec2 within = ivec2(block % columns * 4 + (place & 3), block / columns * 2 + (place >> 2 & 1));
     ivec2 here = rectangle.xy + within;
     bool exists = all(lessThan(within, rectangle.zw));
-    if (exists) { traced_light[here.y * int(frame_size.x) + here.x] = vec4(0.0); }
+    if (exists) { traced_light[(here.y - summed_row) * int(frame_size.x) + here.x] = vec4(0.0); }
     Ray ray;
     PrimaryHit primary;
     float reach, variance;

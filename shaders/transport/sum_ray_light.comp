@@ -11,6 +11,7 @@ layout(std430, binding = TRACED_LIGHT_BINDING) buffer TracedLight { vec4 traced_
 
 uniform int pixel_count;
 uniform int columns;       // of the frame
+uniform int summed_row;     // first row of the frame whose light is there
 
 void main() {
     int number = int(gl_GlobalInvocationID.x);
@@ -18,5 +19,5 @@ void main() {
     uint pixel = pixel_rays[number].y, end = pixel_rays[number + 1].x;
     vec4 sum = vec4(0.0);
     for (uint ray = pixel_rays[number].x; ray < end; ++ray) { sum += ray_light[ray]; }
-    traced_light[int(pixel >> 15) * columns + int(pixel & 0x7fffu)] += sum;
+    traced_light[(int(pixel >> 15) - summed_row) * columns + int(pixel & 0x7fffu)] += sum;
 }

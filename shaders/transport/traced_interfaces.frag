@@ -26,10 +26,11 @@ layout(location = 1) out vec4 out_transmittance;
 
 #if GENERATIONS
 layout(std430, binding = TRACED_LIGHT_BINDING) readonly buffer TracedLight { vec4 traced_light[]; };
+uniform int summed_row;     // first row of the frame that is there
 
 // The light of a pixel's rays has been summed up.
 void trace_channels(Pixel pixel, Ray ray, PrimaryHit primary, float reach) {
-    vec4 found = traced_light[pixel.here.y * int(frame_size.x) + pixel.here.x];
+    vec4 found = traced_light[(pixel.here.y - summed_row) * int(frame_size.x) + pixel.here.x];
     traced_radiance = found.rgb;
     traced_lost = found.a;
 }

@@ -20,7 +20,7 @@ from translucent.geometry.ray_caster import embree_refusal
 from translucent.geometry.solids import Sphere, Torus
 from translucent.gpu import embree_hits as module
 from translucent.gpu.embree_hits import EmbreeHits
-from translucent.gpu.passes import ray_generations
+from translucent.gpu.passes import ray_generations, traced_interfaces
 from translucent.planning.render_plan import Capabilities
 
 SIZE = (40, 30)
@@ -121,6 +121,7 @@ def test_portions_are_halved_where_rays_have_no_room(renderer: tl.Renderer, monk
     whole, halves = rendered(renderer, scene, "embree"), []
     made = ray_generations._halves
     monkeypatch.setattr(ray_generations, "_halves", lambda rectangle: halves.append(rectangle) or made(rectangle))
+    monkeypatch.setattr(traced_interfaces, "MOST_LIGHT", 7 * SIZE[0])
     monkeypatch.setattr(ray_generations, "PLACES", 1)
     monkeypatch.setattr(ray_generations, "MORE_PLACES", 2)
     np.testing.assert_array_equal(rendered(renderer, scene, "embree").radiance, whole.radiance)

@@ -82,7 +82,7 @@ class RayGenerations:
         switches, values
             Of the shaders, whose textures are bound.
         """
-        width, height = job.targets.size
+        width = job.targets.size[0]
         programs = (
             self._begin.program(**switches),
             *(self._step.program(**switches, MISSES=misses) for misses in (False, True)),
@@ -95,9 +95,8 @@ class RayGenerations:
         if job.bending:
             job.targets[mask].color_attachments[0].use(self._unsettled)
         hits = job.resources.ray_hits.of(job.scene, media_center(job.scene))
-        job.targets.buffers.get("traced_light", 16 * width * height).bind_to_storage_buffer(
-            STORAGE_BINDINGS["traced_light"]
-        )
+        light = job.targets.buffers.get("traced_light", 16 * width * part.scissor[3])
+        light.bind_to_storage_buffer(STORAGE_BINDINGS["traced_light"])
         job.gl.memory_barrier()  # light that is drawn by now may not be read yet
         waiting = room.rectangles(part)[::-1]
         while waiting:

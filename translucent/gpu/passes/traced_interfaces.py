@@ -55,6 +55,9 @@ FAINTEST_THROUGHPUT = 1.2e-2
 #: Room around the mirror images of bodies that rough coats blur, in heights of the picture.
 MIRROR_ROOM = 0.06
 
+#: Pixels whose light is summed up before it is drawn: OpenGL need not have larger buffers.
+MOST_LIGHT = 1 << 20
+
 #: Samples of a pixel below which microfacets would be mere noise.
 FEW_SAMPLES = 4
 
@@ -143,12 +146,15 @@ class TracedInterfacesPass:
         Of a job that is bending, only those in the target of the name `mask`.
         """
         by_generations = job.plan.hits == "embree"
-        if by_generations:
-            self._generations.trace(job, part, mask, switches, values)
         variants = self._with_sums if by_generations else self._variants
-        program = variants.program(**switches, GENERATIONS=by_generations)
-        set_used(program, values)
-        variants.draw_part(part, program, framebuffer)
+        rows = max(MOST_LIGHT // job.targets.size[0], 1) if by_generations else part.scissor[3]
+        for row in range(part.bottom, part.top, max(rows, 1)):
+            band, own = part.rows(row, row + rows), {**values, "summed_row": row}
+            if by_generations:
+                self._generations.trace(job, band, mask, switches, own)
+            program = variants.program(**switches, GENERATIONS=by_generations)
+            set_used(program, own)
+            variants.draw_part(band, program, framebuffer)
 
     def _mark_unsettled(self, job: FrameJob) -> None:
         """Leave depths that let pass pixels that need more samples: of interfaces, and of what a ground mirrors."""
