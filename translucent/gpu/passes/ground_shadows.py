@@ -26,6 +26,10 @@ REACH = 1.5
 #: Largest side of a map, in texels. Half as wide as a light's map, its texels are as large as those of a direction's.
 MOST_TEXELS = 2048
 
+#: Texels along a map for each pixel along a picture, whose longer side counts as the next power of two: a thumbnail
+#: takes a small map.
+TEXELS_OF_PIXEL = 4
+
 
 class GroundShadowsPass:
     """Fraction of the environment's light that bodies take from a ground; see ``shaders/shade/ground_shadows.frag``.
@@ -64,7 +68,8 @@ class GroundShadowsPass:
         ahead = {i: views.sky[i].camera.forward for i in directions}
         cosines = {i: -float(ground.normal @ forward) for i, forward in ahead.items()}
         lit = [i for i, cosine in cosines.items() if cosine > 0.0]
-        side = min(job.plan.shadows.size // 2, MOST_TEXELS)
+        finest = TEXELS_OF_PIXEL * 2 ** int(max(job.targets.size) - 1).bit_length()
+        side = min(job.plan.shadows.size // 2, MOST_TEXELS, finest)
         target = self._sized(side)
         key = made_of, irradiance.tobytes(), tuple(lit), middle.tobytes(), axes.tobytes()
         if key != self._made_of:
