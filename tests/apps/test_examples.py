@@ -98,6 +98,7 @@ def test_the_notebook_about_notebooks_runs(
 
     gummy = tl.preset("gummy").medium
     told = {"extinction": gummy.extinction.tolist(), "ior": gummy.ior, "roughness": 0.0, "distance": 0.002}
+    told["preset"] = ""
     (tmp_path / "widget.js").write_text("export default { render() {} };")  # no browser looks at it here
     monkeypatch.setattr(module, "web_path", lambda name: tmp_path / name)
     monkeypatch.setattr(module, "payload", lambda *_: b"")

@@ -314,6 +314,6 @@ def test_without_embreex(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(builtins, "__import__", refuse)
     with pytest.raises(
-        tl.RenderError, match=r"embreex cannot be imported .*; pip install embreex, or render with OpenGL"
+        tl.RenderError, match=r"embreex cannot be imported .*; pip install -U embreex, or render with OpenGL"
     ):
         TracedMesh.of(Sphere().tessellate(8))

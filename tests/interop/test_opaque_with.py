@@ -35,7 +35,8 @@ def test_pyrender_draws_the_opaque_objects_of_a_file(pyrender: ModuleType, run: 
     arrays = {}
     for name, options in (("own", ()), ("pyrender", ("--opaque-with", "pyrender"))):
         output = tmp_path / f"{name}.npz"
-        code, out, err = run("render", model, "-o", output, "--size", "64x48", "--samples", 4, *LIT, *options)
+        arguments = "render", model, "-o", output, "--size", "64x48", "--samples", 4, "--verbose"
+        code, out, err = run(*arguments, *LIT, *options)
         assert (code, err) == (0, "")
         with np.load(output) as file:
             arrays[name] = dict(file)
