@@ -183,7 +183,7 @@ def test_what_cannot_be_had_is_refused_or_told(renderer: tl.Renderer, monkeypatc
     with pytest.raises(tl.InputError, match=r"embreex cannot be imported .*; pip install -U embreex, or leave"):
         rendered(renderer, scene, "embree")
     monkeypatch.undo()
-    monkeypatch.setattr("translucent.geometry.ray_caster.version", lambda name: "2.17.7")
+    monkeypatch.setattr("translucent.geometry.ray_caster._embreex_version", lambda: "2.17.7")
     assert "embreex is 2.17.7, older than 4.4" in str(tl.plan(scene, capabilities=software))
 
 

@@ -413,7 +413,12 @@ def first_hits(scene: EmbreeScene, origins: Array, directions: Array) -> tuple[I
 def embree_versions() -> dict[str, str]:
     """Versions of embreex, and of the Embree in it; raises `RenderError` if it cannot be imported."""
     _import_embreex()
-    return {"embreex": version("embreex"), "embree": _embree_version()}
+    return {"embreex": _embreex_version(), "embree": _embree_version()}
+
+
+@cache  # the metadata of a package are files, and each plan asks
+def _embreex_version() -> str:
+    return version("embreex")
 
 
 @cache  # making a device takes milliseconds, and each record of a batch asks
@@ -430,7 +435,7 @@ def embree_refusal() -> str:
         import embreex.rtcore_scene  # noqa: F401
     except ImportError as error:
         return f"embreex cannot be imported ({error})"
-    found = version("embreex")
+    found = _embreex_version()
     return "" if _numbers(found) >= _OLDEST else f"embreex is {found}, older than 4.4"
 
 
