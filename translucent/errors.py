@@ -85,7 +85,7 @@ LEAST_PART = 3
 
 
 def close_names(written: str, known: Iterable[str]) -> list[str]:
-    """Names that `written` may stand for: misspelled ones first, then those that hold it or that it holds.
+    """Names that `written` may mean: misspelled ones first, then longer and shorter ones.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ uniform vec3 all_light;     // irradiance of all directions where nothing shadow
 uniform float ground_texels; // along a side
 uniform vec3 box_low;        // bounds of all that throws shadows, from the center of the media
 uniform vec3 box_high;
-uniform int order;           // number among those that are drawn
+uniform int order;           // number among the directions that are drawn
 uniform float cell_radius;   // of the cell of the direction, in radians
 
 const int TAPS = 6;

@@ -1,4 +1,4 @@
-// Streams of paths in storage buffers: the path that each follows, and the statistics of those that have ended. Needs
+// Streams of paths in storage buffers: the path that each follows, and the statistics of ended paths. Needs
 // interior_list.glsl and random.glsl.
 
 #include "transport/path_state.glsl"

@@ -159,7 +159,7 @@ def test_convex_is_what_back_face_depth_is_exact_for() -> None:
         ([body(mesh=OPEN), body()], None, 2, "closed bodies, in those pixels, too"),
         ([body(FIRE), body(WINE)], None, 0, "emission among several media: what is in front dims what is behind; one "),
         ([body()], tl.FragmentLists(), 0, "requested; one draw into a list for each pixel, sorted afterwards"),
-        ([body()], tl.KBuffer(5), 0, "requested; one draw, of which each pixel keeps the 5 nearest surfaces"),
+        ([body()], tl.KBuffer(5), 0, "requested; one draw; each pixel keeps the 5 nearest surfaces"),
         ([body()], tl.DepthPeeling(), 0, "requested; two layers with each draw, until all are found"),
         ([body()], tl.DepthPeeling(8), 0, "requested; two layers with each draw"),
         ([body()], tl.DepthPeeling(order="front-to-back"), 0, "requested; a layer with each draw, until all are found"),

@@ -158,7 +158,7 @@ LEAST_LENGTH, LEAST_DEPTH = 0.3, 0.1
 #: Paths below each sample that measure the unscattered light, and their start below it, in cells.
 INWARD_DIRECTIONS, START = 8, 1e-4
 
-#: Blocks of cells along the longest side of a grid, in each of which the solver looks for errors as one.
+#: Blocks of cells along the longest side of a grid. The solver corrects the mean error of each.
 BLOCKS = 8
 
 #: Samples next to each other for which something is found together.

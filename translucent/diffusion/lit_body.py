@@ -36,7 +36,7 @@ class Spreading:
     means : (c, s) csr_array
         Of the samples in each of the cells that have some.
     rings : list of csr_array
-        Cells next to those that are known so far, each time: means of the known ones among the 26 around.
+        Rings of cells around the known ones, from the inside out: means of the known cells among the 26 around.
     cells : (n,) int64
         Places in the flat grid, of the cells that have samples and of each ring.
     deep, numbers : (m,), (m,) int64

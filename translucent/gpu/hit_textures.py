@@ -1,8 +1,8 @@
 """Table of textures of surfaces, which shaders read wherever a ray hits one: ``shaders/transport/textured_hit.glsl``.
 
-It lies behind the triangles in the texture of hierarchies, so that shaders need no sampler more. One record for each
-object, then the corners of the triangles of those that need them, in the order of the triangles, then the texels of the
-textures with their mipmaps, two in each 16 bytes.
+It lies behind the triangles in the texture of hierarchies, so that shaders need no further sampler. First there is a
+record for each object, then the corners of the triangles of textured objects, in the order of the triangles. The texels
+of the textures with their mipmaps follow, two in each 16 bytes.
 """
 
 from __future__ import annotations

@@ -113,7 +113,7 @@ class Library:
     def groups(self) -> dict[str, list[Preset]]:
         """Presets with the words of the search, by their groups; own ones are read again when their files change.
 
-        Without a search, those that people look for first come first, and once more in their groups.
+        Without a search, the most popular presets come first, and once more in their groups.
         """
         self._refresh()
         if self._searched != self.search:

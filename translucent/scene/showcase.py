@@ -38,8 +38,8 @@ from translucent.scene.surface import Surface
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
 DEFAULT_REACH = 0.15
 
-#: Index of refraction of solids of which a color is known alone, that of glass; and of the default medium on a stage,
-#: where there is something to mirror. Without a stage it is 1.
+#: Index of refraction of glass: for solids that only have a color, and for the default medium on a stage, where there
+#: is something to mirror. Without a stage the default medium has 1.
 SOLID_IOR = 1.5
 
 #: The default environment: white above and light gray below.

@@ -1,4 +1,4 @@
-"""Random paths whose hits Embree finds: streams of paths, of which each pass follows the live ones by one event."""
+"""Random paths whose hits Embree finds: each pass follows the live streams of paths by one event."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Trees of rays by generations: the CPU finds what all rays of one hit, then a compute shader lets them interact.
 
 A generation has a list of live rays, in the order of their pixels. Each leaves up to two branches at places of its own,
-twice its number and one more, and the CPU lists those that are there. So pictures are the same each time: no result
+twice its number and one more, and the CPU lists the branches that exist. So pictures are the same each time: no result
 depends on the order in which threads run. A frame is traced in portions, which bound the memory.
 """
 
@@ -25,7 +25,7 @@ from translucent.gpu.uniforms import media_center
 #: Bytes of the buffers of rays, however large the frame is.
 MOST_BYTES = 64 << 20
 
-#: Places for rays to each pixel of a portion, of which live rays fill no more than half: about two rays of a pixel are
+#: Places for rays to each pixel of a portion. Live rays fill no more than half of them: about two rays of a pixel are
 #: alive at once, in bodies with many walls three.
 PLACES, MORE_PLACES = 3, 8
 
@@ -200,7 +200,7 @@ class _Room:
         self._sums.bind_to_storage_buffer(STORAGE_BINDINGS["pixel_rays"])
 
     def turn(self, places: int) -> _Live:
-        """Make rays of the branches in the first so many places; returns those that are there."""
+        """Make rays of the branches in the first so many places; returns the live ones."""
         self._rays, self._branches = self._branches, self._rays
         _, segments, pixels = self._rays
         # OpenGL reads no 0 bytes.
@@ -210,7 +210,7 @@ class _Room:
         return _Live(found, words.take(found), ends[:, :3], ends[:, 3:])
 
     def put(self, live: _Live, hits: RayHits) -> tuple[int, int]:
-        """Write what rays hit, first those that hit anything, and the lists of the rays of pixels.
+        """Write what rays hit, rays with a hit first, and the lists of the rays of pixels.
 
         Returns
         -------

@@ -49,5 +49,5 @@ class KBuffer(Method):
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
         """Passes: one draw of all solids."""
-        reason = f"{why}; one draw, of which each pixel keeps the {self.k} nearest surfaces"
+        reason = f"{why}; one draw; each pixel keeps the {self.k} nearest surfaces"
         return (PassSpec(PassName.K_BUFFER, reason, solids_of(scene), 1, cost=self.cost),)
