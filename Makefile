@@ -54,8 +54,9 @@ gpu-report: ## on a machine with a GPU: tests, report, frames of large models, p
 	$(BOOTSTRAP) --group test
 	$(BIN)/python tools/gpu_report.py --keep
 
-docs: ## build the site of docs/ into out/docs/, with the pictures of examples/
+docs: ## build the site of docs/ into out/docs/, with the pictures of examples/ and a live scene where npm is
 	$(BOOTSTRAP) --group docs
+	@$(BIN)/python tools/build_web.py --if-npm
 	@rm -rf docs/generated
 	$(BIN)/python -m sphinx -W --keep-going -q docs out/docs
 
