@@ -198,7 +198,7 @@ def which(report: dict[str, Any]) -> list[str]:
 
 
 def claims(report: dict[str, Any]) -> list[str]:
-    """What is promised, and whether it held."""
+    """Table of the promises of a report, and whether each held."""
     words = {True: "yes", False: "no", None: "undecided"}
     rows = [[one["text"], words[one["held"]], one["measured"].split("; ")[0]] for one in report["claims"]]
     return table(["promise", "held", "measured, on one scene"], rows)
@@ -288,7 +288,7 @@ def methods(report: dict[str, Any]) -> list[str]:
 
 
 def provenance(report: dict[str, Any]) -> list[str]:
-    """Where the figures come from: command, version, date and machine."""
+    """Sentence with the source of the figures: command, version, date and machine."""
     found = report["provenance"]
     day = datetime.fromisoformat(found["started"])
     machine = f"{found['processor']}, {found['processors']} processors, {found['renderer']}"

@@ -97,7 +97,7 @@ def _without_a_coat(ground: tl.Object) -> tl.Object:
 
 @pytest.mark.filterwarnings("ignore:.*not valid")
 def test_pixels_whose_light_is_lost_take_no_further_samples(renderer: tl.Renderer) -> None:
-    """Of an open box of glass that is viewed from above: nobody knows how rays go on that leave through its hole."""
+    """Open box of glass, viewed from above: where a ray leaves through its hole, the light is unknown."""
     faces = Box((-1, -1, -1), (1, 1, 1)).tessellate(1)
     below = faces.face_normals[:, 1] > -0.5
     box = tl.Mesh(faces.vertices, faces.faces[below])

@@ -137,7 +137,7 @@ def test_a_body_that_moves_is_hit_where_it_is(renderer: tl.Renderer) -> None:
 
 @pytest.fixture
 def crowd(monkeypatch: pytest.MonkeyPatch) -> Iterator[tl.Scene]:
-    """Bodies of all sizes and ways, of which some have Embree scenes of their own."""
+    """Large and small bodies, moved, rotated and mirrored; the large ones have their own Embree scenes."""
     monkeypatch.setattr(module, "OWN_SCENE", len(RING.faces))
     monkeypatch.setattr(module, "MOST_OWN", 3)
     rng = np.random.default_rng(5)

@@ -124,7 +124,7 @@ def test_it_is_told_in_words_and_as_json() -> None:
         "  together: 8 read, 28 written per pixel, and 16 read back",
     ]
     shown = dataclasses.replace(told, passes=(*told.passes, PassTraffic(PassName.CAUSTICS)))
-    assert str(shown).splitlines()[-1] == "  not counted, as it goes with what a ray meets: caustics"
+    assert str(shown).splitlines()[-1] == "  not counted, since it depends on what rays hit: caustics"
     assert shown.summary() == {
         "passes": [
             {"name": "signed_depth", "pixel": {"read": 0, "written": 8}, "face": {"read": 8, "written": 8}},

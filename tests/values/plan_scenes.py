@@ -63,7 +63,7 @@ SCENES = {
     "everything": scene(body(FIRE), sheet(), body(WINE, OPEN), body(None), overlap="union"),
 }
 
-#: Methods that do not order what a ray meets, and the planner's choice.
+#: Methods that do not order what a ray hits, and the planner's choice.
 COLUMNS = (None, tl.SignedDepth(), tl.BackFaceDepth(), tl.ThinLayer())
 
 

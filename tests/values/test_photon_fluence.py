@@ -117,7 +117,7 @@ def covered_by_cube(points: Array) -> Array:
 
 @pytest.mark.parametrize("radius", [0.2, 1.5])
 def test_a_sphere_of_light_shines_its_power_onto_a_cube(radius: float) -> None:
-    """Of each point of the sphere, the fraction of all directions that the cube covers as seen from there.
+    """Fraction of all directions that the cube covers, as seen from each point of the sphere.
 
     The sphere looks like an even disc from everywhere: its light has a density of 1 / sqrt(1 - r^2) over its radius r.
     """

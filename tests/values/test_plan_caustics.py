@@ -108,7 +108,7 @@ def test_fog_that_photons_do_not_light_is_told() -> None:
 
 
 def test_a_plan_names_the_option_that_shows_the_light_in_a_shadow() -> None:
-    """Where a light, a clear body that bends it and something to receive it are there, and photons are not."""
+    """The plan names `--caustics` for a light, a clear refracting body and a receiver, as long as photons are off."""
     offered = "the bright spot in the shadow of 'box': --caustics (tl.Caustics()) shows it"
     assert offered in [str(note) for note in plan(scene()).unmodelled]
     others = [

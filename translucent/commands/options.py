@@ -515,7 +515,7 @@ class ChoiceOptions:
         "where bodies are solid and rays can be; the plan says what was taken.",
     )
     interface_depth: int | None = option(
-        metavar="N", help="Of --interfaces traced: interfaces that light may meet. Default: 8."
+        metavar="N", help="Of --interfaces traced: interfaces that a ray may hit. Default: 8; 12 without --interfaces."
     )
     interface_forks: int | None = option(
         metavar="N",
@@ -523,7 +523,7 @@ class ChoiceOptions:
     )
     interface_hits: str | None = option(
         type=NamesOf("translucent.planning.hits", "HITS"),
-        help="Of --interfaces traced: what finds the surfaces that light meets, Embree or shaders. Default: Embree "
+        help="Of --interfaces traced: what finds the surfaces that rays hit, Embree or shaders. Default: Embree "
         "where OpenGL draws on the processors, too.",
     )
     scattering: str | None = option(

@@ -175,7 +175,7 @@ class Occluders:
 
     @cached_property
     def pose(self) -> Pose:
-        """Of the body."""
+        """Position and rotation of the body."""
         return Pose.of(self.body.matrix)[0]
 
     def nearest(self, origins: Array, directions: Array) -> tuple[Array, Array]:

@@ -315,7 +315,7 @@ class BodyGrid:
 
     @cached_property
     def pattern(self) -> MatrixPattern:
-        """Where the linear system of its cells has numbers."""
+        """Sparsity pattern of the linear system of its cells."""
         return MatrixPattern.of(self)
 
     @cached_property

@@ -183,7 +183,7 @@ class LitBody:
 
     @property
     def pose(self) -> Pose:
-        """Where the body is."""
+        """Position and rotation of the body."""
         return self.casters.pose
 
     def sky_paths(self, others: Sequence[Object]) -> list[sparse.csr_array]:

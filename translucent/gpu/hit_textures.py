@@ -27,7 +27,7 @@ _ONE = 65535
 
 
 def surface_key(scene: Scene) -> tuple[object, ...]:
-    """What the table of a scene depends on."""
+    """Key of the table of a scene: equal for scenes with equal tables."""
     objects = enumerate(scene.objects)
     return tuple((i, body.mesh, has_more(body), *textures_at_hits(body)) for i, body in objects if varies_at_hits(body))
 

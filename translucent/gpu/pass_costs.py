@@ -148,7 +148,7 @@ class FrameTraffic:
         read, written = (sum(step.pixel[i] for step in counted if step.pixel is not None) for i in range(2))
         lines.append(f"  together: {_words(read, written)} per pixel, and {self.read_back} read back")
         if rest:
-            lines.append(f"  not counted, as it goes with what a ray meets: {', '.join(rest)}")
+            lines.append(f"  not counted, since it depends on what rays hit: {', '.join(rest)}")
         return "\n".join(lines)
 
 

@@ -358,7 +358,7 @@ def _write_pfm(pixels: Array, path: Path) -> None:
 
 
 def _beyond(scene: Scene) -> Iterator[tuple[str, str]]:
-    """What Mitsuba cannot say, and what to do, the first things first."""
+    """Features of a scene that Mitsuba lacks, each with advice."""
     solids = [body for body in scene.bodies if body.sheet_thickness is None]
     groups = (
         (

@@ -1,4 +1,4 @@
-"""What finds the surfaces that rays hit: Embree on the processors, or shaders."""
+"""Choice of the ray tracer: Embree on the processors, or shaders."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def check_hits(what: str, hits: str | None) -> None:
 
 
 def chosen_hits(what: str, requested: str | None, software: bool, shader_storage: bool) -> tuple[str, str]:
-    """What finds the surfaces that rays hit, as in `HITS`, and why it is not Embree where that would be faster.
+    """Ray tracer of a plan, one of `HITS`, and the reason why it is not Embree where that would be faster.
 
     Parameters
     ----------
