@@ -29,6 +29,7 @@ extensions = [
     "measurements",
     "preset_reference",
     "live_scene",
+    "pictures",
 ]
 templates_path = ["_templates"]
 exclude_patterns = ["_ext", "_templates", "generated/*.md"]
@@ -48,6 +49,7 @@ add_module_names = False
 html_theme = "furo"
 html_static_path = ["_static"]
 html_css_files = ["math.css", "pages.css"]
+html_js_files = [("turn.js", {"defer": "defer"})]
 html_title = f"translucent {VERSION}"
 html_math_renderer = "mathml"
 html_show_sphinx = False

@@ -34,8 +34,8 @@ from translucent.version import VERSION
 #: First bytes of a container.
 MAGIC = b"TLPAGE01"
 
-#: Bits of a mantissa that are kept of light, which has no more: its error is 5e-5 of each value at most.
-LIGHT_BITS = 13
+#: Bits of the mantissa of light that are kept: errors are 5e-4 of each value at most, a tenth of a step of 8 bits.
+LIGHT_BITS = 10
 
 #: Endings of names that meshes have of their files.
 _FILES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
