@@ -28,6 +28,7 @@ extensions = [
     "mathml",
     "measurements",
     "preset_reference",
+    "typescript_reference",
     "live_scene",
     "pictures",
 ]

@@ -126,8 +126,19 @@ def test_the_front_page_has_a_scene_or_a_picture(
         assert page.read_text(encoding="utf-8") == "page"
 
 
+def test_the_reference_of_the_web_module_has_no_links_to_headings_that_are_too_deep() -> None:
+    written = "# name\n\n## Classes\n\n[`Pass`](#pass) takes [three](https://threejs.org) and [`Pass[]`](#pass-2).\n"
+    page = extension("typescript_reference").as_section(written)
+    assert page == "\n## Classes\n\n`Pass` takes [three](https://threejs.org) and `Pass[]`.\n"
+
+
 def test_pages_include_what_is_written() -> None:
-    written = {*TABLES, "presets", "blender"}  # the last two by preset_reference
+    written = {
+        *TABLES,
+        "presets",
+        "blender",
+        "typescript",
+    }  # the last three by preset_reference and typescript_reference
     included = set()
     for page in DOCS.rglob("*.md"):
         for path in re.findall(r"```\{include\} (\S+)", page.read_text(encoding="utf-8")):

@@ -31,21 +31,21 @@ import { isClosed } from "./topology.js";
 export type Precision = "float32" | "float16";
 
 export interface ExactThicknessOptions {
-  /** Meshes whose inside is measured, with all below them; or which. Else those with a TranslucentMaterial. */
+  /** Meshes whose inside is measured, with all below them, or a test of a mesh. Default: those with a TranslucentMaterial. */
   bodies?: Object3D[] | ((mesh: Mesh) => boolean);
-  /** Meshes that end rays; or which. Else all others that write depth and are not transparent. None: `[]`. */
+  /** Meshes that end rays, or a test of a mesh; `[]` for none. Default: all others that write depth and are not transparent. */
   opaque?: Object3D[] | ((mesh: Mesh) => boolean);
-  /** Pixels of the picture; else those of the renderer's canvas, whatever they become. */
+  /** Pixels of the picture. Default: those of the renderer's canvas, also after it is resized. */
   size?: [number, number];
-  /** float16 where float32 cannot be added up is taken by itself; here it can be asked for. */
+  /** Precision of the sums. Default: float32 where the browser can add it up, float16 elsewhere. */
   precision?: Precision;
-  /** Optical depth per channel beside the metres: where media differ ("auto"), always, or never. */
+  /** Measure the optical depth of each channel, too: always, never, or where media differ ("auto", the default). */
   opticalDepth?: "auto" | boolean;
-  /** Search for where rays leave bodies, for materials that bend them: where one has an ior above 1 ("auto"), always, or never. */
+  /** Find where rays leave bodies: always, never, or where a material bends them ("auto", the default). */
   exits?: "auto" | boolean;
 }
 
-/** Pixels that `read` gives; row 0 is the top one. */
+/** Pixels that `read` returns; row 0 is the top one. */
 export interface ThicknessPixels {
   width: number;
   height: number;
@@ -71,9 +71,11 @@ const LARGEST_16 = 65504;
  * order, as deep as they overlap; other pixels are marked.
  */
 export class ExactThicknessPass {
+  /** Renderer that draws the pass. */
   readonly renderer: WebGLRenderer;
+  /** Options of the constructor; changes count from the next `render` on. */
   options: ExactThicknessOptions;
-  /** Of the box around all bodies at the last `render`, in metres. */
+  /** Diagonal of the box around all bodies at the last `render`, in metres. */
   diagonal = 1;
   private standIns = new Map<Mesh, StandIn>();
   private sums: WebGLRenderTarget | null = null;
