@@ -1,6 +1,6 @@
 // Surfaces that a ray hits in one place: of solids, thin walls and opaque objects. Needs <constants>, <Surfaces>, <ObjectRow>,
 // lib/optics.glsl, lib/interface.glsl, hierarchy.glsl and interior_list.glsl. FROM_EYE: rays may start inside bodies, or before
-// others without an interface.
+// others without an interface. ONE_SURFACE: the hit is given, and no surface of another object lies there.
 
 #if FROM_EYE
 uniform uvec4 start_interior;  // the bodies that the eye is in
@@ -115,7 +115,7 @@ SurfaceHit surface_hit(vec3 origin, vec3 direction, uvec4 interior, float start,
     int rank = -1;  // of what decides: 0 a thin wall, 1 a solid, 2 what is opaque
     uvec4 done = uvec4(0u);
     for (int surface = 0; surface < INTERIOR_SIZE; ++surface) {
-#if !ONE_OBJECT
+#if !ONE_SURFACE
         if (hit.object == UNKNOWN) { hit = nearest_hit(origin, direction, start, end, done); }
         if (surface == 0) { first = hit; }
 #endif
@@ -155,7 +155,7 @@ SurfaceHit surface_hit(vec3 origin, vec3 direction, uvec4 interior, float start,
             found.face_normal = face_normal;
         }
         found.path = max(found.path, hit.path);
-#if ONE_OBJECT
+#if ONE_SURFACE
         break;
 #else
         if (rank == 2) { break; }

@@ -13,6 +13,7 @@ import pytest
 import translucent as tl
 from tests.ball_light import ball_light, flux_within, fresnel
 from translucent.formulas.interface import slab_reflectance, slab_transmittance
+from translucent.geometry.ray_caster import embree_refusal
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes import caustics as caustics_pass
 from translucent.gpu.passes import light_views
@@ -181,6 +182,47 @@ def test_the_irradiance_is_that_of_the_reference(name: str, renderer: tl.Rendere
     np.testing.assert_allclose(share, 1.0, atol=tolerance + noise)
     a, b, found = blurred(a), blurred(b), blurred(found)
     assert np.sqrt(max(((found - a) * (found - b)).mean(), 0.0)) / (0.5 * (a + b).mean()) < 0.2
+
+
+#: Bodies that share places: one in another, both on the ground and on a plate; a pane beside them, whose back is open.
+STANDING = (
+    tl.Object(Box((-0.6, 0.0, -0.6), (0.6, 1.0, 0.6)).tessellate(), TINTED, priority=1),
+    tl.Object(Box((-0.6, 0.0, -0.2), (0.2, 0.7, 0.2)).tessellate(), tl.Medium((1.0, 0.5, 0.1), ior=1.33)),
+    ball(CLEAR, 1.5, COARSE_CORE, surface=tl.Surface(dispersion=2.0)),
+    tl.Object(tl.Mesh(QUAD @ TILTED, [(0, 2, 1), (0, 3, 2)]), CLEAR, at(1.2, 1, 0), sheet_thickness=1e-3),
+    replace(PLATE, surface=tl.Surface(double_sided=False)),
+    GROUND,
+)
+STREAMS = {
+    "rough film and coat": PAIRS["rough film and coat"][0],
+    "standing, dispersive, from a sphere": scene(
+        *STANDING, light=tl.SphereLight((1.5, 6, 1), (10.0, 20.0, 30.0), 0.6), overlap="priority"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", STREAMS)
+def test_photons_by_embree_land_where_those_of_shaders_do(name: str, renderer: tl.Renderer, landed: Landed) -> None:
+    """Each with the same power, but for few at edges of triangles, where either side is as right."""
+    if embree_refusal() or not renderer.gpu.capabilities.shader_storage:
+        pytest.skip("no Embree, or no compute shaders")
+    count, found, gpu = 20_000, list[Array](), renderer.gpu
+    plan = renderer.plan(STREAMS[name], caustics=tl.Caustics(count))
+    assert plan.hits == "embree"
+    others = tuple(one.name for one in plan.passes if one.name not in (PassName.OPAQUE, PassName.CAUSTICS))
+    for hits in ("embree", "gl"):
+        landed.parts.clear()
+        with gpu.context.current():
+            job = gpu.prepare(replace(plan, hits=hits), (8, 8))
+            gpu.run(job, leave_out=others)
+            job.release()
+        found.append(landed.all)
+    one, other = found
+    assert len(one) == len(other) >= count - 2
+    assert (other[:, 3] == 1.0).mean() > 0.2
+    different = (one[:, 3] != other[:, 3]) | (np.abs(one - other).max(axis=1) > 1e-3 * np.abs(other).max(axis=1))
+    assert different.mean() < 2e-3
+    np.testing.assert_allclose(one[:, 4:].sum(axis=0), other[:, 4:].sum(axis=0), rtol=2e-3)
 
 
 def photons_in(renderer: tl.Renderer, one: tl.Scene, size: tuple[int, int], caustics: tl.Caustics) -> Array:

@@ -1,6 +1,6 @@
 """Paths of photons from the lights of a scene through its interfaces and media.
 
-The CPU's twin of ``shaders/transport/photons.frag``: the same aims and starts, and the same choices by chance. It
+The CPU's twin of ``shaders/transport/photon_step.glsl``: the same aims and starts, and the same choices by chance. It
 yields each segment between two surfaces, and not only where photons land.
 """
 

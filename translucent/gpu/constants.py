@@ -58,6 +58,9 @@ STORAGE_BINDINGS = {
     "ended_paths": 2,
     "path_segments": 3,
     "next_segments": 4,
+    "photons": 0,
+    "live_photons": 1,
+    "photon_segments": 2,
     "rays": 0,
     "ray_segments": 1,
     "live_rays": 2,
@@ -77,6 +80,9 @@ HIERARCHY_WIDTH_BITS = 12
 
 #: Width of the textures that hold photons, in texels.
 PHOTON_WIDTH = 512
+
+#: Surfaces on the path of a photon, after as many of which it ends.
+MOST_PHOTON_HITS = 96
 
 #: Types of objects, in the order of their numbers: an absorber is a thin wall that only absorbs and emits, and what is
 #: unseen is drawn over the picture, or from its back.
@@ -147,6 +153,7 @@ CONSTANTS: dict[str, str] = {
     "MIRROR_TOLERANCE": "1e-3",  # from a ground to where a rasterizer may see it, as a fraction of the scene
     "MIRROR_MARGIN": "1e-4",  # from a ground to where its mirrored rays start, as a fraction of the scene
     "PHOTON_WIDTH": f"{PHOTON_WIDTH}u",
+    "MOST_PHOTON_HITS": str(MOST_PHOTON_HITS),
     "SURFACE_OFFSET": "1e-6",  # from a surface to where the next segment of a ray starts, as a fraction of the scene
     "TOUCHING": "1e-6",  # axial depth between surfaces that count as one interface
     "LEAST_ACROSS": repr(LEAST_ACROSS),

@@ -14,6 +14,7 @@ from translucent.errors import InputError
 from translucent.formulas.light import ALL_AROUND
 from translucent.formulas.phase import ISOTROPIC
 from translucent.planning.bodies import count_of, indices
+from translucent.planning.hits import EMBREE_COST, HITS
 from translucent.planning.methods import Method
 from translucent.planning.methods.base import check_count
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
@@ -116,9 +117,9 @@ def check_caustics(scene: Scene, method: Method | None, lit: tuple[int, ...]) ->
 
 
 def passes_with_caustics(
-    passes: tuple[PassSpec, ...], scene: Scene, caustics: Caustics, lit: tuple[int, ...]
+    passes: tuple[PassSpec, ...], scene: Scene, caustics: Caustics, lit: tuple[int, ...], hits: str
 ) -> tuple[PassSpec, ...]:
-    """The passes of a plan in their order, with the passes that photons need."""
+    """The passes of a plan in their order, with the passes that photons need; `hits` is what finds their surfaces."""
     names = [one.name for one in passes]
     carries = next((name for name in _CARRYING if name in names), None)
     steps: list[PassSpec] = []
@@ -126,8 +127,9 @@ def passes_with_caustics(
         steps.append(_into_media(one, scene, lit, caustics) if lit and one.name is carries else one)
         if one.name is PassName.OPAQUE:
             opaque = indices(scene, lambda item: item.medium is None)
-            cost = caustics.cost_of_a_million * caustics.photons / 1e6
-            steps.append(PassSpec(PassName.CAUSTICS, _landing(scene, caustics), opaque, 1, cost=cost))
+            cost = caustics.cost_of_a_million * caustics.photons / 1e6 * (EMBREE_COST if hits == "embree" else 1.0)
+            reason = f"{_landing(scene, caustics)}; {HITS[hits]} finds what they hit"
+            steps.append(PassSpec(PassName.CAUSTICS, reason, opaque, 1, cost=cost))
         elif one.name is PassName.SHADE and scene.opaque:
             steps[-1] = _shaded_with(steps[-1], scene, caustics)
     return tuple(steps)

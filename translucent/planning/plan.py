@@ -413,9 +413,14 @@ def _with_caustics(found: RenderPlan, scene: Scene, caustics: Caustics, machine:
     volumes = found.treated(Treatment.VOLUME)
     lit = lit_by_photons(scene, found.treated(Treatment.VOLUME, Treatment.DIFFUSION))
     check_caustics(scene, found.request.method, lit)
+    hits, slower = found.hits, ""
+    if machine.opengl and scene.opaque and not hits:
+        hits, slower = chosen_hits("Caustics", None, machine.software, machine.shader_storage)
     return replace(
         found,
-        passes=passes_with_caustics(found.passes, scene, caustics, lit),
+        passes=passes_with_caustics(found.passes, scene, caustics, lit, hits),
+        hits=hits,
+        remarks=(*found.remarks, *([Note(NoteKind.SLOW_HITS, slower)] if slower else [])),
         unmodelled=(*found.unmodelled, *caustics_left_out(scene, lit, volumes, machine.opengl)),
         caustics=caustics,
         opaque_to_shadows=opaque_to_shadows(scene),

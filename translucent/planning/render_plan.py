@@ -99,7 +99,7 @@ class RenderPlan:
     interfaces : Interfaces, optional
         How interfaces are found; None where none changes light, or none is rendered.
     hits : str
-        What finds the surfaces that traced rays hit: "embree" or "gl"; empty where no rays are traced by OpenGL.
+        What finds the surfaces that traced rays and photons hit: "embree" or "gl"; empty where OpenGL traces neither.
     diffusion : Diffusion
         Grid of the bodies in which light diffuses.
     traced : bool

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -13,6 +15,7 @@ from translucent.gpu.constants import CONSTANTS, PHOTON_WIDTH
 from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import SURFACE_SAMPLERS, OpaquePass, set_surface, shadow_switches
+from translucent.gpu.passes.photon_streams import PhotonStreams
 from translucent.gpu.passes.traced_interfaces import RAY_SAMPLERS, ray_switches, traced_scene
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.shaders import set_uniform, set_used
@@ -33,20 +36,21 @@ BATCH = PHOTON_WIDTH * 512
 
 @dataclass(frozen=True, eq=False)
 class PhotonTracer:
-    """Everything for following the photons of a scene: aims, target for the hits of a batch, program and textures."""
+    """Everything for following the photons of a scene: aims, target for the hits of a batch, programs and textures."""
 
     aims: list[PhotonAim]
     landed: moderngl.Framebuffer
-    program: moderngl.Program
+    programs: Sequence[Any]
     textures: dict[str, moderngl.Texture]
 
 
 class CausticsPass:
-    """Photons that interfaces turn onto opaque objects; see ``shaders/transport/photons.frag``."""
+    """Photons that interfaces turn onto opaque objects; see ``shaders/transport/photon_step.glsl``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         self._photons = Variants(gl, "geometry/fullscreen.vert", "transport/photons.frag", *RAY_SAMPLERS)
+        self._streams = PhotonStreams(gl, self._photons.units, _LANDED)
         self._spread = Variants(gl, "geometry/fullscreen.vert", "shade/photon_spread.frag", *_RECEIVED)
         self._shade = Variants(
             gl, "geometry/fullscreen.vert", "shade/caustics.frag", *_RECEIVED, "photon_spread", "receiver_base"
@@ -79,11 +83,16 @@ class CausticsPass:
 
     def follow(self, job: FrameJob, tracer: PhotonTracer, number: int, begin: int, end: int) -> None:
         """Follow some photons of one aim, and add them to the pixels of the opaque points that they land on."""
-        self._aim(tracer.program, tracer.aims[number], number, job)
+        values = _aim_values(tracer.aims[number], number, job)
         for first in range(begin, end, BATCH):
             count = min(BATCH, end - first)
             self._photons.bind(**tracer.textures)
-            self._follow(tracer.program, tracer.landed, first, count)
+            for program in tracer.programs:
+                set_used(program, {**values, "first_photon": first, "last_photon": first + count})
+            if job.plan.hits == "embree":
+                self._streams.follow(job, tracer.programs, tracer.landed, count)
+            else:
+                self._follow(tracer.programs[0], tracer.landed, count)
             self._add(job, tracer.landed, count)
 
     def _landed(self, stack: ExitStack) -> moderngl.Framebuffer:
@@ -99,47 +108,29 @@ class CausticsPass:
             texture.filter = moderngl.NEAREST, moderngl.NEAREST
         return framebuffer
 
-    def _tracer(self, stack: ExitStack, job: FrameJob) -> tuple[moderngl.Program, dict[str, moderngl.Texture]]:
-        """Program that follows photons through the scene of a job, with its uniforms, and its textures."""
+    def _tracer(self, stack: ExitStack, job: FrameJob) -> tuple[Sequence[Any], dict[str, moderngl.Texture]]:
+        """Programs that follow photons through the scene of a job, with its uniforms, and their textures."""
         scene = job.scene
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
-        program = self._photons.program(
+        switches: dict[str, bool | int] = {
             **ray_switches(scene),
-            TEXTURED=job.features.textured,
-            EMISSION=False,
-            FROM_EYE=False,
-            LIGHTS=False,
-            ROUGH=any(surface.roughness > 0 for surface in surfaces),
-            DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
+            "TEXTURED": job.features.textured,
+            "EMISSION": False,
+            "FROM_EYE": False,
+            "LIGHTS": False,
+            "ROUGH": any(surface.roughness > 0 for surface in surfaces),
+            "DISPERSION": any(surface.dispersion > 0 for surface in surfaces),
             **coat_switches(scene.bodies),
-        )
+        }
+        by_embree = job.plan.hits == "embree"
+        programs = self._streams.programs(scene, switches) if by_embree else (self._photons.program(**switches),)
         textures, values = traced_scene(job, stack)
         assert job.plan.caustics is not None
-        set_used(program, {"seed": job.plan.caustics.seed, **values})
-        return program, textures
+        for program in programs:
+            set_used(program, {"seed": job.plan.caustics.seed, **values})
+        return programs, textures
 
-    def _aim(self, program: moderngl.Program, aim: PhotonAim, number: int, job: FrameJob) -> None:
-        assert job.plan.caustics is not None
-        entries = [*(i + 1 for i in aim.inside[:8]), *[0] * (8 - len(aim.inside[:8]))]
-        shift = np.random.default_rng((job.plan.caustics.seed, number)).random(2)
-        values = {
-            "aim": number,
-            "aim_shift": tuple(shift),
-            "light_from": tuple(aim.light),
-            "cone": tuple(aim.cone),
-            "light_radius": aim.light_radius,
-            "aim_middle": tuple(aim.middle),
-            "aim_right": tuple(aim.right),
-            "aim_up": tuple(aim.up),
-            "photon_power": tuple(aim.flux * (job.samples / aim.photons)),
-            "light_interior": tuple(low | high << 16 for low, high in zip(entries[::2], entries[1::2], strict=True)),
-        }
-        for name, value in values.items():
-            set_uniform(program, name, value)
-
-    def _follow(self, program: moderngl.Program, landed: moderngl.Framebuffer, first: int, count: int) -> None:
-        set_uniform(program, "first_photon", first)
-        set_uniform(program, "last_photon", first + count)
+    def _follow(self, program: moderngl.Program, landed: moderngl.Framebuffer, count: int) -> None:
         landed.scissor = 0, 0, PHOTON_WIDTH, -(-count // PHOTON_WIDTH)
         landed.use()
         self._gl.enable_only(moderngl.NOTHING)
@@ -212,3 +203,22 @@ class CausticsPass:
         job.targets.view("opaque", 1).use()
         add_up(self._gl)
         self._known.draw_fullscreen(program)
+
+
+def _aim_values(aim: PhotonAim, number: int, job: FrameJob) -> dict[str, Any]:
+    """Loose uniforms of photons with an aim of that number."""
+    assert job.plan.caustics is not None
+    entries = [*(i + 1 for i in aim.inside[:8]), *[0] * (8 - len(aim.inside[:8]))]
+    shift = np.random.default_rng((job.plan.caustics.seed, number)).random(2)
+    return {
+        "aim": number,
+        "aim_shift": tuple(shift),
+        "light_from": tuple(aim.light),
+        "cone": tuple(aim.cone),
+        "light_radius": aim.light_radius,
+        "aim_middle": tuple(aim.middle),
+        "aim_right": tuple(aim.right),
+        "aim_up": tuple(aim.up),
+        "photon_power": tuple(aim.flux * (job.samples / aim.photons)),
+        "light_interior": tuple(low | high << 16 for low, high in zip(entries[::2], entries[1::2], strict=True)),
+    }

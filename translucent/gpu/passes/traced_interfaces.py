@@ -297,6 +297,7 @@ def ray_switches(scene: Scene) -> dict[str, bool]:
     """Switches of the shaders that follow rays through a scene: how bodies overlap, and whether there is one object."""
     return {
         "ONE_OBJECT": len(scene.objects) == 1,
+        "ONE_SURFACE": len(scene.objects) == 1,
         "PRIORITY": scene.overlap == "priority",
         "UNION": scene.overlap == "union",
     }

@@ -1,0 +1,140 @@
+// The step of a photon of a light to the next surface (Jensen 1996, "Global illumination using photon maps"). Interfaces reflect or
+// refract it by chance as a path of light; what media absorb on the path is exact. It lands on the first opaque surface, if an
+// interface has refracted or reflected it: all others are straight light. Needs <constants>, <View>, <Surfaces> and <ObjectRow>.
+
+#include "lib/light.glsl"
+#include "lib/optics.glsl"
+#include "shade/interface_bsdf.glsl"
+#include "transport/random.glsl"
+#include "transport/hierarchy.glsl"
+#include "transport/interior_list.glsl"
+#include "transport/surface_hit.glsl"
+#include "transport/textured_hit.glsl"
+#include "transport/interaction.glsl"
+#include "transport/microfacets.glsl"
+#include "transport/sampled_branch.glsl"
+
+uniform uint aim;            // its number: a light, and a rectangle
+uniform vec2 aim_shift;      // where the sequence of starts begins
+uniform vec4 light_from;     // position from the center of the media, w = 1; or direction of travel, w = 0
+uniform vec4 cone;           // in which a light shines
+uniform float light_radius;  // of the sphere that it is; 0 for a light without size
+uniform vec3 aim_middle;     // of the rectangle that is aimed at
+uniform vec3 aim_right;      // half its sides; 0: all directions from the light
+uniform vec3 aim_up;
+uniform vec3 photon_power;   // of a photon; times cosine over squared distance where a point light aims at a rectangle
+uniform uvec4 light_interior;  // the bodies that the light is in
+uniform int all_closed;
+
+const float ROULETTE = 0.05;     // throughput below which a photon ends by Russian roulette, or goes on with this
+
+struct Photon {
+    vec3 origin;
+    float skipped;     // metres before its origin: from the surface, which it must not hit again
+    vec3 direction;
+    vec3 throughput;   // fraction of its power that is left
+    uvec4 interior;
+    bool bent;         // refracted or reflected
+    bool ends;
+};
+
+// An additive recurrence (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
+vec2 start_of(uint number) {
+    vec2 start = vec2(uvec2(number * 3242174889u, number * 2447445414u) >> 8u) / 16777216.0;
+    return fract(start + aim_shift);
+}
+
+// Number of the photon's channel of light, whose indices of refraction count.
+int channel_of(uint number) {
+#if DISPERSION
+    return int(number % 3u);
+#else
+    return 1;
+#endif
+}
+
+// A photon at the light, or where it comes near the scene; its power is that of its channel alone where indices differ.
+Photon begun(uint number, inout Draws draws, out vec3 power) {
+    vec2 start = start_of(number);
+    vec3 light_at = light_from.xyz;
+    if (light_radius > 0.0) { light_at += light_radius * sphere_point(random_numbers(draws).xyz); }
+    Photon photon = Photon(light_at, 0.0, light_from.xyz, vec3(1.0), light_interior, false, false);
+    power = photon_power;
+#if DISPERSION
+    power *= 3.0 * vec3(equal(ivec3(channel_of(number)), ivec3(0, 1, 2)));
+#endif
+    if (aim_right == vec3(0.0)) {
+        float up = 2.0 * start.x - 1.0;
+        float across = sqrt(max((1.0 - up) * (1.0 + up), 0.0));
+        photon.direction = vec3(across * cos(2.0 * PI * start.y), across * sin(2.0 * PI * start.y), up);
+        power *= cone_attenuation(photon.direction, cone);
+        return photon;
+    }
+    vec3 target = aim_middle + (2.0 * start.x - 1.0) * aim_right + (2.0 * start.y - 1.0) * aim_up;
+    float back = 2.0 * surface_reach;
+    if (light_from.w == 1.0) {
+        vec3 to_target = target - light_at;
+        float distance_m = length(to_target);
+        photon.direction = to_target / distance_m;
+        power *= abs(dot(photon.direction, normalize(cross(aim_right, aim_up)))) / distance_m / distance_m;
+        power *= cone_attenuation(photon.direction, cone);
+        back = min(back, distance_m);
+    }
+    photon.origin = target - back * photon.direction;
+    return photon;
+}
+
+// The interaction of a photon with an interface: one branch, by chance.
+void interact(inout Photon photon, SurfaceHit surface, ObjectRow body, int before, int after, int channel, inout Draws draws) {
+    vec3 normal = facing_normal(surface.smooth_normal, photon.direction);
+    vec3 point = photon.origin + surface.path * photon.direction;
+    Interaction at = interaction_at(surface, body, point, photon.direction, normal, before, after, channel);
+    vec4 numbers = random_numbers(draws);
+    vec3 emitted;
+    vec3 light_density;
+    Branch next = sampled_branch(at, body, polished_lobes(at, body, emitted), photon.throughput, numbers.x, vec3(0.0), draws, light_density);
+    photon.throughput *= next.weight;
+    if (next.transmitted) { photon.interior = surface.interior; }
+    photon.bent = photon.bent || !next.transmitted || (!at.thin_walled && at.ior != 1.0);
+    photon.direction = next.direction;
+    photon.origin = origin_beside(at.point, at.face_normal, photon.direction, photon.skipped);
+    float most = max(photon.throughput.r, max(photon.throughput.g, photon.throughput.b));
+    float lives = min(most / ROULETTE, 1.0);
+    photon.ends = next.lost || numbers.z >= lives;
+    photon.throughput /= max(lives, 1e-30);
+}
+
+// Where a photon lands.
+struct Landing {
+    vec3 point;   // from the center of the media
+    vec3 normal;  // of the face, to the side on which it lies
+    bool there;
+};
+
+// Follows a photon to the nearest surface, `hit`, and from there on; false where it ends there. landing: on what is opaque.
+bool follow(inout Photon photon, Hit hit, int channel, inout Draws draws, inout Landing landing) {
+    int before = effective_medium(photon.interior);
+    photon.throughput *= transmittance(medium_in(photon.interior, before).extinction * (hit.path + photon.skipped));
+    bool sound = true;
+    SurfaceHit surface = surface_hit(photon.origin, photon.direction, photon.interior, 0.0, hit, before, channel, sound);
+    if (!sound && (all_closed == 0 || is_full(surface.interior))) { return false; }
+    ObjectRow body = body_at(surface.object, surface.triangle, surface.weights, 0.0);
+    photon.throughput *= surface.transmittance;
+    if (photon.throughput == vec3(0.0)) { return false; }
+    if (int(body.type) == TYPE_OPAQUE && (surface.outside || body.one_sided == 0.0)) {
+        if (photon.bent) { landing = Landing(photon.origin + hit.path * photon.direction, surface.face_normal, true); }
+        return false;
+    }
+    // A loop in place of a branch: software rasterizers compute a branch for all, and leave a loop that none needs.
+    for (bool goes_on = true; goes_on; goes_on = false) {
+        int after = effective_medium(surface.interior);
+        if (int(body.type) != TYPE_THIN_WALL && !alters_light(before, after, channel)) {
+            vec3 point = photon.origin + surface.path * photon.direction;
+            photon.origin = origin_beside(point, surface.face_normal, photon.direction, photon.skipped);
+            photon.interior = surface.interior;
+        } else {
+            interact(photon, surface, body, before, after, channel, draws);
+        }
+    }
+    return !photon.ends;
+}
