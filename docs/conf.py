@@ -5,6 +5,10 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -50,7 +54,7 @@ add_module_names = False
 html_theme = "furo"
 html_static_path = ["_static"]
 html_css_files = ["math.css", "pages.css"]
-html_js_files = [("turn.js", {"defer": "defer"})]
+html_js_files = [("pages.js", {"defer": "defer"})]
 html_title = f"translucent {VERSION}"
 html_math_renderer = "mathml"
 html_show_sphinx = False
@@ -68,3 +72,14 @@ sphinx_gallery_conf = {
     "write_computation_times": False,
     "show_memory": False,
 }
+
+
+def name_levels(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: object) -> None:
+    """Give the captions of the navigation, which the theme makes headings, the level that headings need."""
+    tree = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
+
+
+def setup(app: Sphinx) -> None:
+    """Connect after the theme, whose navigation is changed."""
+    app.connect("html-page-context", name_levels, priority=900)

@@ -14,6 +14,7 @@ import pytest
 
 import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
+from translucent.cli import cli
 from translucent.commands.console import echo
 
 # Bad input
@@ -103,6 +104,16 @@ def test_help_is_no_error_and_every_verb_shows_an_example(run: Run, arguments: l
     assert "Usage: translucent" in result.out
     if len(arguments) > 1:
         assert f"Example: translucent {arguments[0]}" in result.out
+
+
+@pytest.mark.parametrize("verb", ["render", "explain", "bake", "page", "extinction"])
+def test_help_fits_a_screen_and_the_rest_is_one_option_away(run: Run, verb: str) -> None:
+    usual, whole = run(verb, "--help").out, run(verb, "--help-all").out
+    assert len(usual.splitlines()) <= 42
+    listed = {name for line in usual.splitlines() for name in re.findall(r"^  (?:-\w, )?(--[\w-]+)", line)}
+    known = {name for option in cli.commands[verb].params for name in option.opts}
+    assert "--help-all" in listed <= known
+    assert all(name in whole for name in known if name.startswith("--"))
 
 
 def test_the_version_is_told(run: Run) -> None:

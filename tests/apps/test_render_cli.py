@@ -22,7 +22,7 @@ GREEN = "linear(0.18,0.62,0.35)"
 
 
 def test_help_names_every_method(run: Run) -> None:
-    told = "".join(run("render", "--help").out.split())  # lines are broken at hyphens, too
+    told = "".join(run("render", "--help-all").out.split())  # lines are broken at hyphens, too
     assert [name for name in METHODS if name not in told] == []
 
 

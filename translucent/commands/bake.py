@@ -21,6 +21,7 @@ from translucent.commands.options import (
     AnyMediumOptions,
     FileOptions,
     MediumOptions,
+    VerbCommand,
     group,
     option,
     overwrite_option,
@@ -118,7 +119,11 @@ class BakeOptions:
     overwrite: bool = overwrite_option()
 
 
-@click.command(epilog="Example: translucent bake bear -o thickness.exr --size 128 --rays 16")
+@click.command(
+    cls=VerbCommand,
+    usual="output mode size rays unit height preset high vertices invert check out_dir",
+    epilog="Example: translucent bake bear -o thickness.exr --size 128 --rays 16",
+)
 @click.argument("models", nargs=-1, required=True, metavar="MODEL...")
 @takes(BakeOptions)
 def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:

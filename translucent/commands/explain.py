@@ -15,6 +15,7 @@ from translucent.commands.options import (
     BodyOptions,
     ChoiceOptions,
     FileOptions,
+    VerbCommand,
     common_options,
     group,
     option,
@@ -46,7 +47,11 @@ class ExplainOptions:
     choices: _ExplainedChoices = group(_ExplainedChoices, without=("thickness", "adaptive"))
 
 
-@click.command(epilog="Example: translucent explain goblet")
+@click.command(
+    cls=VerbCommand,
+    usual="color distance preset height stage method as_json",
+    epilog="Example: translucent explain goblet",
+)
 @click.argument("model")
 @takes(ExplainOptions)
 def explain(model: str, given: ExplainOptions, as_json: bool) -> None:

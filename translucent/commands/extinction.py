@@ -19,6 +19,7 @@ from translucent.commands.options import (
     FileOptions,
     MediumOptions,
     NamesOf,
+    VerbCommand,
     clamp_option,
     clamped,
     option,
@@ -106,7 +107,11 @@ class ExtinctionOptions:
     allow_outside: bool = outside_option()
 
 
-@click.command(epilog="Example: translucent extinction '#7b1e3a' 1cm")
+@click.command(
+    cls=VerbCommand,
+    usual="unit target fit preset source td as_json",
+    epilog="Example: translucent extinction '#7b1e3a' 1cm",
+)
 @click.argument("color", required=False)
 @click.argument("distance", required=False)
 @takes(ExtinctionOptions)

@@ -23,6 +23,7 @@ from translucent.commands.options import (
     BodyOptions,
     CameraOptions,
     FileOptions,
+    VerbCommand,
     collected,
     roughness_option,
     with_options,
@@ -380,7 +381,7 @@ class _ObjectOptions(BodyOptions):
 _of_one_object = click.command("object")(with_options(_ObjectOptions, lambda **_: None))
 
 
-class ObjectCommand(click.Command):
+class ObjectCommand(VerbCommand):
     """Verb in which the options of a medium belong to the ``--object`` before them; before the first, to all others."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

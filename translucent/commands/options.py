@@ -56,6 +56,9 @@ Verb = Callable[..., Any]
 Value = TypeVar("Value")
 
 
+#: Name of the parameter, and key of a context, that shows all options.
+_HELP_ALL = "help_all"
+
 #: Key under which a verb finds whether it may replace a file that it reads.
 _OVERWRITE = "translucent.overwrite"
 
@@ -95,6 +98,37 @@ def takes(kind: type) -> Callable[[Verb], Verb]:
         return with_options(kind, common_options(collecting))
 
     return decorate
+
+
+class VerbCommand(click.Command):
+    """Command whose ``--help`` lists its usual options; ``--help-all`` lists all of them.
+
+    Parameters
+    ----------
+    *arguments, **more
+        As of `click.Command`.
+    usual : str
+        Names of the usual options as parameters, with spaces between them.
+    """
+
+    def __init__(self, *arguments: Any, usual: str, **more: Any) -> None:
+        super().__init__(*arguments, **more)
+        self._usual = [*usual.split(), _HELP_ALL]
+        shown = click.Option(["--help-all"], is_flag=True, is_eager=True, expose_value=False, help="Show all options.")
+        shown.callback = self._show_all
+        self.params.append(shown)
+
+    def _show_all(self, ctx: click.Context, _: click.Parameter, requested: bool) -> None:
+        if requested:
+            ctx.meta[_HELP_ALL] = True
+            echo(ctx.get_help())
+            ctx.exit()
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the usual options, or all of them, in their order."""
+        shown = [one for one in self.get_params(ctx) if ctx.meta.get(_HELP_ALL) or one.name in self._usual]
+        with formatter.section("Options" if ctx.meta.get(_HELP_ALL) else "Usual options"):
+            formatter.write_dl([record for one in shown if (record := one.get_help_record(ctx)) is not None])
 
 
 def with_options(kind: type, verb: Verb) -> Verb:

@@ -154,7 +154,9 @@ class RenderOptions:
 
 
 @click.command(
-    cls=ObjectCommand, epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm"
+    cls=ObjectCommand,
+    usual="output color distance preset object_names height size orbit stage samples transparent turntable",
+    epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm",
 )
 @click.argument("model")
 @takes(RenderOptions)

@@ -26,6 +26,7 @@ from translucent.commands.options import (
     ChoiceOptions,
     FileOptions,
     LookOptions,
+    VerbCommand,
     group,
     option,
     overwrite_option,
@@ -160,7 +161,11 @@ class PageOptions:
     verbose: bool = verbose_option()
 
 
-@click.command(epilog="Example: translucent page goblet -o goblet.html --color '#7b1e3a' --distance 1cm")
+@click.command(
+    cls=VerbCommand,
+    usual="output color distance preset height size orbit stage roughness title simplify",
+    epilog="Example: translucent page goblet -o goblet.html --color '#7b1e3a' --distance 1cm",
+)
 @click.argument("model")
 @takes(PageOptions)
 def page(model: str, given: PageOptions, as_json: bool) -> None:

@@ -13,3 +13,13 @@ for (const link of document.querySelectorAll("a.turn")) {
     link.parentElement.remove();
   });
 }
+
+// What scrolls sideways can be reached by the keyboard.
+function reachScrolling() {
+  for (const box of document.querySelectorAll("article pre, article .table-wrapper, article div.math")) {
+    if (box.scrollWidth > box.clientWidth) box.tabIndex = 0;
+    else box.removeAttribute("tabindex");
+  }
+}
+reachScrolling();
+addEventListener("resize", reachScrolling);
