@@ -4,6 +4,7 @@ const uint FLAG_FOLLOWED = 1u << 16;   // it has begun, and not ended
 const uint FLAG_BENT = 1u << 17;       // it has interacted, or been scattered
 const uint FLAG_REFLECTED = 1u << 18;  // it sees the environment as a light
 const uint FLAG_CAREFUL = 1u << 19;    // the driver has cut it short: one event in each pass
+const uint FLAG_SEES_LIGHTS = 1u << 20;  // it has been bent or mirrored since a ray was drawn to a light, and may hit one
 const uint DEPTH_BITS = 0xffffu;
 
 struct Path {

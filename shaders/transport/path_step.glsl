@@ -2,7 +2,8 @@
 // estimator is that of translucent/reference/path_trace.py, but for what follows here. The channels of light take one path
 // together: how far they fly is drawn for one of them, chosen by what it carries, and weighted with the balance heuristic
 // over all (Veach & Guibas 1995; Wilkie et al. 2014), so that together they never carry more than before. What media absorb
-// and emit on a segment is exact. Needs <constants>, <View>, <Environment>, <Surfaces> and <ObjectRow>.
+// and emit on a segment is exact. Needs <constants>, <View>, <Environment>, <Surfaces> and <ObjectRow>. PICTURED: opaque objects
+// whose textures rays do not read are taken from their picture where paths hit them first. BASES: interfaces have diffuse bases.
 
 #include "lib/optics.glsl"
 #include "lib/phase.glsl"
@@ -29,13 +30,13 @@ uniform ivec2 tile_origin;   // of the texels in the picture, from its top left 
 uniform uint last_path;      // how many paths of each pixel are to end
 uniform int spread;          // 1: paths start all over their pixels, and not at one place in them
 uniform int all_closed;      // 1: no solid has holes: what seems to leave through one passes an edge by rounding
+uniform float path_start;    // axial depth at which paths begin: before all objects
 
 const int CHANNEL = 1;             // whose indices of refraction count
 const float ROULETTE = 0.1;       // throughput below which paths end by Russian roulette, or go on with this
 const int MANY_INTERFACES = 256;  // after which they end so whatever they carry: total reflection may hold light for ever
 const float GOES_ON = 0.95;
 const uint MOST_DRAWN = 1u << 22;
-const float EYE_MARGIN = 1e-3;    // axial depth before the media at which paths begin
 
 // Place in the picture at which a path starts: an additive recurrence (Roberts 2018, "The unreasonable effectiveness of
 // quasirandom sequences").
@@ -64,6 +65,7 @@ vec3 environment_radiance(Path path, vec2 pixel) {
 #endif
 }
 
+#if BASES
 // Irradiance on a diffuse base, as far as lights reach it.
 vec3 unblocked_irradiance(vec3 point, vec3 normal) {
     vec3 sum = environment_irradiance(normal);
@@ -78,8 +80,20 @@ vec3 unblocked_irradiance(vec3 point, vec3 normal) {
 #endif
     return sum;
 }
+#endif
 
 #include "transport/opaque_objects.glsl"
+#include "transport/sampled_opaque.glsl"
+
+// A ray towards one of the lights: nothing is known yet of what is on it. weight: light at its end times the throughput.
+struct LightRay {
+    vec3 origin;
+    float skipped;   // metres between the place that is lit and the origin
+    uvec4 interior;
+    vec3 towards;
+    float distance_m;
+    vec3 weight;
+};
 
 // Fraction of the light of each channel that the media of a place turn by an angle, in 1/sr.
 vec3 phase_of(uvec4 interior, int effective, vec3 scattering, float cosine) {
@@ -130,7 +144,7 @@ void play_roulette(inout Path path, float number) {
 
 void begin_path(inout Path path, vec2 pixel, ivec2 texel) {
     vec3 direction = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
-    path = Path(point_at(pixel, max(-EYE_MARGIN, surface_eye_axial_depth)), 0.0, direction, vec3(1.0), vec3(0.0), uvec4(0u),
+    path = Path(point_at(pixel, path_start), 0.0, direction, vec3(1.0), vec3(0.0), uvec4(0u),
         FLAG_FOLLOWED, 0, false, false);
 #if FROM_EYE
     if (start_interior.x != 0u) {
@@ -138,12 +152,6 @@ void begin_path(inout Path path, vec2 pixel, ivec2 texel) {
         path.skipped = 2.0 * SURFACE_OFFSET * surface_reach;
         path.origin = eye + path.skipped * direction;
         path.interior = interior_at_eye(eye, direction, path.skipped);
-    }
-#endif
-#if OPAQUE
-    if (texelFetch(opaque_axial_depth, stored(texel), 0).r < max(-EYE_MARGIN, surface_eye_axial_depth)) {
-        path.light = texelFetch(opaque_radiance, stored(texel), 0).rgb;
-        path.ends = true;
     }
 #endif
 }
@@ -157,9 +165,9 @@ LightSample light_drawn(int number, vec3 point, inout Draws draws) {
     return light_sample(light, point);
 }
 
-// Turns a path where media scatter it, and adds light of one of the lights there.
-void scatter(inout Path path, Medium medium, int effective, inout Draws draws) {
-    path.flags |= FLAG_BENT | FLAG_REFLECTED;
+// Turns a path where media scatter it, and finds a ray to one of the lights there.
+void scatter(inout Path path, Medium medium, int effective, inout Draws draws, inout LightRay lit) {
+    path.flags = (path.flags | FLAG_BENT | FLAG_REFLECTED) & ~FLAG_SEES_LIGHTS;
     path.skipped = 0.0;
     vec4 numbers = random_numbers(draws);
 #if LIGHTS
@@ -167,8 +175,8 @@ void scatter(inout Path path, Medium medium, int effective, inout Draws draws) {
     numbers.x = fract(numbers.x * float(light_count));
     LightSample arriving = light_drawn(light, path.origin, draws);
     vec3 phase = phase_of(path.interior, effective, medium.scattering, dot(arriving.towards, path.direction));
-    vec3 through = straight_transmittance(path.origin, 0.0, path.interior, arriving.towards, arriving.distance_m, CHANNEL);
-    path.light += path.throughput * phase * through * arriving.irradiance * float(light_count);
+    vec3 weight = path.throughput * phase * arriving.irradiance * float(light_count);
+    lit = LightRay(path.origin, 0.0, path.interior, arriving.towards, arriving.distance_m, weight);
 #endif
     vec4 phase_function = chosen_phase(path.interior, effective, medium.scattering, path.throughput, numbers.x);
     vec3 before = path.direction;
@@ -181,9 +189,9 @@ void scatter(inout Path path, Medium medium, int effective, inout Draws draws) {
     play_roulette(path, numbers.w);
 }
 
-// Adds the light of one of the lights that the microfacets of a rough interface scatter into the path. light_density: of
+// The ray to one of the lights whose light the microfacets of a rough interface scatter into the path. light_density: of
 // scattering, in 1/sr.
-void add_light_at_facets(inout Path path, Interaction at, SurfaceHit surface, LightSample arriving, vec3 light_density) {
+void light_at_facets(Path path, Interaction at, SurfaceHit surface, LightSample arriving, vec3 light_density, inout LightRay lit) {
 #if LIGHTS
     // Light that comes from the other side of the face than of the smooth surface does not exist.
     float side = dot(arriving.towards, at.normal) < 0.0 ? -1.0 : 1.0;
@@ -191,23 +199,24 @@ void add_light_at_facets(inout Path path, Interaction at, SurfaceHit surface, Li
     if (light_density == vec3(0.0) || side * across <= 0.0) { return; }
     float skipped;
     vec3 origin = origin_beside(at.point, at.face_normal, arriving.towards, skipped);
-    vec3 through = straight_transmittance(origin, skipped, side > 0.0 ? path.interior : surface.interior, arriving.towards,
-        arriving.distance_m - skipped, CHANNEL);
     vec3 passing = side > 0.0 ? vec3(1.0) : passing_base(at);
-    path.light += path.throughput * passing * through * arriving.irradiance * light_density * float(light_count);
+    vec3 weight = path.throughput * passing * arriving.irradiance * light_density * float(light_count);
+    lit = LightRay(origin, skipped, side > 0.0 ? path.interior : surface.interior, arriving.towards, arriving.distance_m - skipped, weight);
 #endif
 }
 
 // Adds the radiance of the diffuse base, for the fraction of the light that comes to it: whatever the path does next.
 void add_base(inout Path path, Interaction at, ObjectRow body, vec3 arriving) {
+#if BASES
     if (at.transmission == 1.0 || arriving == vec3(0.0)) { return; }
     vec3 base = diffuse_radiance(unblocked_irradiance(at.point, at.normal), unblocked_irradiance(at.point, -at.normal), at.color,
         body.passed, body.passed_share);
     path.light += path.throughput * arriving * (1.0 - at.transmission) * base;
+#endif
 }
 
 // The interaction of a path with an interface: one branch, by chance.
-void interact(inout Path path, SurfaceHit surface, ObjectRow body, int before, int after, inout Draws draws) {
+void interact(inout Path path, SurfaceHit surface, ObjectRow body, int before, int after, inout Draws draws, inout LightRay lit) {
     vec3 normal = facing_normal(surface.smooth_normal, path.direction);
     vec3 point = path.origin + surface.path * path.direction;
     Interaction at = interaction_at(surface, body, point, path.direction, normal, before, after, CHANNEL);
@@ -223,7 +232,12 @@ void interact(inout Path path, SurfaceHit surface, ObjectRow body, int before, i
 #endif
     vec3 light_density;
     Branch next = sampled_branch(at, body, lobes, path.throughput, numbers.x, arriving.towards, draws, light_density);
-    add_light_at_facets(path, at, surface, arriving, light_density);
+    light_at_facets(path, at, surface, arriving, light_density, lit);
+    if (!next.polished) {
+        path.flags &= ~FLAG_SEES_LIGHTS;
+    } else if (at.ior != 1.0) {
+        path.flags |= FLAG_SEES_LIGHTS;
+    }
     add_base(path, at, body, next.on_base);
     path.throughput *= next.weight;
     if (next.transmitted) {
@@ -268,21 +282,61 @@ float drawn_flight(Path path, Medium medium, inout Draws draws, out int channel)
     return NOTHING;
 }
 
-// Ends a path at an opaque object.
-void end_at_object(inout Path path, SurfaceHit surface, ObjectRow body, vec3 point, vec2 pixel, ivec2 texel) {
-    path.ends = true;
-#if OPAQUE
-    if ((path.flags & FLAG_BENT) == 0u) {
-        path.light += path.throughput * background(pixel, path.direction, stored(texel));
-        return;
+// The interaction of a path with an opaque object: one lobe of its bsdf, by chance; and a ray to one of the lights.
+void interact_opaque(inout Path path, SurfaceHit surface, ObjectRow body, vec3 point, inout Draws draws, inout LightRay lit) {
+    vec3 normal = body.plain == 1.0 ? surface.face_normal : facing_normal(surface.smooth_normal, path.direction);
+    float cos_view = clamp(-dot(normal, path.direction), 1e-3, 1.0);
+    OpaqueSurface opaque = opaque_surface(body, normal, point);
+    OpaqueBsdf bsdf = opaque_bsdf(opaque, cos_view);
+    vec4 numbers = random_numbers(draws);
+    path.flags = (path.flags | FLAG_BENT | FLAG_REFLECTED) & ~FLAG_SEES_LIGHTS;
+    ++path.depth;
+    path.light += path.throughput * (1.0 - bsdf.coated) * opaque.emitted;
+#if LIGHTS
+    LightSample arriving = light_drawn(min(int(numbers.x * float(light_count)), light_count - 1), point, draws);
+    numbers.x = fract(numbers.x * float(light_count));
+    arriving.disc = vec4(0.0);  // it comes from one point of it
+    float cos_light = dot(normal, arriving.towards);
+    if (cos_light * dot(surface.face_normal, arriving.towards) > 0.0) {
+        vec3 value = cos_light > 0.0 ? opaque_value(bsdf, normal, -path.direction, arriving, cos_view, cos_light)
+            : (1.0 - bsdf.coated) * bsdf.passed / PI;
+        float skipped;
+        vec3 origin = origin_beside(point, surface.face_normal, arriving.towards, skipped);
+        vec3 weight = path.throughput * value * abs(cos_light) * arriving.irradiance * float(light_count);
+        lit = LightRay(origin, skipped, path.interior, arriving.towards, arriving.distance_m - skipped, weight);
     }
 #endif
-    vec3 normal = body.plain == 1.0 ? surface.face_normal : facing_normal(surface.smooth_normal, path.direction);
-    path.light += path.throughput * opaque_light(body, normal, path.direction, point);
+    bool transmitted;
+    path.throughput *= sampled_opaque(bsdf, normal, path.throughput, numbers.xyz, path.direction, transmitted);
+    path.direction = kept_on_side(path.direction, transmitted ? -surface.face_normal : surface.face_normal);
+    path.origin = origin_beside(point, surface.face_normal, path.direction, path.skipped);
+    play_roulette(path, numbers.w);
 }
 
-// Follows a path to its next event or surface. GIVEN_HITS: `hit` is the nearest surface; else it is looked for.
-void follow(inout Path path, Hit hit, vec2 pixel, ivec2 texel, inout Draws draws) {
+// Radiance of lights with a size that a path hits before a distance, where no ray to them has been drawn. flight: in metres, drawn
+// for a channel, to where media scatter it.
+vec3 lights_hit(Path path, Medium medium, float end, int channel) {
+    vec3 sum = vec3(0.0);
+#if LIGHTS && SPHERES
+    if ((path.flags & FLAG_SEES_LIGHTS) == 0u) { return sum; }
+    for (int i = 0; i < light_count; ++i) {
+        Light light = light_row(i);
+        vec3 middle = light.position.xyz + light.disc.xyz - path.origin;
+        float along = dot(middle, path.direction), radius = light.disc.w;
+        vec3 aside = middle - along * path.direction;
+        float within = radius * radius - dot(aside, aside);
+        float distance_m = along - sqrt(max(within, 0.0)) + path.skipped;
+        if (within <= 0.0 || distance_m <= 0.0 || distance_m >= end) { continue; }
+        Path there = path;
+        attenuate(there, medium, false, distance_m, channel);
+        sum += there.throughput * light.power / (PI * radius * radius);
+    }
+#endif
+    return sum;
+}
+
+// Follows a path to its next event or surface, where a ray to one of the lights may begin.
+void follow_to_event(inout Path path, Hit hit, vec2 pixel, ivec2 texel, inout Draws draws, inout LightRay lit) {
     int before = effective_medium(path.interior);
     Medium medium = medium_in(path.interior, before);
     int channel;
@@ -304,6 +358,7 @@ void follow(inout Path path, Hit hit, vec2 pixel, ivec2 texel, inout Draws draws
     bool collides = flight < surface_path;
     vec3 event = path.origin + max(min(flight - path.skipped, hits ? hit.path - margin : NOTHING), 0.0) * path.direction;
     bool astray = path.interior.x != 0u && !hits && (!collides || length(event) > surface_reach);
+    path.light += lights_hit(path, medium, min(flight, hits ? surface_path : NOTHING), channel);
     if (astray && all_closed == 1) {
         path.interior = uvec4(0u);
     } else {
@@ -318,7 +373,7 @@ void follow(inout Path path, Hit hit, vec2 pixel, ivec2 texel, inout Draws draws
         }
         if (collides) {
             path.origin = event;
-            scatter(path, medium, before, draws);
+            scatter(path, medium, before, draws, lit);
             return;
         }
     }
@@ -334,7 +389,15 @@ void follow(inout Path path, Hit hit, vec2 pixel, ivec2 texel, inout Draws draws
     path.light += path.throughput * surface.emitted;
     path.throughput *= surface.transmittance;
     if (int(body.type) == TYPE_OPAQUE && (surface.outside || body.one_sided == 0.0)) {
-        end_at_object(path, surface, body, path.origin + hit.path * path.direction, pixel, texel);
+#if PICTURED
+        if ((path.flags & FLAG_BENT) == 0u && !reads_all_textures(surface.object)) {
+            path.light += path.throughput * background(pixel, path.direction, stored(texel));
+            path.ends = true;
+            return;
+        }
+#endif
+        interact_opaque(path, surface, body, path.origin + hit.path * path.direction, draws, lit);
+        path.ends = path.ends || path.lost;
         return;
     }
     int after = effective_medium(surface.interior);
@@ -342,7 +405,19 @@ void follow(inout Path path, Hit hit, vec2 pixel, ivec2 texel, inout Draws draws
         path.origin = origin_beside(path.origin + surface.path * path.direction, surface.face_normal, path.direction, path.skipped);
         path.interior = surface.interior;
     } else {
-        interact(path, surface, body, before, after, draws);
+        interact(path, surface, body, before, after, draws, lit);
     }
     path.ends = path.ends || path.lost || path.throughput == vec3(0.0);
+}
+
+// Follows a path to its next event or surface, and adds the light of one of the lights there. GIVEN_HITS: `hit` is the nearest
+// surface; else it is looked for.
+void follow(inout Path path, Hit hit, vec2 pixel, ivec2 texel, inout Draws draws) {
+    LightRay lit = LightRay(vec3(0.0), 0.0, uvec4(0u), vec3(0.0), 0.0, vec3(0.0));
+    follow_to_event(path, hit, pixel, texel, draws, lit);
+#if LIGHTS
+    if (lit.weight != vec3(0.0)) {
+        path.light += lit.weight * straight_transmittance(lit.origin, lit.skipped, lit.interior, lit.towards, lit.distance_m, CHANNEL);
+    }
+#endif
 }

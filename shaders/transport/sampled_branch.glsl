@@ -7,6 +7,7 @@ struct Branch {
     vec3 on_base;      // factor of what comes to the base, of all light or of this branch's
     bool transmitted;
     bool lost;         // among very many microfacets
+    bool polished;     // in one direction alone
 };
 
 // Whether light walks among microfacets; an interface without a step in ior is smooth.
@@ -40,6 +41,7 @@ Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughp
     out vec3 light_density) {
     Branch branch;
     branch.lost = false;
+    branch.polished = true;
     light_density = vec3(0.0);
     vec3 passing = passing_base(at);
 #if ROUGH
@@ -54,6 +56,7 @@ Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughp
         vec3 weight;
         vec3 local = scattered_at_microfacets(at.direction * frame, rough, throughput, to_light * frame, draws, weight, light_density);
         branch.lost = local == vec3(0.0);
+        branch.polished = false;
         branch.transmitted = local.z < 0.0;
         branch.weight = branch.transmitted ? weight * passing : weight;
         branch.on_base = branch.transmitted ? weight : vec3(0.0);

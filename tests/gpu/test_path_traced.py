@@ -135,6 +135,46 @@ def test_lossless_bodies_vanish_in_a_furnace(renderer: tl.Renderer) -> None:
     require_normal(scores(frame.radiance - 1.0, np.square(frame.standard_error, dtype=np.float64)))
 
 
+def test_a_room_lights_itself(renderer: tl.Renderer) -> None:
+    """Walls of albedo a that emit L, and a lossless body: L / (1 - a) everywhere, of all bounces."""
+    walls = tl.Surface(color=(0.5, 0.2, 0.8), ior=1.0, emissive=(1.0, 0.5, 0.25))
+    room = tl.Object(Box((-3, -3, -3), (3, 3, 3)).tessellate(), surface=walls)
+    camera = tl.Camera.look_at((1, 1, 2.5), (0, 0, 0))
+    scene = tl.Scene([ball(tl.Medium(0.0, 3.0, ior=1.5)), room], camera, [], BLACK)
+    frame = renderer.render(scene, SIZE, tl.PathTraced(300))
+    np.testing.assert_allclose(frame.radiance.mean(axis=(0, 1)), (2.0, 0.625, 1.25), rtol=5e-3)
+
+
+def test_opaque_surfaces_take_nothing_in_a_furnace(renderer: tl.Renderer) -> None:
+    """White grounds are exact; metal and coats, but for Schlick's microfacets and the fit of their albedo."""
+    wax = ball(tl.Medium(0.0, 3.0))
+    looks = {1e-6: tl.Surface(ior=1.0), 0.03: tl.Surface(metallic=1.0, roughness=0.3), 0.031: tl.Surface(roughness=0.4)}
+    for most, look in looks.items():
+        scene = tl.Scene([wax, tl.Object(FLOOR, surface=look)], CAMERA, [], WHITE)
+        frame = renderer.render(scene, SIZE, tl.PathTraced(400))
+        assert abs(frame.radiance.mean() - 1.0) < most, look
+
+
+def test_a_lamp_with_a_size_is_found_through_what_bends(renderer: tl.Renderer) -> None:
+    """Rays to it and hits of it, none counted twice: against a ball that shines, which paths only hit."""
+    lamp = tl.SphereLight.from_radiance((0.0, 2.2, 0.0), 3.0, 0.8)
+    shining = tl.Surface(color=(0, 0, 0), ior=1.0, emissive=(3, 3, 3))
+    globe = tl.Object(Sphere((0.0, 2.2, 0.0), 0.8).tessellate(24), surface=shining)
+    walls = tl.Surface(color=(0.2, 0.2, 0.2), ior=1.0)
+    grey = tl.Object(Box((-3, -3, -3), (3, 4, 3)).tessellate(), surface=walls)
+    camera = tl.Camera.look_at((1, 0.5, 2.5), (0, -2, 0), fov_y=50)
+    for surface in (None, FROSTED):
+        glass = ball(tl.Medium(ior=1.5), surface)
+        one, other = (
+            renderer.render(tl.Scene([glass, grey, *more], camera, lights, BLACK), SIZE, tl.PathTraced(1500))
+            for more, lights in (([], [lamp]), ([globe], []))
+        )
+        error = [np.sqrt(np.square(f.standard_error, dtype=np.float64).mean() / 64) for f in (one, other)]
+        off = one.radiance.mean(dtype=np.float64) - other.radiance.mean(dtype=np.float64)
+        assert abs(off) < 4.0 * np.hypot(*error)
+        assert np.hypot(*error) < 0.04 * other.radiance.mean()
+
+
 def test_a_dark_pane_in_closed_form(renderer: tl.Renderer) -> None:
     """Russian roulette ends most of the little that goes through; the rest makes up for it."""
     medium = tl.Medium((3.0, 4.0, 5.0), ior=1.5)
@@ -177,10 +217,11 @@ def test_seeds_differ_by_the_standard_error_which_falls_with_the_root_of_their_n
 
 
 def test_where_nothing_is_left_to_chance_one_path_tells_all(renderer: tl.Renderer) -> None:
-    """Bodies that only absorb and emit, with smooth edges: the picture of other methods, without noise."""
+    """Bodies that only absorb and emit, before what is black: the picture of other methods, without noise."""
     medium = tl.Medium((0.5, 1.0, 2.0), 0.0, (0.1, 0.2, 0.3))
-    scene = tl.Scene([ball(medium), tl.Object(FLOOR)], CAMERA, [SUN], tl.Environment.checkerboard())
-    frame, usual = (renderer.render(scene, (24, 24), method, samples=4) for method in (tl.PathTraced(64), None))
+    black = tl.Object(FLOOR, surface=tl.Surface(color=(0, 0, 0), ior=1.0, emissive=(0.2, 0.4, 0.3)))
+    scene = tl.Scene([ball(medium), black], CAMERA, [SUN], tl.Environment.checkerboard())
+    frame, usual = (renderer.render(scene, (24, 24), method) for method in (tl.PathTraced(64), None))
     assert frame.standard_error is not None
     # Those see faces where the rasterizer moves them, by up to 1/256 of a pixel.
     difference = np.abs(frame.radiance - usual.radiance)

@@ -131,20 +131,29 @@ def test_unscattered_light_knows_its_media() -> None:
 
 
 def test_surfaces_are_what_they_are_to_the_ray_tree() -> None:
-    """Paint, tints, sheets with interfaces, layers, and opaque bodies with lights on them."""
+    """Paint, tints, sheets with interfaces, layers, and an opaque body that shines: the tree ends there."""
     paint = Surface(transmission=0.4, color=(0.9, 0.5, 0.2), diffuse_transmission=0.3)
     pane = box((-1.5, -1.2, -2.0), (1.5, 1.2, -1.9))
     objects = [
         Object(BALL, Medium((0.1, 0.4, 0.9), ior=1.5), surface=paint),
         Object(RING, Medium((0.5, 0.2, 0.1), ior=1.4), sheet_thickness=0.1, surface=Surface(color=(0.5, 1.0, 0.8))),
         Object(pane, Medium(), sheet_thickness=0.1, surface=Surface(opacity=0.5, color=(0.2, 0.3, 0.9))),
-        Object(box((-3, -3, -4), (3, -1.3, 4)), color=(0.7, 0.6, 0.3)),
+        Object(box((-3, -3, -4), (3, -1.3, 4)), surface=Surface(color=(0, 0, 0), emissive=(0.7, 0.6, 0.3))),
     ]
     lights = [SUN, PointLight((2.0, 2.0, 3.0), 8.0)]
     scene = Scene(objects, CAMERA, lights, Environment.checkerboard((1.0, 0.4, 0.1), (0.1, 0.5, 0.9)))
     tree, _ = refracted_light(scene, (10, 8), bounces=12)
     frame, error = path_trace(scene, (10, 8), paths=100)
     assert_agree(frame, error, tree.radiance.reshape(8, 10, 3), 3.0 * tree.residual.reshape(8, 10, 3))
+
+
+def test_a_room_lights_itself() -> None:
+    """Walls of albedo a that emit L, and a lossless body: L / (1 - a) everywhere, of all bounces."""
+    walls = Surface(color=(0.5, 0.2, 0.8), emissive=(1.0, 0.5, 0.25))
+    room = Object(box((-3, -3, -3), (3, 3, 3)), surface=walls)
+    scene = Scene([Object(BALL, Medium(0.0, 3.0, ior=1.5)), room], Camera.look_at((1, 1, 2.5), (0, 0, 0)), [], BLACK)
+    frame, error = path_trace(scene, (6, 6), paths=60)
+    assert_agree(frame, error, np.broadcast_to(np.array([2.0, 0.625, 1.25]), (6, 6, 3)))
 
 
 def test_lights_go_straight_where_no_interface_bends_them() -> None:

@@ -21,6 +21,7 @@ from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Light, Object, Scene
+from translucent.scene.surface import Surface
 
 Array = npt.NDArray[np.float64]
 CAMERA = Camera.look_at((0.4, 0.5, 3.0), (0, 0, 0), fov_y=25)
@@ -107,8 +108,9 @@ def test_more_events_bring_more_light() -> None:
 
 
 def test_without_events_it_is_what_is_seen_through() -> None:
-    """A backdrop of squares is where it is, and opaque objects send back what they do elsewhere."""
-    rock = Object(Box((-0.2, -0.3, -2.0), (0.4, 0.3, -1.5)).tessellate(), color=(0.2, 0.6, 0.9))
+    """A backdrop of squares is where it is, and an opaque object shines as it does elsewhere."""
+    shining = Surface(color=(0, 0, 0), emissive=(0.2, 0.6, 0.9))
+    rock = Object(Box((-0.2, -0.3, -2.0), (0.4, 0.3, -1.5)).tessellate(), surface=shining)
     scene = Scene([Object(BOX, Medium((0.5, 1, 2))), rock], CAMERA, [SUN], Environment.checkerboard("red", "white"))
     frame, _ = path_trace(scene, (8, 6), paths=4)
     np.testing.assert_allclose(frame.radiance, render(scene, (8, 6)).radiance, rtol=1e-9)

@@ -60,13 +60,21 @@ def test_nobody_gets_paths_unasked() -> None:
         ([body(surface=Surface(dispersion=1.0))], NoteKind.REFRACTION, "bend all colors alike"),
         ([body(surface=Surface(clearcoat=0.5, clearcoat_roughness=0.2))], NoteKind.COATS, "roughness of clear coats"),
         ([body(surface=Surface(emissive=(1, 1, 1)))], NoteKind.GLOW, "surfaces that emit"),
-        ([body(), body(None, 2.0)], NoteKind.SHADOWS, "opaque objects"),
     ],
 )
 def test_what_no_path_shows_is_told(objects: list[tl.Object], kind: NoteKind, words: str) -> None:
     notes = [note for note in plan(scene(*objects, lights=[SUN]), METHOD).unmodelled if note.kind is kind]
     assert len(notes) == 1
     assert words in notes[0]
+
+
+def test_paths_find_shadows_by_themselves() -> None:
+    """Maps are for diffuse bases, and for opaque objects of which rays do not read all."""
+    ground, lamp = body(None, 2.0), tl.SphereLight((0, 5, 0), 1.0, 0.1)
+    found = plan(scene(body(), ground, lights=[lamp]), METHOD)
+    assert not found.has(PassName.SHADOW_MAPS)
+    assert not found.says(NoteKind.LIGHTS_LEFT_OUT)
+    assert plan(scene(body(surface=Surface(transmission=0.5)), ground, lights=[lamp]), METHOD).has(PassName.SHADOW_MAPS)
 
 
 def test_what_paths_do_not_read_of_surfaces_is_told() -> None:

@@ -63,6 +63,7 @@ from translucent.planning.methods import (
     SignedDepth,
     ThinLayer,
 )
+from translucent.planning.methods.path_traced import has_bases, takes_picture
 from translucent.planning.methods.ray_marched import MAX_STEPS
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.remarks import remarks
@@ -443,6 +444,8 @@ def _with_textures(found: RenderPlan, machine: Capabilities) -> RenderPlan:
 def _with_shadows(found: RenderPlan, scene: Scene, machine: Capabilities) -> RenderPlan:
     """The plan with shadows on opaque objects, or on a picture of them that is drawn elsewhere."""
     before, behind = shadow_passes(scene, over_backdrop=found.request.over_backdrop), tuple[PassSpec, ...]()
+    if found.paths is not None and not has_bases(scene) and not takes_picture(scene, textured=found.textured):
+        return found  # paths find shadows by themselves
     unmodelled: list[Note] = []
     if found.request.over_backdrop:
         reason = "opaque objects come as a picture drawn elsewhere: rays through the media end at its depth"

@@ -417,6 +417,17 @@ class StraightLight:
                 radiance += arriving * phase[:, None]
         return radiance
 
+    def on_surfaces(self, live: LiveRays, normals: Array, start: float) -> Array:
+        """(k, 3): irradiance of all lights on opaque surfaces with unit normals (k, 3) at the origins of `live`."""
+        found = np.zeros((len(live), 3))
+        for number, to_light in enumerate(self.at_interfaces(live.rays.origins)):
+            cosine = np.einsum("ki,ki->k", to_light, normals)
+            lit = np.flatnonzero(cosine > 0.0)
+            arriving = self.irradiance(number, live.rays.origins[lit], live.inside.where(lit), start)
+            with np.errstate(under="ignore"):
+                found[lit] += cosine[lit, None] * arriving
+        return found
+
     def irradiance(self, number: int, points: Array, inside: Inside, start: float = 0.0) -> Array:
         """Irradiance (k, 3) of one light, straight on, at points (k, 3) `inside` bodies.
 

@@ -27,10 +27,16 @@ from translucent.reference.interactions import Interactions, LiveRays, StraightL
 from translucent.reference.interfaces import FirstInterfaces, Inside, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge
 from translucent.reference.light_paths import LightPaths, SurfaceLight
-from translucent.reference.phase import scattered_directions
+from translucent.reference.phase import scattered_directions, turned
 from translucent.reference.refracted import RayEnds, check_surfaces
 from translucent.reference.render import scene_hits, shade_hits
-from translucent.reference.surfaces import OpaqueHits, nearest_opaque, scene_crossings, sheet_thicknesses
+from translucent.reference.surfaces import (
+    OpaqueHits,
+    lambert_surfaces,
+    nearest_opaque,
+    scene_crossings,
+    sheet_thicknesses,
+)
 from translucent.reference.volume import Segments, Volume, multiplicities, points_on, volume_segments
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene
@@ -131,12 +137,13 @@ class InterfacePaths:
         collided = np.isfinite(event)
         walled = ~collided & (flight.wall.distance <= flight.end)
         hit = ~collided & (flight.interfaces.distance <= flight.end)
-        self._add_ends(live, flight, np.flatnonzero(walled | (~collided & ~hit & flight.leaves)))
+        self._add_ends(live, flight, np.flatnonzero(~collided & ~hit & ~walled & flight.leaves))
         further = np.flatnonzero(~collided & ~hit & ~walled & ~flight.leaves)
         return joined(
             (
                 self._moved(live.where(further), flight.end[further], flight.interfaces.there.where(further)),
-                self._interact(live, flight, np.flatnonzero(hit)),
+                self._interact(live, flight, np.flatnonzero(hit & ~walled)),
+                self._reflect(live, flight, np.flatnonzero(walled)),
                 self._scatter(live, flight, event, weights),
             )
         )
@@ -252,6 +259,24 @@ class InterfacePaths:
         self.interfaces_hit[live.owner] += 1
         return self._roulette(live)
 
+    def _reflect(self, live: LiveRays, flight: _Flight, hit: Integers) -> LiveRays:
+        """Reflect paths diffusely from opaque objects (Lambert), and add light of lights and emission there."""
+        if not hit.size:
+            return live.where(hit)
+        wall = flight.wall.where(hit)
+        inside = self._inside_at(live.inside, flight, flight.wall.distance, hit)
+        live = self._moved(live.where(hit), wall.distance, inside, self.own.tolerance)
+        normals, color, emitted = lambert_surfaces(self.scene, live.rays.directions, wall)
+        self._add(live, emitted + color / np.pi * self.straight.on_surfaces(live, normals, self.own.tolerance))
+        up, turn = np.sqrt(self.rng.random(len(live))), 2.0 * np.pi * self.rng.random(len(live))
+        directions = turned(normals, up, turn)
+        always = np.ones(len(live), dtype=bool)
+        rays = replace(live.rays, directions=directions)
+        self.interfaces_hit[live.owner] += 1
+        with np.errstate(under="ignore"):
+            throughput = live.throughput * color
+        return self._roulette(replace(live, rays=rays, throughput=throughput, bent=always, reflected=always))
+
     def _one_branch(self, live: LiveRays) -> LiveRays:
         """One branch of each path, chosen by its throughput: a polished sheet has two."""
         live = live.where(np.argsort(live.owner, kind="stable"))
@@ -326,9 +351,10 @@ def path_trace(
     polished interfaces bend of them no path finds: caustics, and light in media behind such interfaces. The plan tells
     where this leaves out something. Light of the environment is all there.
 
-    Opaque surfaces and diffuse bases reflect as they do for `render`, and a backdrop fixed to the picture lights like
-    the mean of its squares. Light inside a medium has no finite variance: there the error bars say little. Nor do they
-    with few paths before rare bright reflections.
+    Paths go on from opaque surfaces, which reflect diffusely, so that these and bodies light each other. Diffuse bases
+    reflect as they do for `render`, and a backdrop fixed to the picture lights like the mean of its squares. A sphere light
+    counts as points. Light inside a medium has no finite variance: there the error bars say little. Nor do they with
+    few paths before rare bright reflections.
 
     Parameters
     ----------

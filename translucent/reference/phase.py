@@ -45,12 +45,17 @@ def scattered_directions(
     for number, phase in enumerate(phases):
         own = chosen == number
         cosine[own] = _cosines(phase, u[own], rng)
+    return turned(directions, cosine, angle)
+
+
+def turned(directions: Array, cosine: Array, angle: Array) -> Array:
+    """Unit vectors (k, 3) at the cosines (k,) to unit vectors (k, 3), at angles (k,) around them."""
     sine = np.sqrt(np.maximum((1.0 - cosine) * (1.0 + cosine), 0.0))
     across, up = _frame(directions)
     with np.errstate(under="ignore"):
-        turned = across * np.cos(angle)[:, None] + up * np.sin(angle)[:, None]
-        scattered = directions * cosine[:, None] + turned * sine[:, None]
-    return np.asarray(scattered / np.linalg.norm(scattered, axis=1, keepdims=True))
+        aside = across * np.cos(angle)[:, None] + up * np.sin(angle)[:, None]
+        found = directions * cosine[:, None] + aside * sine[:, None]
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
 def _cosines(phase: PhaseFunction, u: Array, rng: np.random.Generator) -> Array:

@@ -127,27 +127,39 @@ def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits, irradiance
     Lambert: color / pi times the irradiance on the visible side, as `SurfaceLight.on_opaque` gives it.
     """
     radiance = np.zeros((len(rays), 3))
-    for i, body in enumerate(scene.objects):
-        visible = np.flatnonzero(nearest.item == i)
-        if visible.size:
-            radiance[visible] = _lambert(body, nearest.where(visible), rays.where(visible), irradiance)
+    visible = np.flatnonzero(nearest.item >= 0)
+    if visible.size:
+        hits, directions = nearest.where(visible), rays.directions[visible]
+        normals, color, emitted = lambert_surfaces(scene, directions, hits)
+        # From the eye, as the rays are, so that the vector to a light keeps its digits far from the world's origin.
+        points = rays.origins[visible] + hits.distance[:, None] * directions
+        with np.errstate(under="ignore"):
+            radiance[visible] = color / np.pi * irradiance(points, normals) + emitted
     return radiance
 
 
-def _lambert(body: Object, hits: OpaqueHits, rays: Rays, irradiance: Irradiance) -> Array:
-    """(k, 3): radiance that one object reflects and emits along rays that hit it."""
+def lambert_surfaces(scene: Scene, directions: Array, hits: OpaqueHits) -> tuple[Array, Array, Array]:
+    """Normals of opaque surfaces towards the rays that hit them, their base colors, and emitted radiance, (k, 3) each.
+
+    `directions`: (k, 3), in which the rays travel.
+    """
+    normals, color, emitted = np.zeros((3, *directions.shape))
+    for i in np.unique(hits.item):
+        own = np.flatnonzero(hits.item == i)
+        normals[own], color[own], emitted[own] = _lambert(scene.objects[i], directions[own], hits.where(own))
+    return normals, color, emitted
+
+
+def _lambert(body: Object, directions: Array, hits: OpaqueHits) -> tuple[Array, Array, Array]:
+    """`lambert_surfaces` of one object."""
     normals = world_normals(body, hits.face)
-    away = np.einsum("ki,ki->k", normals, rays.directions) > 0
-    normals[away] *= -1.0
-    # From the eye, as the rays are, so that the vector to a light keeps its digits far from the world's origin.
-    points = rays.origins + hits.distance[:, None] * rays.directions
+    normals[np.einsum("ki,ki->k", normals, directions) > 0] *= -1.0
     color = body.base_color * color_and_opacity(body, hits.face, hits.barycentric)[:, :3]
-    emitted = np.zeros(3)
+    emitted = np.zeros_like(color)
     if body.surface is not None and body.surface.glows:
         texture = sampled(body, hits.face, hits.barycentric, body.surface.emissive_texture)
         emitted = np.asarray(body.surface.emissive) * texture[:, :3]
-    with np.errstate(under="ignore"):
-        return np.asarray(color / np.pi * irradiance(points, normals) + emitted)
+    return normals, color, emitted
 
 
 #: Transmittance of an opaque layer: the smallest that float32 can hold.

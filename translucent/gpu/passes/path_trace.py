@@ -21,7 +21,9 @@ from translucent.gpu.passes.traced_interfaces import RAY_SAMPLERS, ray_switches,
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches
 from translucent.gpu.shaders import set_uniform, set_used
 from translucent.gpu.targets import Storage, add_up
+from translucent.planning.methods.path_traced import has_bases, takes_picture
 from translucent.planning.passes import PassSpec
+from translucent.scene.lights import PositionalLight
 
 _STATE = ("path_origin", "path_direction", "path_light", "path_interior", "path_counts", "path_mean", "path_spread")
 _COUNTS = _STATE.index("path_counts")
@@ -45,6 +47,9 @@ TILE = 512
 
 #: Largest number of events of a path in one pass: some drivers cut loops short after too many iterations.
 MOST_EVENTS = 64
+
+#: Axial depth before the objects at which paths begin.
+EYE_MARGIN = 1e-3
 
 #: Seconds that a pass over a tile may take, by which the number of events is chosen; no driver stops that.
 PASS_SECONDS = 0.1
@@ -114,7 +119,7 @@ class PathTracer:
             stack.callback(storage.release)
             textures, values = traced_scene(job, stack)
             assert job.plan.paths is not None
-            values |= {"seed": job.plan.paths.seed, "spread": spread}
+            values |= {"seed": job.plan.paths.seed, "spread": spread, "path_start": _path_start(job)}
             for number, corner in enumerate(corners):
                 size = min(tile, width - corner[0]), min(tile, height - corner[1])
                 if by_embree:
@@ -238,16 +243,29 @@ class PathTracer:
             **resources.light_textures(environment),
             **resources.background_textures(environment),
         }
-        if job.features.has_opaque:
+        if _pictured(job):
             textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets["opaque"].color_attachments
         self._trace.bind(**textures)
         resources.shadows.use(self._trace.units)
 
 
+def _pictured(job: FrameJob) -> bool:
+    """True if the picture of opaque objects is seen by paths that hit them first."""
+    return job.features.has_opaque and takes_picture(job.scene, textured=job.features.textured)
+
+
+def _path_start(job: FrameJob) -> float:
+    """Axial depth before all objects, and not behind the eye."""
+    media, opaque = job.placed.media, job.placed.opaque
+    nearest = media.near if opaque is None else min(media.near, opaque.near)
+    return max((nearest - media.near) / media.length - EYE_MARGIN, -media.near / media.length)
+
+
 def _switches(job: FrameJob) -> dict[str, bool | int]:
     """Switches of ``shaders/transport/path_step.glsl``."""
-    scene, environment = job.scene, job.scene.environment
+    scene, environment, pictured = job.scene, job.scene.environment, _pictured(job)
     media = [body.medium for body in scene.bodies if body.medium is not None]
+    bases = has_bases(scene)
     return {
         "FROM_EYE": job.placed.starts_inside,
         **ray_switches(scene),
@@ -255,11 +273,14 @@ def _switches(job: FrameJob) -> dict[str, bool | int]:
         "SCATTER": any(medium.scatters for medium in media),
         "EMISSION": any(medium.emits for medium in media),
         "LIGHTS": bool(scene.lights),
+        "SPHERES": any(light.disc[3] > 0.0 for light in scene.lights if isinstance(light, PositionalLight)),
+        "BASES": bases,
         "ROUGH": any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies),
         "DISPERSION": False,
-        "OPAQUE": job.features.has_opaque,
+        "OPAQUE": pictured,
+        "PICTURED": pictured,
         **interface_shadow_switches(job),
-        "DIMMED": job.features.dims_interfaces,
+        "DIMMED": bases and job.features.dims_interfaces,
         **background_switches(environment),
         **coat_switches(scene.objects),
     }
@@ -279,15 +300,15 @@ class PathTracePass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Follow the paths of this sample, or where nothing else depends on it those of all samples at once.
 
-        Opaque objects are drawn for each sample; paths that hit them first see that picture.
+        The picture of opaque objects that paths do not see whole is drawn for each sample.
         """
         assert job.plan.paths is not None
-        paths = job.plan.paths.paths
-        if job.features.has_opaque:
+        paths, pictured = job.plan.paths.paths, _pictured(job)
+        if pictured:
             begun, last = (paths * (job.sample + i) // job.samples for i in range(2))
         else:
             begun, last = 0, 0 if job.sample < job.samples - 1 else paths
         if last > job.paths_traced:
-            for progress in self.tracer.steps(job, last, spread=job.samples > 1 and not job.features.has_opaque):
+            for progress in self.tracer.steps(job, last, spread=job.samples > 1 and not pictured):
                 job.report((begun + progress.fraction * (last - begun)) / paths)
         self.tracer.show(job)

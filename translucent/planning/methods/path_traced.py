@@ -11,6 +11,8 @@ from translucent.planning.bodies import indices, open_bodies
 from translucent.planning.hits import check_hits
 from translucent.planning.methods.base import Method, check_count
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
+from translucent.planning.surface_textures import has_more, varies_at_hits
+from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Largest number of paths of each pixel.
@@ -26,9 +28,11 @@ class PathTraced(Method):
     interfaces, walks among the microfacets of rough ones (Heitz et al. 2016), free flights in media that scatter, with
     the balance heuristic over the channels (Wilkie et al. 2014). It takes the place of `interfaces` and `scattering`,
     which choose approximations. `Frame.standard_error` is the noise; thickness, optical depth and transmittance are
-    those of the planner's own choice of method, and exact.
+    those of the planner's own choice of method, and exact. Opaque objects are part of it: paths go on from them, so that
+    grounds and bodies light each other.
 
-    Light of point, spot and directional lights that polished interfaces bend is found by no path.
+    Light of point, spot and directional lights that polished interfaces bend is found by no path; sphere lights have
+    a size that paths hit.
 
     Parameters
     ----------
@@ -90,9 +94,11 @@ class PathTraced(Method):
         """Notes on effects that paths do not find or do not render."""
         notes = []
         bending = [body for body in scene.bodies if _bends(body)]
-        if scene.lights and bending:
+        # `plan` has points in place of spheres, each a part of one.
+        if any(not isinstance(light, PositionalLight) or light.disc[3] == 0.0 for light in scene.lights) and bending:
             text = (
-                "light of point, spot and directional lights that polished interfaces bend: in media, and as caustics"
+                "light of point, spot and directional lights that polished interfaces bend, in media and as caustics: "
+                "no path finds lights without a size; a tl.SphereLight has one"
             )
             notes.append(Note(NoteKind.LIGHTS_LEFT_OUT, text))
         surfaces = [(body, body.surface) for body in scene.bodies if body.surface is not None]
@@ -104,12 +110,21 @@ class PathTraced(Method):
             notes.append(Note(NoteKind.COATS, text))
         if emitting := [body for body, surface in surfaces if surface.glows]:
             notes.append(Note(NoteKind.GLOW, f"light of surfaces that emit: {object_names(emitting)}"))
-        if scene.opaque:
-            text = (
-                "mirror images of things in opaque objects; shadows of the environment on them unless it has directions"
-            )
-            notes.append(Note(NoteKind.SHADOWS, text))
         return tuple(notes)
+
+
+def takes_picture(scene: Scene, *, textured: bool) -> bool:
+    """True if paths that hit some opaque object first take its picture, since rays do not read all of its textures.
+
+    `textured`: rays read textures at all.
+    """
+    return any(has_more(item) or (varies_at_hits(item) and not textured) for item in scene.opaque)
+
+
+def has_bases(scene: Scene) -> bool:
+    """True if interfaces of bodies have diffuse bases."""
+    surfaces = [body.surface for body in scene.bodies if body.surface is not None]
+    return any(surface.transmission < 1.0 or surface.transmission_texture is not None for surface in surfaces)
 
 
 def _bends(body: Object) -> bool:
