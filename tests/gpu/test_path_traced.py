@@ -162,7 +162,7 @@ def test_a_lamp_with_a_size_is_found_through_what_bends(renderer: tl.Renderer) -
     globe = tl.Object(Sphere((0.0, 2.2, 0.0), 0.8).tessellate(24), surface=shining)
     walls = tl.Surface(color=(0.2, 0.2, 0.2), ior=1.0)
     grey = tl.Object(Box((-3, -3, -3), (3, 4, 3)).tessellate(), surface=walls)
-    camera = tl.Camera.look_at((1, 0.5, 2.5), (0, -2, 0), fov_y=50)
+    camera = tl.Camera.look_at((1.0, 0.2, 2.6), (0, -1.2, 0), fov_y=60)
     for surface in (None, FROSTED):
         glass = ball(tl.Medium(ior=1.5), surface)
         one, other = (
@@ -172,7 +172,7 @@ def test_a_lamp_with_a_size_is_found_through_what_bends(renderer: tl.Renderer) -
         error = [np.sqrt(np.square(f.standard_error, dtype=np.float64).mean() / 64) for f in (one, other)]
         off = one.radiance.mean(dtype=np.float64) - other.radiance.mean(dtype=np.float64)
         assert abs(off) < 4.0 * np.hypot(*error)
-        assert np.hypot(*error) < 0.04 * other.radiance.mean()
+        assert np.hypot(*error) < 0.06 * other.radiance.mean()
 
 
 def test_a_dark_pane_in_closed_form(renderer: tl.Renderer) -> None:

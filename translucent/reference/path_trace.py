@@ -352,9 +352,9 @@ def path_trace(
     where this leaves out something. Light of the environment is all there.
 
     Paths go on from opaque surfaces, which reflect diffusely, so that these and bodies light each other. Diffuse bases
-    reflect as they do for `render`, and a backdrop fixed to the picture lights like the mean of its squares. A sphere light
-    counts as points. Light inside a medium has no finite variance: there the error bars say little. Nor do they with
-    few paths before rare bright reflections.
+    reflect as they do for `render`, and a backdrop fixed to the picture lights like the mean of its squares. A sphere
+    light counts as points. Light inside a medium has no finite variance: there the error bars say little. Nor do they
+    with few paths before rare bright reflections.
 
     Parameters
     ----------

@@ -28,8 +28,8 @@ class PathTraced(Method):
     interfaces, walks among the microfacets of rough ones (Heitz et al. 2016), free flights in media that scatter, with
     the balance heuristic over the channels (Wilkie et al. 2014). It takes the place of `interfaces` and `scattering`,
     which choose approximations. `Frame.standard_error` is the noise; thickness, optical depth and transmittance are
-    those of the planner's own choice of method, and exact. Opaque objects are part of it: paths go on from them, so that
-    grounds and bodies light each other.
+    those of the planner's own choice of method, and exact. Opaque objects are part of it: paths go on from them, so
+    that grounds and bodies light each other.
 
     Light of point, spot and directional lights that polished interfaces bend is found by no path; sphere lights have
     a size that paths hit.
