@@ -338,6 +338,70 @@ def wine() -> Mesh:
     return Mesh(inwards.vertices, inwards.faces[:, ::-1])
 
 
+#: Of a tumbler in centimetres: radius inside at the floor and at the rim, height of the floor and of the rim, wall.
+TUMBLER = (3.25, 3.75, 1.1, 10.5)
+TUMBLER_WALL, DRINK_POINT = 0.22, 31
+
+
+def tumbler_wall() -> Array:
+    """Inner wall (n, 2) of the tumbler, from the middle of its floor to the rim: a round corner, then straight."""
+    low, high, floor, rim = TUMBLER
+    corner = 0.7
+    lean = (high - low) / (rim - floor)
+    flat = np.stack([np.linspace(0.0, low - corner, 9)[:-1], np.full(8, floor)], axis=1)
+    side = np.stack(
+        [low + lean * np.linspace(corner, rim - floor, 25)[1:], np.linspace(floor + corner, rim, 25)[1:]], 1
+    )
+    return np.concatenate([flat, arc((low - corner, floor + corner), corner, -90.0, 0.0, 9), side])
+
+
+def tumbler() -> Mesh:
+    """A straight glass with a thick foot."""
+    wall = tumbler_wall()
+    radius, rim = wall[-1]
+    outer = np.array([(3.30, 0.35), (radius + TUMBLER_WALL, rim)])
+    side = outer[0] + np.linspace(0.0, 1.0, 10)[:, None] * (outer[1] - outer[0])
+    under = np.stack([np.linspace(0.0, 2.95, 9)[:-1], np.zeros(8)], axis=1)
+    edge = arc((2.95, 0.35), 0.35, -90.0, 0.0, 8)[:-1]
+    lip = arc((radius + TUMBLER_WALL / 2, rim), TUMBLER_WALL / 2, 0.0, 180.0, 8)[1:-1]
+    return turned(np.concatenate([under, edge, side, lip, wall[::-1]]), 96)
+
+
+def drink() -> Mesh:
+    """What fills the tumbler: its inner wall point for point, and a level surface."""
+    wall = tumbler_wall()[: DRINK_POINT + 1]
+    level = np.stack([wall[-1, 0] * np.linspace(1.0, 0.0, 9)[1:], np.full(8, wall[-1, 1])], axis=1)
+    inwards = turned(np.concatenate([wall, level])[::-1], 96)
+    return Mesh(inwards.vertices, inwards.faces[:, ::-1])
+
+
+def ice_cube() -> Mesh:
+    """A cube with round edges whose sides have melted a little unevenly, about the origin."""
+    half, corner = 1.15, 0.3
+
+    def field(p: Array) -> Array:
+        waves = np.sin(1.7 * p[..., 0] + 0.4) * np.sin(1.9 * p[..., 1] - 0.8) * np.sin(1.6 * p[..., 2] + 1.3)
+        q = np.abs(p) - (half - corner)
+        body = np.linalg.norm(np.maximum(q, 0.0), axis=-1) + np.minimum(q.max(axis=-1), 0.0) - corner
+        return np.asarray(body + 0.09 * waves)
+
+    return implicit_surface(field, (-1.4, -1.4, -1.4), (1.4, 1.4, 1.4), 0.1)
+
+
+def lantern() -> Mesh:
+    """A lantern of wax, open at the top: a thick wall around a hollow for a light."""
+    outer = [
+        np.stack([np.linspace(0.0, 4.0, 12)[:-1], np.zeros(11)], axis=1),
+        arc((4.0, 0.4), 0.4, -90.0, 0.0, 8),
+        np.stack([np.full(12, 4.4), np.linspace(0.4, 11.2, 14)[1:-1]], axis=1),
+        arc((3.95, 11.2), 0.45, 0.0, 180.0, 16),
+        np.stack([np.full(10, 3.5), np.linspace(11.2, 2.0, 12)[1:-1]], axis=1),
+        arc((2.7, 2.0), 0.8, 0.0, -90.0, 10),
+        np.stack([np.linspace(2.7, 0.0, 9)[1:], np.full(8, 1.2)], axis=1),
+    ]
+    return turned(np.concatenate(outer), 96)
+
+
 def sheet(rows: int, columns: int) -> Faces:
     """Faces of an open grid, seen counter-clockwise with columns to the right and rows upwards."""
     index = np.arange(rows * columns).reshape(rows, columns)
@@ -380,6 +444,10 @@ def shapes() -> dict[str, Shape]:
         "wick.ply": Shape("The wick of candle.ply", "profile, revolved", wick()),
         "flame.ply": Shape("The flame of candle.ply", "drop, revolved", flame()),
         "amber.ply": Shape("Polished pebble", "dented ellipsoid, marching cubes", amber()),
+        "tumbler.ply": Shape("Straight glass with a thick foot", "profile, revolved", tumbler()),
+        "drink.ply": Shape("What fills tumbler.ply", "the tumbler's inner wall and a level top", drink()),
+        "ice.ply": Shape("Ice cube", "rounded and dented box, marching cubes", ice_cube()),
+        "lantern.ply": Shape("Lantern of wax, 9 mm wall, open at the top", "profile, revolved", lantern()),
         "leaf.ply": Shape("Leaf with texture coordinates, one sheet", "outline, fold and arch on a grid", leaf()),
     }  # fmt: skip
 
@@ -418,14 +486,16 @@ def readme(made: dict[str, Shape]) -> str:
 Small meshes for examples and tests, all made by `tools/make_meshes.py`, which also writes this page: edit that file and
 run it again. They are part of the project and under its MIT license.
 
-Unit: metre. y is up; each stands on y = 0, but for the wine, which stands in its glass, and for wick and flame, which
-are on their candle. Binary PLY, positions in float32, faces counter-clockwise seen from outside.
+Unit: metre. y is up; each stands on y = 0, but for wine and drink, which stand in their glasses, for wick and flame,
+which are on their candle, and for the ice cube, which is about the origin. Binary PLY, positions in float32, faces
+counter-clockwise seen from outside.
 
 | file | what | how made | size in cm (x × y × z) | triangles | closed |
 |---|---|---|---|---|---|
 {table}
 
-The side of the wine and the inside of the goblet are the same vertices, so the two bodies share a face exactly.
+The side of the wine and the inside of the goblet are the same vertices, so the two bodies share a face exactly. So do
+the drink and the tumbler.
 """
 
 

@@ -54,7 +54,6 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.frames.photographs import fit_photographs as fit_photographs
     from translucent.frames.tiled import Tile as Tile
     from translucent.geometry.mesh import Mesh as Mesh
-    from translucent.gltf.load import load_scene as load_scene
     from translucent.gltf.materials import read_materials as read_materials
     from translucent.gltf.write import write_medium as write_medium
     from translucent.interop.mitsuba import to_mitsuba as to_mitsuba
@@ -115,6 +114,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.scene.stages import staged as staged
     from translucent.scene.surface import Surface as Surface
     from translucent.scene.texture import Texture as Texture
+    from translucent.scene_files import load_scene as load_scene
     from translucent.showing import show as show
     from translucent.tiles import render_tiles as render_tiles
 
@@ -137,7 +137,6 @@ _NAMES = {
     "frames.photographs": "Photograph fit_photographs",
     "frames.tiled": "Tile",
     "geometry.mesh": "Mesh",
-    "gltf.load": "load_scene",
     "gltf.materials": "read_materials",
     "gltf.write": "write_medium",
     "interop.mitsuba": "to_mitsuba write_mitsuba",
@@ -170,6 +169,7 @@ _NAMES = {
     "scene.stages": "staged",
     "scene.surface": "Surface",
     "scene.texture": "Texture",
+    "scene_files": "load_scene",
     "showing": "show",
     "tiles": "render_tiles",
 }

@@ -1,5 +1,5 @@
-"""Paths of the files in ``shaders/`` and ``meshes/``, and of what is built out of ``web/``: beside the package in an
-installed wheel, else in the checkout.
+"""Paths of the files in ``shaders/``, ``meshes/`` and ``scenes/``, and of what is built out of ``web/``: beside the
+package in an installed wheel, else in the checkout.
 """
 
 from __future__ import annotations
@@ -53,6 +53,19 @@ def mesh_path(name: str) -> Path:
 def mesh_names() -> list[str]:
     """Names of the meshes that come with the toolkit."""
     return [path.stem for path in _mesh_files()]
+
+
+def scene_path(name: str) -> Path:
+    """Path of a scene that comes with the toolkit, such as ``glass-of-wine``; raises `InputError` for other names."""
+    path = _folder("scenes") / f"{name}.toml"
+    if name not in scene_names():
+        raise InputError(f"scene {name!r}", "not one of the toolkit's own", f"use one of {', '.join(scene_names())}")
+    return path
+
+
+def scene_names() -> list[str]:
+    """Names of the scenes that come with the toolkit."""
+    return sorted(path.stem for path in _folder("scenes").glob("*.toml"))
 
 
 def web_path(name: str) -> Path:

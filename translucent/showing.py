@@ -27,7 +27,8 @@ from translucent.notebook.view import view
 from translucent.page.write import title_of, write_page
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import filled, showcase, with_roughness
-from translucent.scene.stages import DEFAULT_STAGE, has_ground, staged
+from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, has_ground, staged
+from translucent.scene_files import is_composed, load_composed
 from translucent.signals import import_trimesh
 
 #: Size of the picture that pages and widgets frame.
@@ -106,6 +107,9 @@ def _scene(thing: Any, material: Preset | Medium | None, unit: str | None) -> Sc
     roughness = material.roughness if isinstance(material, Preset) else None
     if isinstance(thing, Scene):
         return thing if medium is None else with_roughness(filled(thing, medium), roughness)
+    if isinstance(thing, str | Path) and is_composed(str(thing)):
+        scene: Scene = load_composed(str(thing), unit, SIZE, None if medium is None else lambda _: medium)
+        return staged(scene, scene.stage) if scene.stage != NO_STAGE else scene  # type: ignore[attr-defined]
     if is_scene(thing) or (isinstance(thing, str | Path) and Path(thing).suffix.lower() in SUFFIXES):
         scene = load_scene(thing, unit, size=SIZE)
         if medium is not None:

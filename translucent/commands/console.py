@@ -51,7 +51,9 @@ def echo(text: str, *, err: bool = False, nl: bool = True, color: bool | None = 
 
 def advise(text: str) -> None:
     """Print advice on stderr, behind all that the running command prints."""
-    click.get_current_context().call_on_close(partial(echo, f"note: {text}", err=True))
+    say = partial(echo, f"note: {text}", err=True)
+    context = click.get_current_context(silent=True)
+    say() if context is None else context.call_on_close(say)
 
 
 def _discard(stream: TextIO) -> None:

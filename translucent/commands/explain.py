@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from translucent.commands.console import echo
-from translucent.commands.model import SceneRequest, is_scene_file, medium_lines, read_scene
+from translucent.commands.model import SceneRequest, is_scene_file, medium_lines, models_argument, read_scene
 from translucent.commands.options import (
     BodyOptions,
     ChoiceOptions,
@@ -52,7 +52,7 @@ class ExplainOptions:
     usual="color distance preset height stage method as_json",
     epilog="Example: translucent explain goblet",
 )
-@click.argument("model")
+@models_argument()
 @takes(ExplainOptions)
 def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
     """Say what is known about MODEL, which passes would render it, and why.

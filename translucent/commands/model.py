@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -103,28 +103,53 @@ class SceneRequest:
 
 
 def is_scene_file(model: str) -> bool:
-    """True if MODEL is a glTF file, which holds a scene; all others hold one mesh."""
+    """True if MODEL is a glTF file, or several models; all others hold one mesh."""
     from translucent.gltf.load import SUFFIXES
+    from translucent.scene_files import is_composed
 
-    return Path(model).suffix.lower() in SUFFIXES
+    return Path(model).suffix.lower() in SUFFIXES or is_composed(model)
+
+
+def models_argument(*, required: bool = True) -> Callable[[Any], Any]:
+    """Argument of a verb: one model, or several, each with its material; the verb gets one text."""
+
+    def together(_: click.Context, __: click.Parameter, words: tuple[str, ...]) -> str | None:
+        from translucent.scene_files import joined
+
+        return joined(words) if words else None
+
+    return click.argument("model", nargs=-1, required=required, callback=together, metavar="MODEL...")
+
+
+def files_of(model: str) -> list[str]:
+    """Files and names that MODEL consists of."""
+    from translucent.scene_files import is_composed, model_names
+
+    return model_names(model) if is_composed(model) else [model]
 
 
 def read_scene(model: str, requested: SceneRequest) -> Scene:
     """The scene of a glTF file, or one mesh on show, as it is requested."""
     from translucent.scene.showcase import framing, objects_named, with_media, with_roughness
     from translucent.scene.stages import staged, upright
+    from translucent.scene_files import is_composed
 
     options, (stage, turn) = requested.camera, _turned(requested.stage)
     if options.camera is not None and options.defining:
         raise InputError(
             f"--camera {options.camera}", f"{', '.join(options.defining)} given, too", "give one or the other"
         )
-    scene, chosen = (_file_scene if is_scene_file(model) else _mesh_scene)(model, requested, stage)
+    composed = is_composed(model)
+    read = _composed_scene if composed else _file_scene if is_scene_file(model) else _mesh_scene
+    scene, chosen = read(model, requested, stage)
     named = {id(item) for one in requested.media for item in objects_named(scene, one.name)}
+    # What the options say of a material is of the objects that have none.
+    named |= {id(scene.objects[i]) for i in getattr(scene, "with_material", ())}
     others = [item for item in scene.objects if id(item) not in named]
     scene = with_roughness(scene, requested.roughness, others)
     if requested.change is not None:
-        scene = with_media(scene, requested.change, [item for item in scene.objects if id(item) not in named])
+        mine = {id(item) for one in requested.media for item in objects_named(scene, one.name)}
+        scene = with_media(scene, requested.change, [item for item in scene.objects if id(item) not in mine])
     for one in requested.media:
         scene = with_roughness(scene, one.roughness, objects_named(scene, one.name))
     for line in _textured_roughness(scene, requested):
@@ -214,6 +239,35 @@ def _file_scene(model: str, requested: SceneRequest, stage: str | None) -> tuple
     return scene, chosen
 
 
+def _composed_scene(model: str, requested: SceneRequest, stage: str | None) -> tuple[Scene, Stage | None]:
+    from translucent.scene.stages import NO_STAGE, stage_named
+    from translucent.scene_files import load_composed
+
+    for option, value in (
+        ("--camera", requested.camera.camera),
+        ("--variant", requested.variant),
+        ("--time", requested.time),
+    ):
+        if value is not None:
+            raise InputError(f"{option} {value}", f"{model} is no glTF file", "leave it out")
+    medium, file = requested.medium, requested.file
+    scene: Scene = load_composed(
+        model,
+        file_unit(model, file) if file.unit or file.sizes else None,
+        requested.size,
+        None if medium is None else lambda _: medium,
+        allow_outside=file.allow_outside,
+    )
+    for remark in scene.remarks:  # type: ignore[attr-defined]
+        advise(remark)
+    scene = _with_media(scene, requested.media)
+    own: str = scene.stage  # type: ignore[attr-defined]
+    chosen = stage_named(stage or (own if requested.environment is None else NO_STAGE))
+    if requested.environment is not None:
+        scene = dataclasses.replace(scene, environment=requested.environment)
+    return scene, chosen
+
+
 def _with_media(scene: AnyScene, media: Sequence[NamedMedium]) -> AnyScene:
     """Scene with the media of the objects that are named."""
     from translucent.scene.showcase import filled, objects_named
@@ -263,11 +317,14 @@ def _file_bounds(model: str, file: FileOptions) -> Array:
     """(2, 3): bounds of a model in metres, as its file has them."""
     from translucent.gltf.load import load_scene
     from translucent.mesh_files import load_mesh
+    from translucent.scene_files import is_composed, load_composed
 
     if not is_scene_file(model):
         return load_mesh(mesh_file(model, None), "m", allow_outside=file.allow_outside).bounds
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # they come again as the file is read with its unit
+        if is_composed(model):
+            return load_composed(model, allow_outside=file.allow_outside).shown_bounds
         return load_scene(model, allow_outside=file.allow_outside).shown_bounds
 
 

@@ -24,8 +24,10 @@ from translucent.commands.model import (
     ObjectCommand,
     SceneRequest,
     echo_advice,
+    files_of,
     is_own,
     medium_lines,
+    models_argument,
     read_objects,
     read_scene,
     require_translucent,
@@ -158,7 +160,7 @@ class RenderOptions:
     usual="output color distance preset object_names height size orbit stage samples transparent turntable",
     epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm",
 )
-@click.argument("model")
+@models_argument()
 @takes(RenderOptions)
 def render(model: str, given: RenderOptions, as_json: bool) -> None:
     """Render MODEL, a file or one of the toolkit's own meshes, to a picture with its physical quantities.
@@ -184,7 +186,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
         from translucent.interop.mitsuba import check_output
 
         check_output(given.output)
-    refuse_overwriting(given.output, model, given.look.environment, given.look.background)
+    refuse_overwriting(given.output, *files_of(model), given.look.environment, given.look.background)
     requested = SceneRequest(
         medium=given.medium.read(),
         keeps_ior=given.medium.keeps_ior,

@@ -16,7 +16,9 @@ from translucent.commands.model import (
     SceneRequest,
     echo_advice,
     file_unit,
+    files_of,
     medium_lines,
+    models_argument,
     read_scene,
     require_translucent,
 )
@@ -64,7 +66,7 @@ class PreviewOptions:
 
 
 @click.command(epilog="Example: translucent preview goblet")
-@click.argument("model", required=False)
+@models_argument(required=False)
 @takes(PreviewOptions)
 def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
     """Open MODEL, a file or one of the toolkit's own meshes, in a window. Without it: a goblet.
@@ -166,7 +168,7 @@ class PageOptions:
     usual="output color distance preset height size orbit stage roughness title simplify",
     epilog="Example: translucent page goblet -o goblet.html --color '#7b1e3a' --distance 1cm",
 )
-@click.argument("model")
+@models_argument()
 @takes(PageOptions)
 def page(model: str, given: PageOptions, as_json: bool) -> None:
     """Write MODEL, a file or one of the toolkit's own meshes, as a page that any browser with WebGL2 shows.
@@ -181,7 +183,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
 
     output, look = given.output, given.look
     check_output(output)
-    refuse_overwriting(output, model, look.environment, look.background)
+    refuse_overwriting(output, *files_of(model), look.environment, look.background)
     pixels = check_page_size(read_size(given.size))
     picture = _read_poster(given.poster)
     requested = SceneRequest(

@@ -29,6 +29,7 @@ from translucent.preview.document import (
     zoomed,
 )
 from translucent.scene.showcase import SOLID_IOR
+from translucent.scene_files import is_composed
 from translucent.units import metres_per_unit
 
 #: Largest number of steps that can be undone.
@@ -149,7 +150,7 @@ def apply(document: Document, action: Action) -> Document:
         case Open():
             model, material = Model(action.path, checked("model.unit", action.unit, "m")), document.material
             # A glTF file shows its own media; on a mesh, which has none, a material of the user's own stays.
-            if Path(action.path).suffix.lower() in SUFFIXES or material.source == "file":
+            if not _is_mesh(action.path) or material.source == "file":
                 material = Material()
             return replace(model=model, material=material, orbit=None, assigned=(), hidden=())
         case Resize():
@@ -189,7 +190,7 @@ def _changed(document: Document, action: SetField) -> Document:
         raise InputError(f"field {action.field!r}", "there is none to change", "use for example material.roughness")
     if isinstance(owner, Material):
         changed = changed_material(owner, name, action.value)
-        bare = Path(document.model.path).suffix.lower() not in SUFFIXES
+        bare = _is_mesh(document.model.path)
         if bare and owner.source == "file" and changed.source == "color":
             changed = dataclasses.replace(changed, ior=max(owner.ior, SOLID_IOR))  # a solid, as of other verbs
         return dataclasses.replace(document, material=changed)
@@ -297,3 +298,8 @@ def _viewed_alike(document: Document, other: Document) -> Document:
     factor = metres_per_unit(document.model.unit) / metres_per_unit(other.model.unit)
     orbit = other.orbit if other.orbit is None or factor == 1.0 else resized(other.orbit, factor)
     return dataclasses.replace(document, orbit=orbit)
+
+
+def _is_mesh(model: str) -> bool:
+    """True if a model is one mesh, and no scene with materials of its own."""
+    return Path(model).suffix.lower() not in SUFFIXES and not is_composed(model)

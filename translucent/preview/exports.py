@@ -46,6 +46,7 @@ from translucent.scene.stages import NO_STAGE
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Texture
 from translucent.scene.turntable import turntable
+from translucent.scene_files import is_composed
 
 if TYPE_CHECKING:
     from translucent.bake.thickness_map import ThicknessMap
@@ -275,6 +276,8 @@ def python_code(recipe: Recipe) -> str:
     unit = "" if model.unit == "m" else f", unit={model.unit!r}"
     if recipe.loaded.bare:
         lines += [f"mesh = tl.load_mesh({path}{unit})", 'scene = tl.showcase(mesh, stage="none")']
+    elif is_composed(model.path):
+        lines += ["from translucent.scene_files import load_composed", "", f"scene = load_composed({path}{unit})"]
     else:
         lines += [f"scene = tl.load_scene({path}{unit})"]
     count = len(recipe.loaded.scene.objects)

@@ -71,6 +71,7 @@ from translucent.scene.stages import (
 )
 from translucent.scene.surface import Surface
 from translucent.scene.turntable import on_stage
+from translucent.scene_files import ComposedScene, is_composed, load_composed
 from translucent.units import metres_per_unit
 
 #: Bytes of a file from which on it is read by a worker process: while a picture is on show, and before. Whatever reads
@@ -143,8 +144,11 @@ def load(model: Model, allow_outside: bool = False) -> Loaded:
     """
     from translucent.mesh_files import load_mesh  # with trimesh, which takes long to import
 
-    if Path(model.path).suffix.lower() in SUFFIXES:
-        scene: Scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
+    if is_composed(model.path):
+        unit = None if model.unit == "m" else model.unit
+        scene: Scene = load_composed(model.path, unit, allow_outside=allow_outside)
+    elif Path(model.path).suffix.lower() in SUFFIXES:
+        scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
     elif model.path in mesh_names() and not Path(model.path).exists():
         scene = showcase(load_mesh(mesh_path(model.path), model.unit), stage="none")
     else:
@@ -256,6 +260,8 @@ def stage_name(look: Look, loaded: Loaded) -> str:
     """Name of the stage that a look requests; ``auto`` is the choice of ``translucent render`` for the model."""
     if look.stage != AUTO:
         return look.stage
+    if isinstance(loaded.scene, ComposedScene) and not (look.environment or look.background):
+        return loaded.scene.stage
     own = look.environment or look.background or loaded.scene.lights or loaded.has_camera
     return NO_STAGE if own or has_ground(loaded.scene) else DEFAULT_STAGE
 

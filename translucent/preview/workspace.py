@@ -407,6 +407,8 @@ class Workspace:
             self._keep(loaded)
             for note in filter(None, dict.fromkeys(size_note(item.mesh, way="field") for item in loaded.scene.objects)):
                 self.tell("info", f"{Path(model.path).name}: {note}")
+            for remark in getattr(loaded.scene, "remarks", ()):
+                self.tell("info", remark)
             self._set(self.history if action is None else self.history.done(action))
             if action is not None and os.path.exists(model.path):
                 self.recent = put_first(str(Path(model.path).resolve()), self.recent)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, hello_imgui, imgui
 
-from translucent.assets import mesh_names
+from translucent.assets import mesh_names, scene_names
 from translucent.errors import shortened
 from translucent.preview.actions import Hide, Resize
 from translucent.preview.document import Model
@@ -71,7 +71,7 @@ def _file(state: WindowState) -> None:
             _recent(state, recent, unit)
         imgui.end_menu()
     if imgui.begin_menu("The toolkit's own"):
-        for name in mesh_names():
+        for name in (*scene_names(), *mesh_names()):
             if imgui.menu_item(name, "", name == path, True)[0]:
                 state.work.open(Model(name))
         imgui.end_menu()
