@@ -8,13 +8,14 @@ PYTHON ?= $(shell for python in python3.13 python3.12 python3.11 python3; do \
     then echo $$python; exit; fi; done; echo python3)
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
+BLENDER_ARGS ?=
 
 BOOTSTRAP = @$(PYTHON) tools/bootstrap.py
 BIN = .venv/bin
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv demo test test-drivers lint bench gpu-report docs gallery meshes web wheel clean
+.PHONY: help venv demo test test-drivers lint bench gpu-report blender docs gallery meshes web wheel clean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -77,6 +78,10 @@ wheel: ## build the wheel into dist/ and check it in an environment of its own
 	$(BOOTSTRAP) --group dev
 	@$(BIN)/python tools/build_web.py --if-npm
 	$(BIN)/python tools/check_wheel.py
+
+blender: ## build the extension for Blender into dist/, with wheels for each platform
+	$(BOOTSTRAP) --group dev
+	@$(BIN)/python tools/build_blender.py $(BLENDER_ARGS)
 
 clean: ## remove all that these commands made: .venv, out/, dist/, caches
 	rm -rf .venv out build dist web/dist web/node_modules web/src/generated docs/generated docs/gallery_of_examples .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

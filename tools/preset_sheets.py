@@ -63,6 +63,12 @@ def tile_of(renderer: tl.Renderer, preset: Preset, stage: str, again: bool) -> I
         return picture.convert("RGB")
 
 
+def corner(number: int) -> tuple[int, int]:
+    """Left and upper pixel of a preset on its sheet: its name, and its tiles below that."""
+    row, column = divmod(number, COLUMNS)
+    return GAP + column * (len(STAGES) * TILE[0] + GAP), GAP + row * (TILE[1] + NAME + GAP)
+
+
 def sheet_of(renderer: tl.Renderer, presets: list[Preset], named: set[str]) -> Image.Image:
     """All these presets beside their names."""
     rows = -(-len(presets) // COLUMNS)
@@ -70,7 +76,7 @@ def sheet_of(renderer: tl.Renderer, presets: list[Preset], named: set[str]) -> I
     sheet = Image.new("RGB", (COLUMNS * width + GAP, rows * height + GAP), "white")
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
     for i, preset in enumerate(presets):
-        left, top = GAP + i % COLUMNS * width, GAP + i // COLUMNS * height
+        left, top = corner(i)
         draw.text((left, top), preset.name, fill="black", font=font)
         for k, stage in enumerate(STAGES):
             tile = tile_of(renderer, preset, stage, preset.name in named)
