@@ -2,8 +2,7 @@
 
 #if DIFFUSED
 #include "lib/diffusion.glsl"
-
-uniform sampler3D diffused_light;    // grids of all bodies: below, the fluence at the surface; above, what enters there
+#include "shade/diffused_texture.glsl"
 
 // Basic radiance L / n^2 inside an object, below a point of its surface and towards it; cosine: of the direction there;
 // optical_depth: of the path back through the object, on which it has been scattered.

@@ -5,6 +5,7 @@
 
 #include "lib/bsdf.glsl"
 #include "shade/environment_light.glsl"
+#include "shade/ground_light.glsl"
 #include "shade/highlight.glsl"
 #include "shade/lights.glsl"
 #include "shade/reflectance_table.glsl"
@@ -105,7 +106,8 @@ vec3 opaque_environment(OpaqueSurface surface, OpaqueBsdf bsdf, vec3 normal, vec
     float last = surface.passed == vec3(0.0) ? 1.0 : -1.0;
     for (float side = 1.0; side >= last; side -= 2.0) {
         vec3 albedo = surface.unoccluded * (side > 0.0 ? bsdf.base : bsdf.passed);
-        sum += albedo * environment_irradiance(side * normal) * environment_reaching(point, side * normal) / PI;
+        vec3 irradiance = environment_irradiance(side * normal) * environment_reaching(point, side * normal);
+        sum += albedo * (irradiance + ground_light(point, side * normal)) / PI;
     }
 #if CLEAR_COAT
     sum = (1.0 - bsdf.coated) * sum + surface.unoccluded * bsdf.coated * environment_light(direction, surface.clearcoat.y);

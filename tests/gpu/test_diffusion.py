@@ -94,6 +94,19 @@ def test_lossless_bodies_vanish_in_white_light(
     assert np.abs(off).max() < worst
 
 
+@pytest.mark.parametrize("surface", [None, tl.Surface(color=(1, 1, 1), ior=1.0, roughness=1.0)])
+def test_lossless_bodies_vanish_on_a_white_ground(renderer: tl.Renderer, surface: tl.Surface | None) -> None:
+    """What the ground takes of the sky it sends into the body, and the other way round; rays see that, too."""
+    corners = 60.0 * np.array([(-1, 0, -1), (-1, 0, 1), (1, 0, 1), (1, 0, -1)]) - (0.0, 1.01, 0.0)
+    ground = tl.Object(tl.Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]])), None, color=(1, 1, 1), surface=surface)
+    body = tl.Object(BALL, tl.Medium(scattering=20.0, ior=1.0 if surface is None else 1.4))
+    camera = tl.Camera.look_at((1.0, 2.0, 5.0), (0, -0.4, 0), fov_y=40.0)
+    scene = tl.Scene([body, ground], camera, environment=WHITE, environment_shadows=128)
+    off = np.abs(renderer.render(scene, (64, 64), samples=4, scattering=COARSE).radiance - 1.0)
+    assert np.quantile(off, 0.99) < 0.05
+    assert off.mean() < 0.006
+
+
 def test_a_scene_that_is_turned_as_a_whole_looks_the_same(renderer: tl.Renderer) -> None:
     """Grids turn with their bodies; measured: pixels differ by 2e-5."""
     turn, stretch = np.eye(4), np.diag([1.0, 0.7, 1.2, 1.0])

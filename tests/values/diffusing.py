@@ -6,7 +6,6 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import sparse
 
 import translucent as tl
 from translucent.diffusion.field import DiffusingBody, DiffusionField
@@ -41,14 +40,13 @@ def lit(
 ) -> DiffuseSolution:
     """Light of a body on which none of its light falls again."""
     flux = np.broadcast_to(np.asarray(entering, np.float64), (len(grid.points), 3)).copy()
-    nothing = sparse.csr_array((len(flux), len(flux)))
-    return BodySystem(grid, medium, 0.0).solved(flux, nothing, np.zeros((grid.count, 3)) if inside is None else inside)
+    return BodySystem(grid, medium, 0.0).solved(flux, None, np.zeros((grid.count, 3)) if inside is None else inside)
 
 
 def lit_by_rays(grid: BodyGrid, medium: tl.Medium, rays: EnteringRays) -> DiffuseSolution:
     """Light of a body in a rays, on which none of its light falls again."""
-    dark, nothing = np.zeros((len(grid.points), 3)), sparse.csr_array((len(grid.points),) * 2)
-    return BodySystem(grid, medium, 0.0).solved(dark, nothing, np.zeros((grid.count, 3)), [rays])
+    dark = np.zeros((len(grid.points), 3))
+    return BodySystem(grid, medium, 0.0).solved(dark, None, np.zeros((grid.count, 3)), [rays])
 
 
 def entering_of(grid: BodyGrid, rays: EnteringRays) -> Array:

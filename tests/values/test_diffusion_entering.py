@@ -155,6 +155,7 @@ def test_bright_parts_of_the_environment_enter_as_lamps_do(monkeypatch: pytest.M
     sun = zones(BLACK, tl.DirectionalLight((0, -1, 0), (1, 1, 1)))
     directed = zones(overhead)
     monkeypatch.setattr(entering, "BRIGHT", 1e9)
+    monkeypatch.setattr(entering, "SUN", 1e9)
     uniform = zones(overhead)
     off = [float(np.abs(found - sun).max()) for found in (directed, uniform)]
     print(off)

@@ -26,14 +26,14 @@ def test_mixed_lights_take_no_steps() -> None:
     """Dimmed, tinted, and both together, once each has been solved for; and solutions are those from nothing."""
     body = tl.Object(Sphere().tessellate(24), MILK)
     grid = body_grid(body, Diffusion(12).cell_size(body))
-    count, itself = len(grid.points), sparse.csr_array((len(grid.points),) * 2)
+    count = len(grid.points)
     system = BodySystem(grid, MILK, 0.0, warm_starts=True)
     dark = np.zeros((grid.count, 3))
     above = np.maximum(grid.normals[:, :1], 0.0) * np.ones(3)
     even, steps = np.ones((count, 3)), []
     for entering in (even, above, 0.2 * above, 3.0 * even + 0.5 * above, even * (0.1, 1.0, 2.0)):
-        found = system.solved(entering, itself, dark)
-        alone = BodySystem(grid, MILK, 0.0).solved(entering, itself, dark)
+        found = system.solved(entering, None, dark)
+        alone = BodySystem(grid, MILK, 0.0).solved(entering, None, dark)
         np.testing.assert_allclose(found.fluence, alone.fluence, atol=20 * TOLERANCE * alone.fluence.max())
         steps.append(found.steps)
     assert min(steps[:2]) > 10

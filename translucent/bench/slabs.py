@@ -9,7 +9,6 @@ from functools import cache
 from typing import ClassVar, Literal
 
 import numpy as np
-from scipy import sparse
 
 from translucent.arrays import Array
 from translucent.bench.claims import SLAB_CLAIMS, Judge
@@ -129,8 +128,7 @@ def _diffused(medium: Medium) -> Array:
     top, bottom = grid.face_normals[:, 1] > 0.9, grid.face_normals[:, 1] < -0.9
     middle = np.abs(grid.points[:, [0, 2]]).max(axis=1) < MIDDLE
     flux = np.repeat(top.astype(np.float64)[:, None], 3, axis=1)
-    from_itself = sparse.csr_array((len(flux), len(flux)))
-    found = BodySystem(grid, medium, 0.0).solved(flux, from_itself, np.zeros((grid.count, 3)))
+    found = BodySystem(grid, medium, 0.0).solved(flux, None, np.zeros((grid.count, 3)))
     leaving = np.stack([found.fluence[side & middle].mean(axis=0) for side in (top, bottom)])
     return diffuse_interface(medium.ior).exit_share * leaving
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from threading import Lock
 
-from translucent.diffusion.entering import opaque_surfaces
+import numpy as np
+
+from translucent.arrays import Array, Integers
+from translucent.diffusion.entering import bounding_ball, opaque_surfaces, radiance_without_suns
+from translucent.diffusion.exchange import GroundMap, GroundPoints, OpaqueSurfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.diffusion.keys import (
     coefficients_of,
@@ -15,6 +19,7 @@ from translucent.diffusion.keys import (
     diffusion_key,
     kept,
     media_lit_by_photons,
+    opaque_key,
     place_of,
     roughness_of,
 )
@@ -28,7 +33,8 @@ from translucent.planning.caustics import opaque_to_shadows
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.scattering import Diffusion
-from translucent.scene.scene import Object
+from translucent.scene.grounds import ground_below
+from translucent.scene.scene import Object, Scene
 
 #: Bodies, and lit scenes, that are kept.
 KEPT_BODIES, KEPT_SCENES = 16, 4
@@ -42,10 +48,13 @@ class Fields:
     ----------
     surfaces : dict of int to DiffusionField
     volumes : dict of int to VolumeField
+    ground : GroundMap, optional
+        Light that the bodies with surfaces send to a ground.
     """
 
     surfaces: dict[int, DiffusionField]
     volumes: dict[int, VolumeField]
+    ground: GroundMap | None = None
 
     def __bool__(self) -> bool:
         """True if light diffuses in any body."""
@@ -68,7 +77,7 @@ class FieldCache:
     def __init__(self, *, warm_starts: bool = False) -> None:
         self._warm_starts = warm_starts
         self._lock = Lock()
-        self._opaque: OrderedDict[Hashable, RayCaster | None] = OrderedDict()
+        self._opaque: OrderedDict[Hashable, OpaqueSurfaces | None] = OrderedDict()
         self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
         self._shapes: OrderedDict[Hashable, BodyShape] = OrderedDict()
         self._systems: OrderedDict[Hashable, BodySystem] = OrderedDict()
@@ -88,18 +97,19 @@ class FieldCache:
             return known  # nobody waits for other light that a thread looks for
 
         def make() -> Fields:
-            places = tuple(place_of(item) for item in scene.opaque)
+            places = tuple(opaque_key(item) for item in scene.opaque)
             opaque = kept(self._opaque, places, lambda: opaque_surfaces(scene.opaque), 1)
-            surfaces, volumes = {}, {}
+            surfaces, volumes, lit = {}, {}, {}
             bent = self._bent(plan)
             for i, medium in diffusing_media(scene).items():
                 body = scene.objects[i]
                 if treatment_of(body) is Treatment.DIFFUSION:
                     own = self._body(body, medium, places, opaque, diffusion)
                     surfaces[i] = own.field(scene, i, bent.entering.get(i), bent.stops.get(i))
+                    lit[i] = own.lit
                 else:
                     volumes[i] = self._volume(body, medium, diffusion).field(scene, bent.volumes.get(i))
-            return Fields(surfaces, volumes)
+            return Fields(surfaces, volumes, ground_map(scene, lit, surfaces))
 
         with self._lock:
             return kept(self._scenes, key, make, KEPT_SCENES)
@@ -128,7 +138,7 @@ class FieldCache:
                 store.clear()
 
     def _body(
-        self, body: Object, medium: Medium, places: Hashable, opaque: RayCaster | None, diffusion: Diffusion
+        self, body: Object, medium: Medium, places: Hashable, opaque: OpaqueSurfaces | None, diffusion: Diffusion
     ) -> DiffusingBody:
         roughness, own = roughness_of(body), own_frame(body)
         step = diffusion.cell_size(own)
@@ -176,7 +186,8 @@ class FieldCache:
         cells = {i: FineCells.of(own.cells.low, own.cells.step, own.number.shape) for i, own in grids.items()}
         found = photons_in_media(scene, caustics, cells, [i for i in lit if i not in fogs])
         bending = opaque_to_shadows(scene)
-        stops = {i: opaque_surfaces([scene.objects[k] for k in sorted(bending - {i})]) for i in lit}
+        bent = {i: opaque_surfaces([scene.objects[k] for k in sorted(bending - {i})]) for i in lit}
+        stops = {i: None if surfaces is None else surfaces.caster for i, surfaces in bent.items()}
         return _Bent({i: PhotonFluence(cells[i], found.fluence[i], stops[i]) for i in fogs}, found.entering, stops)
 
 
@@ -187,6 +198,26 @@ class _Bent:
     volumes: dict[int, PhotonFluence]
     entering: dict[int, EnteringPhotons]
     stops: dict[int, RayCaster | None]
+
+
+def ground_map(scene: Scene, lit: Mapping[int, LitBody], surfaces: Mapping[int, DiffusionField]) -> GroundMap | None:
+    """Light that bodies, by their numbers, send to the ground below them; None without one.
+
+    Where the environment reaches the ground through everything, as a scene may say, it counts for as much as it does.
+    """
+    if not lit or (ground := ground_below(scene, sorted(lit))) is None:
+        return None
+    low, high = scene.boxes[sorted(lit)].transpose(1, 0, 2)
+    points = GroundPoints(ground, scene.objects.index(ground.ground), np.stack([low.min(axis=0), high.max(axis=0)]))
+    total = np.zeros(points.points.shape)
+    for i, body in lit.items():
+
+        def light(sample: Integers, directions: Array, leaving: Array = surfaces[i].leaving) -> Array:
+            sent = leaving[sample] / np.pi
+            return sent if scene.environment_shadows else sent - radiance_without_suns(scene.environment, directions)
+
+        total += points.irradiance(bounding_ball(scene.objects[i]), body.nearest, light)
+    return points.map(np.maximum(total, 0.0))
 
 
 def _density_place(body: Object, diffusion: Diffusion) -> Hashable:

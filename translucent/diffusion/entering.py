@@ -12,6 +12,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
+from translucent.diffusion.exchange import OpaqueSurfaces
 from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, other_plane_points
 from translucent.diffusion.keys import may_dim
@@ -19,11 +20,10 @@ from translucent.diffusion.photons import EnteringPhotons
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
 from translucent.formulas.interface import refracted_direction
-from translucent.geometry.mesh import Mesh, Triangles, joined
 from translucent.geometry.ray_caster import RayCaster, ray_caster_of
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import row_solid_angles, texel_directions
-from translucent.scene.lights import PositionalLight
+from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Object, Scene
 
 #: Faces of one body on a line that are looked for.
@@ -50,7 +50,7 @@ def light_passed(bodies: Sequence[Object], points: Array, directions: Array, dis
 
 def sky_paths(body: Object, points: Array, directions: Array, visible: Mask) -> sparse.csr_array:
     """(s, k): metres in another body from points (s, 3) in unit directions (k, 3) that are `visible`."""
-    center, radius = _bounding_ball(body)
+    center, radius = bounding_ball(body)
     towards = center - points
     along = towards @ directions.T
     near = (towards**2).sum(axis=1)[:, None] - along**2 <= radius**2
@@ -61,7 +61,7 @@ def sky_paths(body: Object, points: Array, directions: Array, visible: Mask) -> 
     return sparse.csr_array((metres[crossed], (sample[crossed], direction[crossed])), visible.shape)
 
 
-def _bounding_ball(body: Object) -> tuple[Array, float]:
+def bounding_ball(body: Object) -> tuple[Array, float]:
     """Center and radius of a ball around a body."""
     corners = body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3]
     center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
@@ -110,6 +110,9 @@ BRIGHT = 2.0
 
 #: Rays of each sample that carry such light.
 SKY_RAYS = 4
+
+#: Radiance of an environment's picture, in units of its mean, above which light counts as that of a sun.
+SUN = 16.0
 
 #: Pairs of a sample and a direction whose transfer is found at a time.
 _TOGETHER = 1 << 13
@@ -166,12 +169,11 @@ class Occluders:
     ----------
     body : Object
         Itself.
-    opaque : RayCaster, optional
-        See `opaque_surfaces`.
+    opaque : OpaqueSurfaces, optional
     """
 
     body: Object
-    opaque: RayCaster | None = None
+    opaque: OpaqueSurfaces | None = None
 
     @cached_property
     def pose(self) -> Pose:
@@ -185,20 +187,12 @@ class Occluders:
         own = ray_caster_of(self.body.mesh).nearest(*rays)[1]
         if self.opaque is None:
             return own, np.full(len(origins), np.inf)
-        return own, self.opaque.nearest(origins, directions)[1]
+        return own, self.opaque.caster.nearest(origins, directions)[1]
 
 
-def opaque_surfaces(objects: Sequence[Object]) -> RayCaster | None:
+def opaque_surfaces(objects: Sequence[Object]) -> OpaqueSurfaces | None:
     """All opaque objects of a scene as one mesh in world coordinates, ready for rays; None if there are none."""
-    parts: list[Triangles] = [
-        (item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3], item.mesh.faces, None)
-        for item in objects
-        if len(item.mesh.faces)
-    ]
-    if not parts:
-        return None
-    vertices, faces, _ = joined(parts, "opaque objects")
-    return RayCaster(Mesh(vertices, faces))
+    return OpaqueSurfaces(objects) if any(len(item.mesh.faces) for item in objects) else None
 
 
 def flux_of(photons: EnteringPhotons, grid: BodyGrid, pose: Pose) -> Array:
@@ -261,16 +255,69 @@ def even_directions(count: int) -> Array:
     return np.stack([level * np.cos(angle), level * np.sin(angle), up], axis=1)
 
 
-def environment_parts(environment: Environment, directions: Array, turn: Array | None = None) -> Array:
+def environment_parts(
+    environment: Environment, directions: Array, turn: Array | None = None, *, suns: bool = True
+) -> Array:
     """(k, 3): radiance of the environment, integrated over the part of the sphere nearest to each direction.
 
-    `turn` (3, 3) rotates the directions to those of the environment.
+    `turn` (3, 3) rotates the directions to those of the environment. Without `suns`, see `suns_of`, all else.
     """
-    nearest, _ = nearest_parts(directions)
-    texels, angle = _map_directions()
-    texels = texels if turn is None else texels @ turn.T
-    radiance = angle[:, None] * np.asarray(environment.lighting(texels), np.float64)
+    if environment.map is None:
+        nearest, _ = nearest_parts(directions)
+        texels, angle = _map_directions()
+        radiance = angle[:, None] * np.asarray(
+            environment.lighting(texels if turn is None else texels @ turn.T), np.float64
+        )
+    else:
+        # Of a picture every pixel counts, however small the sun is.
+        texels, power, rest = _map_texels(environment)
+        nearest = np.asarray(cKDTree(directions).query(texels if turn is None else texels @ turn)[1])
+        radiance = power if suns else rest
     return np.stack([np.bincount(nearest, radiance[:, channel], len(directions)) for channel in range(3)], axis=1)
+
+
+def suns_of(environment: Environment) -> tuple[DirectionalLight, ...]:
+    """Lights for the parts of an environment that are brighter than `SUN` times its mean: for what exceeds that.
+
+    All of them together are smaller than 1 / `SUN` of the sphere. Their light comes from one direction in each of
+    `DIRECTIONS` parts of it.
+    """
+    if environment.map is None:
+        return ()
+    texels, power, rest = _map_texels(environment)
+    bright = np.flatnonzero((power - rest).any(axis=1))
+    part = cKDTree(even_directions(DIRECTIONS)).query(texels[bright])[1] if len(bright) else np.zeros(0, np.int64)
+    found = []
+    for number in np.unique(part):
+        at = bright[part == number]
+        irradiance = power[at] - rest[at]
+        found.append(DirectionalLight(-(irradiance.sum(axis=1) @ texels[at]), irradiance.sum(axis=0)))
+    return tuple(found)
+
+
+def radiance_without_suns(environment: Environment, directions: Array) -> Array:
+    """(k, 3): radiance from unit vectors (k, 3), up to `SUN` times the mean of the environment."""
+    radiance = np.asarray(environment.lighting(directions), np.float64)
+    return radiance if environment.map is None else radiance * _below_suns(radiance, environment)
+
+
+def _map_texels(environment: Environment) -> tuple[Array, Array, Array]:
+    """Directions (k, 3) in the world of an image's texels, their radiance times solid angle, and that without suns."""
+    assert environment.map is not None
+    height, width = MAP_HEIGHT, 2 * MAP_HEIGHT
+    radiance = environment.scale * environment.map.reduced(height, width).reshape(-1, 3)
+    angle = np.repeat(row_solid_angles(height, width), width)[:, None]
+    down, right = np.divmod(np.arange(height * width), width)
+    polar, azimuth = np.pi * (down + 0.5) / height, 2.0 * np.pi * ((right + 0.5) / width - environment.turn - 0.5)
+    level = np.sin(polar)
+    directions = np.stack([level * np.sin(azimuth), np.cos(polar), -level * np.cos(azimuth)], axis=1)
+    return directions, angle * radiance, angle * radiance * _below_suns(radiance, environment)
+
+
+def _below_suns(radiance: Array, environment: Environment) -> Array:
+    """(k, 1): fraction of a radiance (k, 3) that is not above `SUN` times the mean in any channel."""
+    mean = np.maximum(environment.mean, np.finfo(np.float32).tiny)
+    return np.asarray(np.minimum(1.0, SUN / np.maximum((radiance / mean).max(axis=1, keepdims=True), 1e-30)))
 
 
 def nearest_parts(directions: Array) -> tuple[Integers, Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -17,12 +18,16 @@ from translucent.diffusion.entering import (
     environment_parts,
     flux_of,
     from_light,
+    light_passed,
     nearest_parts,
+    radiance_without_suns,
     sky_light,
+    suns_of,
 )
+from translucent.diffusion.exchange import Patches, direct_irradiance
 from translucent.diffusion.first_events import EnteringRays, joined_rays
 from translucent.diffusion.grid import BodyGrid
-from translucent.diffusion.keys import dimming_key, environment_key, kept, light_key
+from translucent.diffusion.keys import dimming_key, environment_key, kept, light_key, may_dim
 from translucent.diffusion.lit_body import LitBody
 from translucent.diffusion.photons import EnteringPhotons
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
@@ -31,7 +36,7 @@ from translucent.formulas.diffuse_interface import diffuse_interface, emergent_c
 from translucent.formulas.diffusion import emergent_radiance, in_scattered_shares
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
-from translucent.scene.lights import PositionalLight
+from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Object, Scene
 
 #: Values (x, y, z, 3) in cells.
@@ -70,6 +75,8 @@ class DiffusionField:
         Of the interface; see `DiffuseInterface`.
     fluxes : tuple of 4 floats
         See `emergent_fluxes`.
+    leaving : (s, 3) float64
+        Flux that leaves the samples of the surface; see `DiffuseSolution`.
     steps : int
         Iterations of the solver.
     cells : int
@@ -93,6 +100,7 @@ class DiffusionField:
     exit_share: float
     mean_cosine: float
     fluxes: tuple[float, float, float, float]
+    leaving: Array
     steps: int
     cells: int
     ior: float
@@ -145,6 +153,10 @@ class DiffusionField:
 class DiffusingBody:
     """Solver of the subsurface light of one body and medium, for any lights.
 
+    Attributes
+    ----------
+    lit : LitBody
+
     Parameters
     ----------
     lit : LitBody
@@ -168,9 +180,10 @@ class DiffusingBody:
         corrected: bool = True,
         warm_starts: bool = False,
     ) -> None:
-        self._lit, self._medium, self._roughness = lit, medium, roughness
+        self.lit, self._medium, self._roughness = lit, medium, roughness
         self._interface = diffuse_interface(medium.ior, roughness)
         self._entrance = lit.entrance(medium.ior, roughness)
+        self._exchange = lit.exchange(medium.ior, roughness)
         self._system = system or BodySystem(
             lit.grid, medium, roughness, lit.shape.densities, corrected=corrected, warm_starts=warm_starts
         )
@@ -184,29 +197,45 @@ class DiffusingBody:
         `photons` carry the light that other bodies, whose surfaces are `stops`, refract and reflect; none of it goes
         straight through these.
         """
-        dimming, grid, pose = dimming_bodies(scene, body), self._lit.grid, self._lit.pose
+        dimming, grid, pose = dimming_bodies(scene, body), self.lit.grid, self.lit.pose
         through = (self._medium.ior, self._roughness, tuple(map(dimming_key, dimming)), stops)
+        suns = suns_of(scene.environment)
 
         def sky() -> tuple[Array, EnteringRays]:
-            directions = self._lit.shape.sky.directions
-            return self._from_sky(environment_parts(scene.environment, directions, pose.turn), dimming)
+            parts = environment_parts(scene.environment, self.lit.shape.sky.directions, pose.turn, suns=False)
+            return self._from_sky(parts, dimming)
 
-        def rays_of(light: Light) -> tuple[Array, EnteringRays]:
-            found = from_light(grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops)
+        def rays_of(light: Light, stops: RayCaster | None) -> tuple[Array, EnteringRays]:
+            found = from_light(grid, self.lit.casters, light, self._medium.ior, self._interface, dimming, stops)
             return np.zeros((0, 3)), found
 
-        arriving, most = self._lit.arriving, 1 + len(scene.lights)
+        arriving, most = self.lit.arriving, 1 + len(scene.lights) + len(suns)
         entering, bright = kept(arriving, (environment_key(scene.environment), through), sky, most)
         rays, inside = [bright], np.zeros((grid.count, 3))
         for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, pose, light.position)) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
-                rays.append(kept(arriving, (light_key(light), through), partial(rays_of, light), most)[1])
+                rays.append(kept(arriving, (light_key(light), through), partial(rays_of, light, stops), most)[1])
+        for sun in suns:  # photons carry none of its light
+            rays.append(kept(arriving, ("sun", light_key(sun), through), partial(rays_of, sun, None), most)[1])
         if photons is not None:
             entering = entering + flux_of(photons, grid, pose)
-        found = self._system.solved(entering, self._entrance.itself, inside, rays)
-        return _field(self._lit, self._medium, self._roughness, found)
+        if (patches := self.lit.patches) is not None:
+            radiosity = patches.radiosity(self._irradiance(patches, scene, body, suns))
+            entering = entering + self._exchange.received(radiosity)
+        returned = self._exchange.returned if self._exchange.any else None
+        found = self._system.solved(entering, returned, inside, rays)
+        return _field(self.lit, self._medium, self._roughness, found)
+
+    def _irradiance(self, patches: Patches, scene: Scene, body: int, suns: Sequence[DirectionalLight]) -> Array:
+        """(p, 3): light of lights and environment on patches of opaque surfaces, as far as the body lets it through."""
+        surfaces, own = self.lit.casters.opaque, scene.objects[body]
+        assert surfaces is not None
+        passing = [*dimming_bodies(scene, body), *([own] if may_dim(own) else [])]
+        passed = partial(light_passed, passing)
+        straight = direct_irradiance(patches.points, patches.normals, (*scene.lights, *suns), surfaces.caster, passed)
+        return straight + patches.from_sky(partial(radiance_without_suns, scene.environment))
 
     def _from_sky(self, parts: Array, others: list[Object]) -> tuple[Array, EnteringRays]:
         """Flux (s, 3) that enters from radiance over solid angles (k, 3), less what other bodies on its path absorb.
@@ -215,12 +244,12 @@ class DiffusingBody:
         elsewhere, and as much comes from there: in uniform light it is not missing.
         """
         if not parts.any():
-            return np.zeros((len(self._lit.grid.points), 3)), joined_rays([])
-        received, directions, ior = self._entrance.received, self._lit.shape.sky.directions, self._medium.ior
+            return np.zeros((len(self.lit.grid.points), 3)), joined_rays([])
+        received, directions, ior = self._entrance.received, self.lit.shape.sky.directions, self._medium.ior
         means = parts / nearest_parts(directions)[1][:, None]
         radiances = [np.broadcast_to(channel.astype(np.float32), received.shape) for channel in means.T]
         absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
-        paths = self._lit.sky_paths(absorbing)
+        paths = self.lit.sky_paths(absorbing)
         for channel in range(3) if absorbing else ():
             depth = sparse.csr_array(received.shape)
             for body, metres in zip(absorbing, paths, strict=True):
@@ -230,7 +259,7 @@ class DiffusingBody:
             radiances[channel] = radiances[channel].copy()
             radiances[channel][lost.row, lost.col] *= optics.transmittance(lost.data)
         mirrored = (1.0 - diffuse_interface(ior).entering) / self._interface.entering
-        return sky_light(directions, received, radiances, self._lit.grid.normals, ior, mirrored)
+        return sky_light(directions, received, radiances, self.lit.grid.normals, ior, mirrored)
 
 
 def _cell_at(grid: BodyGrid, pose: Pose, position: npt.ArrayLike) -> int:
@@ -272,6 +301,7 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
         exit_share=interface.exit_share,
         mean_cosine=cosine,
         fluxes=emergent_fluxes(medium.ior, cosine),
+        leaving=found.leaving,
         steps=found.steps,
         cells=grid.count,
         ior=medium.ior,

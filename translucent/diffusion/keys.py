@@ -36,11 +36,12 @@ def diffusion_key(plan: RenderPlan) -> Hashable:
         )
         for i, medium in diffusing_media(scene).items()
     )
-    opaque = tuple(place_of(item) for item in scene.opaque)
+    opaque = tuple(opaque_key(item) for item in scene.opaque)
     lighting = environment_key(scene.environment)
     lights = tuple(light_key(light) for light in scene.lights)
     dimming = tuple((i, dimming_key(item)) for i, item in enumerate(scene.objects) if may_dim(item))
-    return (plan.diffusion, bodies, opaque, lighting, lights, dimming, bending)
+    shadows = bool(scene.environment_shadows)  # of bodies on a ground, see `ground_map`
+    return (plan.diffusion, bodies, opaque, lighting, lights, dimming, bending, shadows)
 
 
 def environment_key(around: Environment) -> Hashable:
@@ -82,6 +83,11 @@ def diffusing_media(scene: Scene) -> dict[int, Medium]:
 def place_of(item: Object) -> tuple[object, bytes]:
     """Mesh of an object, and where it is."""
     return item.mesh, item.matrix.tobytes()
+
+
+def opaque_key(item: Object) -> Hashable:
+    """All of an opaque object that the light depends on that it blocks, reflects and emits."""
+    return place_of(item), item.base_color.tobytes(), item.surface
 
 
 def coefficients_of(medium: Medium) -> Hashable:

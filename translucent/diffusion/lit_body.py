@@ -13,11 +13,12 @@ from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
 from translucent.diffusion.entering import BEFORE, Occluders, Pose, Sky, sky_of, sky_paths, transfer
+from translucent.diffusion.exchange import Exchange, OpaqueSurfaces, Patches
 from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, Densities, body_grid, densities
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.ray_caster import RayCaster
+from translucent.geometry.ray_caster import ray_caster_of
 from translucent.scene.scene import Object
 
 #: Cells by which values at the surface are spread beyond the cells that it crosses.
@@ -101,12 +102,15 @@ class Entrance:
 
     Attributes
     ----------
+    transfer : (n,) float64
+        Flux for a unit of radiance from the part of the sphere around the direction of each pair of `Sky`.
     received : (s, k) float32
-        For a unit of radiance from the part of the sphere around each direction; 0 where the sky is hidden.
+        The same where the sky is visible, else 0.
     itself : (s, s) csr_array
         Form factors: for a unit of diffuse flux that leaves another sample.
     """
 
+    transfer: Array
     received: Floats
     itself: sparse.csr_array
 
@@ -148,7 +152,7 @@ class BodyShape:
             ends = np.searchsorted(sky.sample[sky.facing], np.arange(count + 1))
             itself = sparse.csr_array((flux[sky.facing] / np.pi, sky.other, ends), (count, count))
             self._entrances.clear()
-            self._entrances[ior, roughness] = Entrance(received, itself)
+            self._entrances[ior, roughness] = Entrance(flux, received, itself)
         return self._entrances[ior, roughness]
 
 
@@ -217,16 +221,49 @@ class LitBody:
     @cached_property
     def _hidden(self) -> Mask:
         """(n,): pairs of `Sky` in which something opaque is before the sky, or before the body itself."""
-        sky, opaque, starts = self.shape.sky, self.casters.opaque, self._starts
+        sky, starts = self.shape.sky, self._starts
         hidden = np.zeros(len(sky.sample), bool)
-        if opaque is None:
+        if self.casters.opaque is None:
             return hidden
+        opaque = self.casters.opaque.caster
         directions, (low, high) = self.pose.outwards(sky.directions), opaque.bounds
         away = ((starts.min(axis=0) > high) & (directions >= 0.0)) | ((starts.max(axis=0) < low) & (directions <= 0.0))
         pairs = np.flatnonzero(~away.any(axis=1)[sky.direction])
         distance = opaque.distances(starts, directions, sky.sample[pairs], sky.direction[pairs])
         hidden[pairs] = distance < sky.distance[pairs]
         return hidden
+
+    @cached_property
+    def patches(self) -> Patches | None:
+        """Patches of opaque surfaces that the samples see; None if there are none."""
+        if self.casters.opaque is None or not self._hidden.any():
+            return None
+        sky, pairs = self.shape.sky, np.flatnonzero(self._hidden)
+        rays = self._starts[sky.sample[pairs]], self.pose.outwards(sky.directions)[sky.direction[pairs]]
+        step, samples = self.grid.cells.step, len(self.grid.points)
+        return Patches.of(self.casters.opaque, pairs, rays, step, self.nearest, samples)
+
+    def nearest(self, origins: Array, directions: Array) -> tuple[Array, Integers]:
+        """Distance (k,) at which rays (k, 3), (k, 3) of the world hit the body, inf for none, and the sample there."""
+        into, number = np.linalg.inv(self.casters.body.matrix), np.arange(len(origins))
+        local = origins @ into[:3, :3].T + into[:3, 3], directions @ into[:3, :3].T
+        distance = ray_caster_of(self.casters.body.mesh).distances(*local, number, number).astype(np.float64)
+        sample, hit = np.zeros(len(origins), np.int64), np.isfinite(distance)
+        places = origins[hit] + distance[hit, None] * directions[hit]
+        sample[hit] = self._tree.query(self.pose.inwards(places - self.pose.shift))[1]
+        return distance, sample
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.grid.points)
+
+    def exchange(self, ior: float, roughness: float) -> Exchange:
+        """Flux that enters for what leaves, through an interface with this index and roughness."""
+        entrance, patches = self.entrance(ior, roughness), self.patches
+        if patches is None:
+            return Exchange(entrance.itself)
+        seen = patches.seen(self.shape.sky.sample, entrance.transfer, len(self.grid.points))
+        return Exchange(entrance.itself, patches, seen)
 
     def entrance(self, ior: float, roughness: float) -> Entrance:
         """Transfer through an interface with this index and roughness; the last one is cached."""
@@ -238,7 +275,7 @@ class LitBody:
             received[sky.sample[hidden], sky.direction[hidden]] = 0.0
             itself.data[hidden[sky.facing]] = 0.0
             self._entrances.clear()
-            self._entrances[ior, roughness] = Entrance(received, itself)
+            self._entrances[ior, roughness] = Entrance(free.transfer, received, itself)
         return self._entrances[ior, roughness]
 
 
@@ -247,8 +284,8 @@ def own_frame(body: Object) -> Object:
     return replace(body, transform=Pose.of(body.matrix)[1])
 
 
-def lit_body(body: Object, opaque: RayCaster | None, step: float, shape: BodyShape | None = None) -> LitBody:
-    """Geometry of a body with cells of this side, shadowed by itself and by `opaque_surfaces`.
+def lit_body(body: Object, opaque: OpaqueSurfaces | None, step: float, shape: BodyShape | None = None) -> LitBody:
+    """Geometry of a body with cells of this side, shadowed by itself and by opaque surfaces.
 
     `shape` is that of its own frame, where it is known.
     """

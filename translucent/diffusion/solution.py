@@ -14,8 +14,10 @@ optimization"; Haskell et al. 1994 for the condition at the surface; Grosjean 19
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
 
 import numpy as np
 from scipy import sparse
@@ -224,6 +226,8 @@ class DiffuseSolution:
         Flux that enters, that of the body itself included.
     inside : (cells, 3) float64
         Fluence in the cells.
+    leaving : (s, 3) float64
+        Flux that leaves the samples: what has been in the body, and what its surface mirrors.
     scattered : (s, 3) float64
         Fraction of the paths through the body from each sample on which uniform light is scattered.
     steps : int
@@ -233,8 +237,17 @@ class DiffuseSolution:
     fluence: Array
     entering: Array
     inside: Array
+    leaving: Array
     scattered: Array
     steps: int
+
+
+class Returned(Protocol):
+    """Flux (s,) that enters a body again in a color channel, for a flux (s,) that leaves it."""
+
+    def __call__(self, leaving: Array, channel: int) -> Array:
+        """(s,): flux that enters."""
+        ...
 
 
 class BodySystem:
@@ -291,7 +304,7 @@ class BodySystem:
 
     @np.errstate(under="ignore")
     def solved(
-        self, entering: Array, from_itself: sparse.csr_array, inside: Array, rays: Sequence[EnteringRays] = ()
+        self, entering: Array, returned: Returned | None, inside: Array, rays: Sequence[EnteringRays] = ()
     ) -> DiffuseSolution:
         """Light at the body's surface.
 
@@ -299,8 +312,8 @@ class BodySystem:
         ----------
         entering : (s, 3)
             Flux that enters at the samples from outside, in W/m^2, from all around.
-        from_itself : (s, s) csr_array
-            Flux that enters for the flux that leaves each sample.
+        returned : callable, optional
+            Flux (s,) that enters again in a color channel, for a flux (s,) that leaves the samples.
         inside : (cells, 3)
             Power of lights inside each cell, in W.
         rays : sequence of EnteringRays
@@ -311,19 +324,24 @@ class BodySystem:
             If the solver does not get there.
         """
         fluence, flux, cells = np.zeros_like(entering), entering.copy(), np.zeros_like(inside)
-        scattered = np.ones_like(entering)
+        scattered, leaving = np.ones_like(entering), np.zeros_like(entering)
         steps, ray = 0, joined_rays(rays)
         path = entry_paths(ray, self._grid, self._dense)
         for channel, system in self._channels.items():
             emission = float(self._emitted[channel])
             straight = system.directional(ray.entering[:, channel], ray.mirrored[:, channel], path)
             found = system.solved(
-                entering[:, channel], from_itself, inside[:, channel], emission, straight, self._warm_starts
+                entering[:, channel],
+                None if returned is None else partial(returned, channel=channel),
+                inside[:, channel],
+                emission,
+                straight,
+                self._warm_starts,
             )
-            fluence[:, channel], flux[:, channel], cells[:, channel], taken = found
+            fluence[:, channel], flux[:, channel], leaving[:, channel], cells[:, channel], taken = found
             scattered[:, channel] = system.scattered
             steps += taken
-        return DiffuseSolution(fluence, flux, cells, scattered, steps)
+        return DiffuseSolution(fluence, flux, cells, leaving, scattered, steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -417,15 +435,15 @@ class _ChannelSystem:
     def solved(
         self,
         entering: Array,
-        from_itself: sparse.csr_array,
+        returned: Callable[[Array], Array] | None,
         power: Array,
         emission: float,
         straight: _DirectionalEffects,
         warm_starts: bool,
-    ) -> tuple[Array, Array, Array, int]:
-        """Fluence and flux at the samples, fluence in the cells, and steps.
+    ) -> tuple[Array, Array, Array, Array, int]:
+        """Fluence, flux that enters and that leaves at the samples, fluence in the cells, and steps.
 
-        Light of the body falls on it again until little changes.
+        Light of the body falls on it again, as `returned` says of a flux that leaves, until little changes.
         """
         inside = self._albedo * (power + emission * self._emitted_cells) + straight.power
         emitted = self._albedo * emission * self._emitted_near + straight.near
@@ -437,14 +455,16 @@ class _ChannelSystem:
             fluence = (self._read @ cells) * self._attenuated + self._diffuse.near * flux + emitted
             return np.asarray(np.maximum(fluence, 0.0) * self._correction)
 
-        def received(fluence: Array, flux: Array) -> Array:
+        def leaving(fluence: Array, flux: Array) -> Array:
             # What the surface mirrors goes on as if it was diffuse.
-            leaving = self._exit_fraction * fluence + self._mirrored * flux + straight.mirrored
-            return np.asarray(entering + from_itself @ leaving)
+            return np.asarray(self._exit_fraction * fluence + self._mirrored * flux + straight.mirrored)
+
+        def received(fluence: Array, flux: Array) -> Array:
+            return entering if returned is None else entering + returned(leaving(fluence, flux))
 
         near, flux, steps = self._cells.even(source(entering)), entering, 0
         before, tolerance = np.zeros_like(entering), TOLERANCE
-        if from_itself.nnz:
+        if returned is not None:
             flux, tolerance = received(at_surface(near, entering), entering), FIRST
         for _ in range(MOST_BOUNCES):
             near, taken = self._cells.solved(source(flux), None if warm_starts else near, tolerance)
@@ -453,13 +473,13 @@ class _ChannelSystem:
             change = received(fluence, flux) - flux
             # Fraction of the last change that returns now. In a hollow it is nearly all, and always the same: so much
             # is still to come.
-            returned = float(change @ before) / max(float(before @ before), np.finfo(np.float64).tiny)
-            returned = min(max(returned, 0.0), MOST_RETURNED)
-            flux = np.maximum(flux + change / (1.0 - returned), 0.0)
+            again = float(change @ before) / max(float(before @ before), np.finfo(np.float64).tiny)
+            again = min(max(again, 0.0), MOST_RETURNED)
+            flux = np.maximum(flux + change / (1.0 - again), 0.0)
             most = np.abs(flux + straight.flux).max(initial=0.0)
             largest = np.abs(change).max(initial=0.0)
-            if tolerance == TOLERANCE and largest <= ENOUGH * (1.0 - returned) * most:
+            if tolerance == TOLERANCE and largest <= ENOUGH * (1.0 - again) * most:
                 break
             tolerance = min(max(OF_CHANGE * largest / max(most, np.finfo(np.float64).tiny), TOLERANCE), FIRST)
-            before = change if returned == 0.0 else np.zeros_like(entering)
-        return fluence, flux + straight.flux, np.maximum(near, 0.0), steps
+            before = change if again == 0.0 else np.zeros_like(entering)
+        return fluence, flux + straight.flux, leaving(fluence, flux), np.maximum(near, 0.0), steps

@@ -138,6 +138,7 @@ CONSTANTS: dict[str, str] = {
     "HARMONIC_2": repr(BAND_2),
     "HARMONIC_2_ZONAL": repr(BAND_2_ZONAL),
     "CLEARCOAT_IOR": repr(CLEARCOAT_IOR),
+    "GROUND_TOLERANCE": "1e-3",  # distance from its plane up to which a point is on a ground, in sizes of its map
     "FILM_CENTERS": f"vec3{FILM_CENTERS}",
     "FILM_WIDTHS": f"vec3{FILM_WIDTHS}",
     "FILM_BLUE_CENTER": repr(FILM_BLUE_CENTER),

@@ -41,6 +41,8 @@ class DiffusedTexture:
     fields : Fields
     first_layers : dict of int to int
         Of each object in the texture.
+    ground_layer : int
+        Of the map of a ground, if there is one.
     """
 
     def __init__(self, gl: moderngl.Context, fields: Fields) -> None:
@@ -49,6 +51,8 @@ class DiffusedTexture:
         volumes = {number: field.volumes for number, field in (fields.surfaces | fields.volumes).items()}
         shapes = np.array([values.shape for arrays in volumes.values() for values in arrays])
         extent = shapes[:, 0].max(), shapes[:, 1].max(), shapes[:, 2].sum()
+        if (ground := fields.ground) is not None:
+            extent = max(extent[0], len(ground.values)), max(extent[1], len(ground.values)), extent[2] + 1
         width, height, layers = (unlike_powers(int(side)) for side in extent)
         texels = np.zeros((layers, height, width, 4), np.float32)
         first = 0
@@ -58,6 +62,9 @@ class DiffusedTexture:
                 across, up, deep = values.shape[:3]
                 texels[first : first + deep, :up, :across, :3] = values.transpose(2, 1, 0, 3)
                 first += deep
+        self.ground_layer = first
+        if ground is not None:
+            texels[first, : len(ground.values), : len(ground.values), :3] = ground.values
         self.texture = gl.texture3d((width, height, layers), 4, texels, dtype="f4")
         self.texture.filter = moderngl.LINEAR, moderngl.LINEAR
         self.texture.repeat_x = self.texture.repeat_y = self.texture.repeat_z = False
@@ -85,6 +92,20 @@ class DiffusedTexture:
             }
             for number, field in self.fields.surfaces.items()
         }
+
+
+def ground_uniforms(light: DiffusedTexture | None, center: Array) -> dict[str, npt.ArrayLike]:
+    """Fields of the Lights block for the light that bodies send to a ground; positions count from `center`."""
+    if light is None or (ground := light.fields.ground) is None:
+        names = "ground_light_plane", "ground_light_right", "ground_light_up"
+        return {"ground_light_layer": np.zeros(2), **dict.fromkeys(names, np.zeros(4))}
+    rows = ground.axes / np.square(ground.axes).sum(axis=1, keepdims=True)
+    return {
+        "ground_light_layer": (light.ground_layer, len(ground.values)),
+        "ground_light_plane": (*ground.normal, ground.height - float(ground.normal @ center)),
+        "ground_light_right": (*rows[0], float(rows[0] @ (center - ground.middle))),
+        "ground_light_up": (*rows[1], float(rows[1] @ (center - ground.middle))),
+    }
 
 
 def slot_grids(light: DiffusedTexture | None, slots: Sequence[Slot], center: Array) -> dict[str, Array]:

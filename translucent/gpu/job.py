@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.gpu.diffusion import DiffusedTexture, density_uniforms, scene_grids
+from translucent.gpu.diffusion import DiffusedTexture, density_uniforms, ground_uniforms, scene_grids
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import (
     BODY,
@@ -283,9 +283,10 @@ class FrameJob(CameraView):
         self.media_apart = self.features.media_apart if self.compact else None
         placed = placed or PlacedScene.of(scene)
         counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))
-        contents = _contents(self.features, placed, Balance.of(placed, plan.method, counts), targets.size)
+        light = resources.diffusion.of(plan)
+        ground = ground_uniforms(light, media_center(scene))
+        contents = _contents(self.features, placed, Balance.of(placed, plan.method, counts), targets.size, ground)
         if self.features.varies:
-            light = resources.diffusion.of(plan)
             contents[DENSITY] = density_uniforms(scene, self.features.slots, media_sphere(scene)[0], light)
         super().__init__(gl, placed, self.roles_of(counts), contents, targets, resources)
         self._cleared: set[str] = set()
@@ -426,7 +427,11 @@ class FrameJob(CameraView):
 
 
 def _contents(
-    features: FrameFeatures, placed: PlacedScene, balance: Balance, size: tuple[int, int]
+    features: FrameFeatures,
+    placed: PlacedScene,
+    balance: Balance,
+    size: tuple[int, int],
+    ground: dict[str, npt.ArrayLike],
 ) -> dict[UniformBlock, bytes]:
     """Contents of the uniform blocks that are the same for all samples of a frame."""
     scene = placed.scene
@@ -434,7 +439,7 @@ def _contents(
     contents = {
         SHADE: shade_uniforms(scene, balance),
         MEDIA: media_uniforms(placed, features.slots),
-        LIGHTS: light_uniforms(scene, shine),
+        LIGHTS: light_uniforms(scene, shine, ground),
         ENVIRONMENT: environment_uniforms(scene.environment),
     }
     if features.has_surfaces or features.path_traced or features.has_caustics or features.shadows_backdrop:

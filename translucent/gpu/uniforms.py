@@ -419,8 +419,10 @@ def slot_bits(count: int) -> int:
     return max(count - 1, 0).bit_length()
 
 
-def light_uniforms(scene: Scene, shine: bool) -> bytes:
+def light_uniforms(scene: Scene, shine: bool, ground: Mapping[str, npt.ArrayLike]) -> bytes:
     """Contents of the Lights block; none of them lights surfaces where there are none that they could shine on.
+
+    `ground` has its fields of the light that bodies send to a ground.
 
     Raises
     ------
@@ -440,7 +442,14 @@ def light_uniforms(scene: Scene, shine: bool) -> bytes:
         else:
             position[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
     count = len(lights) if shine else 0
-    return LIGHTS.pack(light_position=position, light_power=power, light_disc=disc, light_cone=cone, light_count=count)
+    return LIGHTS.pack(
+        light_position=position,
+        light_power=power,
+        light_disc=disc,
+        light_cone=cone,
+        light_count=count,
+        **ground,
+    )
 
 
 def shade_uniforms(scene: Scene, balance: Balance) -> bytes:

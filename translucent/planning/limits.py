@@ -11,6 +11,7 @@ from translucent.planning.interfaces import InterfaceMode
 from translucent.planning.methods import Method
 from translucent.planning.passes import Note, NoteKind
 from translucent.planning.rendered import Treatment, treatment_of
+from translucent.scene.grounds import ground_below
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Largest number of lights that shine on surfaces.
@@ -261,6 +262,9 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             f"{object_names(bodies)}: what other bodies scatter of the environment's light reaches them, and "
             "what is smaller than a cell has no light of its own"
         )
+        ground = ground_below(scene, [i for i, body in enumerate(scene.objects) if body in bodies])
+        if others := [item for item in scene.opaque if ground is None or item is not ground.ground]:
+            text += f"; of the light that they send out, none reaches {object_names(others)}"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -57,6 +58,24 @@ def mirror_of(scene: Scene) -> Mirror | None:
 def ground_of(scene: Scene) -> Mirror | None:
     """Ground of a scene, if it has one: the first flat shadow catcher that is opaque."""
     return next((found for item in scene.opaque if item.shadow_catcher and (found := _flat(item))), None)
+
+
+def ground_below(scene: Scene, bodies: Sequence[int]) -> Mirror | None:
+    """Flat opaque surface that is nearest to some bodies, which are all on one side of it; None if there is none.
+
+    Its normal is towards the bodies.
+    """
+    boxes = scene.boxes[list(bodies)]
+    best, found = np.inf, None
+    for item in scene.opaque:
+        if (mirror := _flat(item)) is None:
+            continue
+        for sign in (1.0, -1.0):
+            normal, height = sign * mirror.normal, sign * mirror.height
+            lowest = float((np.where(normal > 0, boxes[:, 0], boxes[:, 1]) @ normal).min()) - height
+            if -SUNK * scene.diagonal <= lowest < best:
+                best, found = lowest, Mirror(item, normal, height)
+    return found
 
 
 def ground_from_above(scene: Scene) -> Mirror | None:

@@ -159,7 +159,7 @@ class CausticsPass:
         framebuffer.clear(depth=1.0)
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<="
-        unshadowed = shadow_switches(False, job.resources)
+        unshadowed = shadow_switches(False, job.resources) | {"DIFFUSED": False}
         bare = unshadowed | coat_switches(())
         for i in objects[::-1]:
             body = job.scene.objects[i]

@@ -74,6 +74,7 @@ class LayersPass:
             SHADOW_MAPS=0,
             SHADOW_SPECTRAL=0,
             GROUND_SHADOWS=0,
+            DIFFUSED=0,
             **look_switches(body),
             **coat_switches([body]),
         )

@@ -32,8 +32,9 @@ class OpaquePass:
     """Nearest opaque surface of each pixel; see ``shaders/shade/opaque.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._plain = Variants(gl, "geometry/body.vert", "shade/opaque.frag", *SURFACE_SAMPLERS)
-        self._surfaced = Variants(gl, "geometry/interface.vert", "shade/opaque.frag", *SURFACE_SAMPLERS)
+        samplers = *SURFACE_SAMPLERS, "diffused_light"
+        self._plain = Variants(gl, "geometry/body.vert", "shade/opaque.frag", *samplers)
+        self._surfaced = Variants(gl, "geometry/interface.vert", "shade/opaque.frag", *samplers)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the opaque objects with the depth test on."""
@@ -54,6 +55,9 @@ class OpaquePass:
             job.resources.shadows.use(self._plain.units)
         common = {"LIGHT_MAP": light_map, "DEPTH_ONLY": False, "PROJECTED_DEPTH": False}
         common |= shadow_switches(job.features.has_shadow_maps, job.resources)
+        if (light := job.diffused_light) is not None:
+            light.texture.use(self._plain.units["diffused_light"])
+        common["DIFFUSED"] = light is not None
         if light_map:
             job.resources.environments.light(environment).irradiance.use(self._plain.units["light_irradiance"])
         ground = job.resources.shadows.ground if job.features.has_shadow_maps else None
@@ -93,7 +97,7 @@ class OpaquePass:
         framebuffer.use()
         view.gl.enable_only(moderngl.DEPTH_TEST)
         common = {"LIGHT_MAP": False, "DEPTH_ONLY": True, "PROJECTED_DEPTH": projected}
-        common |= shadow_switches(False, view.resources) | coat_switches(())
+        common |= shadow_switches(False, view.resources) | coat_switches(()) | {"DIFFUSED": False}
         for i in objects:
             surface = view.scene.objects[i].surface
             if surface is None or not surface.alpha_cutoff:

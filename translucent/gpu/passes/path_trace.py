@@ -277,6 +277,7 @@ def _switches(job: FrameJob) -> dict[str, bool | int]:
         "BASES": bases,
         "ROUGH": any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies),
         "DISPERSION": False,
+        "DIFFUSED": False,
         "OPAQUE": pictured,
         "PICTURED": pictured,
         **interface_shadow_switches(job),

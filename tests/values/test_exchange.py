@@ -1,0 +1,106 @@
+"""Light that bodies and opaque surfaces send each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.arrays import Array, Integers
+from translucent.diffusion.cache import ground_map
+from translucent.diffusion.entering import environment_parts, even_directions, opaque_surfaces, suns_of
+from translucent.diffusion.exchange import GroundPoints
+from translucent.diffusion.field import DiffusingBody
+from translucent.diffusion.lit_body import lit_body
+from translucent.geometry.solids import Box, Sphere
+from translucent.planning.scattering import Diffusion
+from translucent.scene.environment_map import EnvironmentMap
+from translucent.scene.grounds import ground_below
+
+CAMERA = tl.Camera.look_at((0, 1, 5), (0, 0, 0))
+WHITE = tl.Environment.constant((1, 1, 1))
+BLACK = tl.Environment.constant((0, 0, 0))
+LOSSLESS = tl.Medium(scattering=(6.0, 12.0, 24.0), ior=1.4)
+
+
+def ground(color: float = 1.0, height: float = -1.02) -> tl.Object:
+    """A wide square below a ball, which faces up."""
+    corners = np.array([(-40, height, -40), (-40, height, 40), (40, height, 40), (40, height, -40)], np.float64)
+    return tl.Object(tl.Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]])), None, color=(color,) * 3)
+
+
+def solver(scene: tl.Scene) -> DiffusingBody:
+    """Solver of the first object."""
+    body = scene.objects[0]
+    assert body.medium is not None
+    lit = lit_body(body, opaque_surfaces(scene.opaque), Diffusion(12).cell_size(body))
+    return DiffusingBody(lit, body.medium, 0.0)
+
+
+def test_nothing_is_seen_of_a_white_ground_and_a_lossless_body_in_uniform_light() -> None:
+    """The light of the sky that the ground takes away it sends on; in the corner of a room, too, and not if gray."""
+    ball = tl.Object(Sphere().tessellate(24), LOSSLESS)
+    wall = tl.Object(Box((1.05, -1.02, -40), (1.2, 40, 40)).tessellate(), None, color=(1, 1, 1))
+    alone = tl.Scene([ball], CAMERA, environment=WHITE)
+    free = solver(alone).field(alone, 0)
+    for around, tolerance in (((ground(),), 5e-3), ((ground(), wall), 0.02)):
+        scene = tl.Scene([ball, *around], CAMERA, environment=WHITE)
+        found = solver(scene).field(scene, 0)
+        np.testing.assert_allclose(found.leaving, free.leaving, rtol=tolerance)
+    gray = tl.Scene([ball, ground(0.5)], CAMERA, environment=WHITE)
+    assert solver(gray).field(gray, 0).leaving.mean() < 0.9 * free.leaving.mean()
+
+
+def test_a_ground_lights_a_body_from_below() -> None:
+    """The underside of a small lossless ball high above a sunny ground shows the radiosity of the ground."""
+    light = tl.DirectionalLight((0, -1, 0), (1, 2, 3))
+    ball = tl.Object(Sphere(radius=0.1).tessellate(24), tl.Medium(scattering=200.0))
+    scene = tl.Scene([ball, ground(0.5, -3.0)], CAMERA, [light], BLACK)
+    diffusing = solver(scene)
+    below = diffusing.lit.grid.normals[:, 1] < -0.95
+    found = diffusing.field(scene, 0).leaving[below].mean(axis=0)
+    np.testing.assert_allclose(found, 0.5 * np.array((1, 2, 3)), rtol=0.1)
+
+
+def test_the_light_of_a_ball_on_a_ground() -> None:
+    """Irradiance below a ball of even radiosity is that times (r / d)^2 cos, where all of it is above the ground."""
+    ball = tl.Object(Sphere(radius=0.5).tessellate(64), LOSSLESS)
+    scene = tl.Scene([ball, ground(0.5)], CAMERA, environment=WHITE, environment_shadows=8)
+    found = ground_below(scene, [0])
+    assert found is not None
+    assert found.height == pytest.approx(-1.02)
+    points, diffusing = GroundPoints(found, 1, ball.bounds), solver(scene)
+
+    def even(sample: Integers, _: Array) -> Array:
+        return np.full((len(sample), 3), 1.0 / np.pi)
+
+    irradiance = points.irradiance((np.zeros(3), 0.5), diffusing.lit.nearest, even)[:, 0]
+    distance = np.linalg.norm(points.points, axis=1)
+    near = distance < 6.0
+    np.testing.assert_allclose(irradiance[near], (0.5**2 * 1.02 / distance**3)[near], rtol=0.03)
+    # Where the environment reaches the ground through the ball, that counts for the same light.
+    reached, field = tl.Scene(scene.objects, CAMERA, environment=WHITE), diffusing.field(scene, 0)
+    shadowed, through = (ground_map(one, {0: diffusing.lit}, {0: field}) for one in (scene, reached))
+    assert shadowed is not None
+    assert through is not None
+    assert shadowed.values.max() > 0.3 > 0.03 > through.values.max()
+
+
+@pytest.mark.parametrize(("degrees", "rotation"), [(1.0, 0.0), (0.4, 40.0)])
+def test_suns_of_pictures_keep_their_light_and_direction(degrees: float, rotation: float) -> None:
+    """However small they are, and wherever they stand between the directions in which samples look."""
+    towards = np.array((0.5, 0.6, -0.3)) / np.linalg.norm((0.5, 0.6, -0.3))
+    cosine, sine = np.cos(np.radians(rotation)), np.sin(np.radians(rotation))
+    world = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]) @ towards
+
+    def radiance(directions: Array) -> Array:
+        return 0.1 + 1e4 * (directions @ towards > np.cos(np.radians(degrees)))[..., None] * np.ones(3)
+
+    around = tl.Environment.image(EnvironmentMap.from_formula(radiance, 512), rotation=rotation)
+    suns, directions, total = suns_of(around), even_directions(128), 4.0 * np.pi * around.mean
+    sent = np.sum([sun.irradiance for sun in suns], axis=0)
+    rest = environment_parts(around, directions, suns=False)
+    np.testing.assert_allclose(rest.sum(axis=0) + sent, total, rtol=1e-9)
+    np.testing.assert_allclose(environment_parts(around, directions).sum(axis=0), total, rtol=1e-9)
+    assert sent[0] > 0.5 * total[0]
+    assert min(-np.asarray(sun.direction) @ world for sun in suns) > np.cos(np.radians(2.0))
