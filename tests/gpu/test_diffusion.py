@@ -104,7 +104,7 @@ def test_lossless_bodies_vanish_on_a_white_ground(renderer: tl.Renderer, surface
     scene = tl.Scene([body, ground], camera, environment=WHITE, environment_shadows=128)
     off = np.abs(renderer.render(scene, (64, 64), samples=4, scattering=COARSE).radiance - 1.0)
     assert np.quantile(off, 0.99) < 0.05
-    assert off.mean() < 0.006
+    assert off.mean() < 0.01
 
 
 def test_a_scene_that_is_turned_as_a_whole_looks_the_same(renderer: tl.Renderer) -> None:
