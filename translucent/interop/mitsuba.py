@@ -1,9 +1,10 @@
 """Scenes for Mitsuba 3, so that anybody can check a picture against an independent path tracer.
 
 What is written: closed bodies with a homogeneous medium behind a dielectric, rough dielectric or null interface; opaque
-diffuse objects; point, directional and sphere lights; constant environments, gradients and pictures of all directions;
-the camera; a film with a box filter; ``volpathmis`` without a limit of depth. Triangles carry the normals for shading
-that pictures have here, in the world. Vertices and pictures lie in files beside, since neither form has room for them.
+diffuse objects of one color or with a texture of it; point, directional and sphere lights; constant environments,
+gradients and pictures of all directions; the camera; a film with a box filter; ``volpathmis`` without a limit of depth.
+Triangles carry the normals for shading that pictures have here, in the world. Vertices and pictures lie in files
+beside, since neither form has room for them.
 
 Conventions that differ, and what is done about them:
 
@@ -13,7 +14,9 @@ Conventions that differ, and what is done about them:
 - Row i of h in its environment maps is at the angle pi i / (h - 1) from +Y, and the center of the picture is +Z. Rows
   are at pi (i + 1/2) / h here, with -Z in the middle: rows are added, and between them lie the same straight lines.
 - A roughness r is its ``alpha`` r^2, GGX. Its rough dielectrics have no scattering among facets, and lose light that
-  ours keep: up to 2 % of a frosted ball with r = 0.2, and more beyond.
+  ours keep: a frosted ball of ior 1.5 in a white world has a radiance of 0.99 there with r = 0.2, 0.95 with 0.3 and
+  0.78 with 0.5, and 1 here. From `ROUGH` on a warning says so.
+- Its pictures are flipped: v = 0 is the first row of a bitmap, and the last one here.
 - A sphere light is seen there, and hides what is behind it.
 
 Source: plugin documentation of Mitsuba 3.
@@ -23,6 +26,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+import warnings
 from collections.abc import Iterator, Mapping
 from functools import partial
 from importlib import import_module
@@ -33,8 +37,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from translucent.arguments import checked
-from translucent.arrays import Array
-from translucent.errors import InputError, RenderError
+from translucent.arrays import Array, Floats
+from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.files.paths import OutputFiles, require_output
 from translucent.geometry.normals import corner_normals
 from translucent.planning.bodies import open_bodies, overlapping_pair
@@ -42,8 +46,8 @@ from translucent.scene.camera import check_size
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight, SphereLight, SpotLight
 from translucent.scene.scene import Object, Scene, check_scene, object_names
-from translucent.scene.surface import Surface
-from translucent.signals import import_trimesh
+from translucent.scene.surface import TEXTURE_FIELDS, Surface
+from translucent.scene.texture import Texture
 
 #: Diagonal of the scene in units of Mitsuba, to a power of ten.
 DIAGONAL = 1000.0
@@ -56,6 +60,9 @@ SAMPLES = 256
 
 #: Depth from which on Mitsuba ends paths by chance: shorter ones are not much noisier for it.
 ROULETTE = 100
+
+#: Roughness of an interface from which on its rough dielectric loses more than 2 % of the light.
+ROUGH = 0.25
 
 #: Element of XML for each plugin.
 _ELEMENTS = {
@@ -72,6 +79,7 @@ _ELEMENTS = {
     "roughdielectric": "bsdf",
     "twosided": "bsdf",
     "diffuse": "bsdf",
+    "bitmap": "texture",
     "homogeneous": "medium",
     "hg": "phase",
     "point": "emitter",
@@ -83,6 +91,9 @@ _ELEMENTS = {
 
 #: Elements of XML for triples, which are points unless they are directions.
 _VECTORS = {"direction": "vector"}
+
+#: Plugins within others that XML names.
+_NAMED = ("interior", "reflectance")
 
 Described = dict[str, Any]
 
@@ -202,13 +213,14 @@ def _element(value: Described, name: str | None, files: Mapping[str, str]) -> El
         elif isinstance(one, dict) and one["type"] == "rgb":
             ElementTree.SubElement(element, "rgb", name=key, value=", ".join(map(repr, one["value"])))
         elif isinstance(one, dict):
-            element.append(_element(one, "interior" if key == "interior" else None, files))
+            element.append(_element(one, key if key in _NAMED else None, files))
         elif isinstance(one, list):
             text = ", ".join(map(repr, one))
             ElementTree.SubElement(element, _VECTORS.get(key, "point"), name=key, value=text)
         else:
-            kind = {str: "string", int: "integer", float: "float"}[type(one)]
-            ElementTree.SubElement(element, kind, name=key, value=files.get(one, str(one)))
+            kind = {str: "string", bool: "boolean", int: "integer", float: "float"}[type(one)]
+            text = files.get(one, one) if isinstance(one, str) else str(one).lower()
+            ElementTree.SubElement(element, kind, name=key, value=text)
     return element
 
 
@@ -226,6 +238,10 @@ def describe(scene: Scene, size: tuple[int, int], samples: int = SAMPLES) -> tup
         raise InputError(f"samples {samples}", "less than 1", "give for example 256")
     for found, do in _beyond(scene):
         raise InputError("a scene for Mitsuba", found, do)
+    rough = [body for body in scene.bodies if body.surface is not None and body.surface.roughness > ROUGH]
+    if rough:
+        text = "Mitsuba's rough dielectrics have no scattering among facets: there they are darker than here"
+        warnings.warn(f"{object_names(rough)}: {text}", TranslucentWarning, stacklevel=3)
     scale = units_per_metre(scene)
     described: Described = {
         "type": "scene",
@@ -246,7 +262,11 @@ def describe(scene: Scene, size: tuple[int, int], samples: int = SAMPLES) -> tup
     files: dict[str, Any] = {}
     for i, item in enumerate(scene.objects):
         files[f"{i}.ply"] = partial(_write_mesh, item, scale)
-        described[f"object_{i}"] = {"type": "ply", "filename": f"{i}.ply", **_material(item, scale)}
+        texture = _color_texture(item)
+        if texture is not None:
+            files[f"{i}.pfm"] = partial(_write_pfm, texture.pixels[..., :3] * item.base_color.astype(np.float32))
+        color = _rgb(item.base_color) if texture is None else _bitmap(f"{i}.pfm", texture)
+        described[f"object_{i}"] = {"type": "ply", "filename": f"{i}.ply", **_material(item, scale, color)}
     for i, light in enumerate(scene.lights):
         described[f"light_{i}"] = _light(light, scale)
     described["environment"], pixels = _environment(scene.environment)
@@ -280,10 +300,21 @@ def _rgb(values: Any) -> Described:
     return {"type": "rgb", "value": [float(value) for value in np.asarray(values, dtype=np.float64)]}
 
 
-def _material(item: Object, scale: float) -> Described:
-    """Interface, and medium behind it."""
+def _color_texture(item: Object) -> Texture | None:
+    """Texture of the diffuse reflection of an opaque object."""
+    return None if item.medium is not None or item.surface is None else item.surface.color_texture
+
+
+def _bitmap(file: str, texture: Texture) -> Described:
+    """Texture of linear values; the mesh has the coordinates of the picture itself."""
+    how = {"filter_type": "bilinear", "wrap_mode": texture.wrap[0]}
+    return {"type": "bitmap", "filename": file, "raw": True, **how}
+
+
+def _material(item: Object, scale: float, color: Described) -> Described:
+    """Interface and medium behind it; or diffuse reflection of a color."""
     if (medium := item.medium) is None:
-        diffuse = {"type": "diffuse", "reflectance": _rgb(item.base_color)}
+        diffuse = {"type": "diffuse", "reflectance": color}
         one_sided = item.surface is not None and not item.surface.double_sided
         return {"bsdf": diffuse if one_sided else {"type": "twosided", "bsdf": diffuse}}
     roughness = 0.0 if item.surface is None else item.surface.roughness
@@ -344,14 +375,30 @@ def _write_mesh(item: Object, scale: float, path: Path) -> None:
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
     if mesh.diagnosis.inverted:
         normals = -normals
+    columns = [corners, normals]
+    if (texture := _color_texture(item)) is not None:
+        assert mesh.uv is not None
+        u, v = np.moveaxis(mesh.uv[mesh.faces] @ texture.rows[:, :2].T + texture.rows[:, 2], -1, 0)
+        columns.append(np.stack([u, 1.0 - v], axis=-1))
+    vertices = np.concatenate(columns, axis=-1)
     if item.faces_inwards:
-        corners, normals = corners[:, ::-1], normals[:, ::-1]
-    faces = np.arange(3 * len(corners)).reshape(-1, 3)
-    soup = import_trimesh().Trimesh(corners.reshape(-1, 3), faces, vertex_normals=normals.reshape(-1, 3), process=False)
-    path.write_bytes(soup.export(file_type="ply", vertex_normal=True))
+        vertices = vertices[:, ::-1]
+    faces = np.empty(len(corners), np.dtype([("count", "u1"), ("corners", "<i4", 3)]))
+    faces["count"], faces["corners"] = 3, np.arange(3 * len(corners)).reshape(-1, 3)
+    properties = ("x", "y", "z", "nx", "ny", "nz", "u", "v")[: vertices.shape[-1]]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {3 * len(corners)}",
+        *(f"property float {name}" for name in properties),
+        f"element face {len(corners)}",
+        "property list uchar int vertex_indices",
+        "end_header\n",
+    ]
+    path.write_bytes("\n".join(header).encode() + vertices.astype("<f4").tobytes() + faces.tobytes())
 
 
-def _write_pfm(pixels: Array, path: Path) -> None:
+def _write_pfm(pixels: Floats, path: Path) -> None:
     """Write linear radiance as a Portable Float Map: float32, the last row first."""
     height, width = pixels.shape[:2]
     path.write_bytes(f"PF\n{width} {height}\n-1.0\n".encode() + pixels[::-1].astype("<f4").tobytes())
@@ -434,7 +481,11 @@ def _beyond_surface(item: Object) -> str:
         found.append("color")
     if surface.glows:
         found.append("emissive")
-    if any(surface.textures):
+    held = [name for name in TEXTURE_FIELDS if getattr(surface, name) is not None]
+    if item.medium is None and held == ["color_texture"] and surface.color_texture is not None:
+        if len(set(surface.color_texture.wrap)) > 1:
+            found.append("a texture that repeats in one direction alone")
+    elif held:
         found.append("textures")
     if item.mesh.colors is not None:
         found.append("colors of vertices")
