@@ -37,7 +37,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from translucent.arguments import checked
-from translucent.arrays import Array, Floats
+from translucent.arrays import Array
 from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.files.paths import OutputFiles, require_output
 from translucent.geometry.normals import corner_normals
@@ -264,7 +264,7 @@ def describe(scene: Scene, size: tuple[int, int], samples: int = SAMPLES) -> tup
         files[f"{i}.ply"] = partial(_write_mesh, item, scale)
         texture = _color_texture(item)
         if texture is not None:
-            files[f"{i}.pfm"] = partial(_write_pfm, texture.pixels[..., :3] * item.base_color.astype(np.float32))
+            files[f"{i}.pfm"] = partial(_write_pfm, texture.pixels[..., :3] * item.base_color)
         color = _rgb(item.base_color) if texture is None else _bitmap(f"{i}.pfm", texture)
         described[f"object_{i}"] = {"type": "ply", "filename": f"{i}.ply", **_material(item, scale, color)}
     for i, light in enumerate(scene.lights):
@@ -398,7 +398,7 @@ def _write_mesh(item: Object, scale: float, path: Path) -> None:
     path.write_bytes("\n".join(header).encode() + vertices.astype("<f4").tobytes() + faces.tobytes())
 
 
-def _write_pfm(pixels: Floats, path: Path) -> None:
+def _write_pfm(pixels: Array, path: Path) -> None:
     """Write linear radiance as a Portable Float Map: float32, the last row first."""
     height, width = pixels.shape[:2]
     path.write_bytes(f"PF\n{width} {height}\n-1.0\n".encode() + pixels[::-1].astype("<f4").tobytes())
