@@ -14,7 +14,9 @@ import numpy as np
 
 from translucent.arguments import brief, checked, checked_but
 from translucent.errors import InputError, RenderError, TranslucentWarning
+from translucent.extras import require_package
 from translucent.formulas.tone import tone_curve
+from translucent.frames.denoising import denoised
 from translucent.frames.frame import Frame, check_exposure
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.job import TextureBackdrop
@@ -148,6 +150,7 @@ class Renderer:
         caustics: Caustics | None = None,
         shadows: ShadowMaps | None = None,
         adaptive: bool = True,
+        denoise: bool = False,
         progress: Callable[[float], None] | None = None,
     ) -> Frame:
         """Render a scene.
@@ -184,6 +187,10 @@ class Renderer:
             into media. None, the default: no caustics.
         shadows : ShadowMaps, optional
             How sharp shadows on opaque objects are. Without OpenGL they are traced.
+        denoise : bool
+            Take the noise of random paths, and of rough interfaces and what they mirror, out of the picture by Open
+            Image Denoise (the extra ``denoise``). Such a picture has no standard error, and no known one: its plan and
+            its provenance say so. What has no noise stays as it is.
         progress : callable, optional
             Takes the share of the work that is done, 0 to 1; with OpenGL.
 
@@ -212,6 +219,7 @@ class Renderer:
             shadows,
             transparent=transparent,
             adaptive=adaptive,
+            denoise=denoise,
             over_backdrop=over_backdrop,
         )
         return self.render_requested(scene, size, request, backdrop, progress)
@@ -232,6 +240,8 @@ class Renderer:
         elif backdrop is not None:
             raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
         plan = self.plan_requested(scene, request)
+        if request.denoise:
+            require_package("pyoidn", "denoise", "render with more samples")  # before any work is done
         try:
             if request.transparent:
                 frame = self._render_transparent(plan, size, progress)
@@ -245,6 +255,8 @@ class Renderer:
         frame.provenance.update(self.provenance)
         if not request.over_backdrop:  # such a scene is not all that is seen
             frame = frame.rendered_from(scene, plan)
+        if request.denoise and plan.has_noise:
+            frame = denoised(frame, plan.scene)
         _warn(frame)
         return frame
 

@@ -56,6 +56,7 @@ class NoteKind(StrEnum):
     OPAQUE_BODIES = "opaque bodies"
     UNSEEN_BODIES = "unseen bodies"
     SLOW_HITS = "slow hits"
+    DENOISED = "denoised"
 
     # What a page in a browser does with a scene.
     MANY_TRIANGLES = "many triangles"

@@ -165,8 +165,15 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
         found = _with_caustics(found, scene, request.caustics, machine)
     elif paths is None:
         found = replace(found, unmodelled=(*found.unmodelled, *caustics_to_request(scene)))
+    if request.denoise:
+        found = replace(found, unmodelled=(*found.unmodelled, _denoised_note(found)))
     found = _with_textures(found, machine)
     return found if found.traced else _with_shadows(found, scene, machine)
+
+
+def _denoised_note(found: RenderPlan) -> Note:
+    text = "denoised: a network (Open Image Denoise) puts what it expects in place of noise, with an error nobody knows"
+    return Note(NoteKind.DENOISED, text if found.has_noise else "not denoised: nothing is drawn at random here")
 
 
 def _with_point_lights(scene: Scene, rendered: Scene) -> tuple[Scene, tuple[Note, ...]]:

@@ -185,6 +185,12 @@ class RenderPlan:
         return self.method.ordered
 
     @property
+    def has_noise(self) -> bool:
+        """True if anything is drawn at random: paths, or microfacets of rough interfaces and of what mirrors."""
+        rough = any(item.surface is not None and item.surface.roughness > 0 for item in self.scene.objects)
+        return self.paths is not None or (isinstance(self.interfaces, TracedInterfaces) and rough)
+
+    @property
     def geometry_passes(self) -> int:
         """Total number of draws of the geometry."""
         return sum(step.geometry_passes for step in self.passes)

@@ -42,6 +42,8 @@ class RenderRequest(Flags):
     caustics : Caustics, optional
     shadows : ShadowMaps, optional
     transparent : bool
+    denoise : bool
+        Take noise out of the picture when it is drawn.
     over_backdrop : bool
         Everything opaque is a picture that is drawn elsewhere.
     **flags : bool
@@ -60,6 +62,7 @@ class RenderRequest(Flags):
     caustics: Caustics | None = None
     shadows: ShadowMaps | None = None
     transparent: bool = False
+    denoise: bool = False
     over_backdrop: bool = False
 
     def __post_init__(self) -> None:
@@ -74,6 +77,10 @@ class RenderRequest(Flags):
                 if name == "interfaces" and isinstance(value, str) and value in _OLD_NAMES:
                     do = f"write interfaces=tl.{_OLD_NAMES[value]}"
                 raise InputError(f"{name} {brief(value)}", f"not {what}", do)
+        if self.denoise and (self.transparent or self.over_backdrop):
+            what = "a transparent frame" if self.transparent else "a backdrop"
+            do = "leave out one of the two"
+            raise InputError("denoise", f"{what}: the difference of two pictures is none that a denoiser knows", do)
         if self.over_backdrop and self.caustics is not None:
             found = "what is drawn elsewhere has no mesh that light could land on"
             raise InputError("caustics before a backdrop", found, "leave out one of the two")

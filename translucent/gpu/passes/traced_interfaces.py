@@ -107,7 +107,7 @@ class TracedInterfacesPass:
             "faintest_throughput": faintest_throughput(forks),
             "most_interfaces": depth,
             "sample_number": job.sample,
-            "blurred_fraction": blurred_fraction(job.samples),
+            "blurred_fraction": 0.0 if job.plan.request.denoise else blurred_fraction(job.samples),
             "sample_width": job.samples**-0.5,
             "picture_first": int(_shows_more(job)),
             **scene_values,
@@ -267,7 +267,8 @@ def faintest_throughput(forks: int) -> float:
 def blurred_fraction(samples: int) -> float:
     """Fraction of the variance of microfacets that blurs what they reflect; 1 with few samples.
 
-    The blur is smooth and somewhat wrong, the samples are right and noisy: their errors balance about so.
+    The blur is smooth and somewhat wrong, the samples are right and noisy: their errors balance about so. Where a
+    denoiser follows, which takes out noise and keeps what is wrong, nothing is blurred.
     """
     return 1.0 if samples < FEW_SAMPLES else float(samples**-0.15)
 
