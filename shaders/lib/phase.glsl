@@ -6,6 +6,7 @@
 
 #include <constants>
 
+const int AHEAD_EVENTS = 16;  // after which a Legendre moment of order 3 is small unless g > 0.98
 const int DRAINE_STEPS = 24;  // of Newton's method, or halvings of its bracket
 
 // In 1/sr. Turned around for g < 0, the base does not cancel.
@@ -55,6 +56,29 @@ float draine_cosine(float share, float anisotropy, float alpha) {
 float phase_value(vec4 phase, float cos_scatter) {
     float value = (1.0 - phase.w) * henyey_greenstein(cos_scatter, phase.x);
     return phase.w == 0.0 ? value : value + phase.w * draine(cos_scatter, phase.y, phase.z);
+}
+
+// Phase function of light that a medium has scattered before on its path from a light, times the probability of that; without
+// its mean over all directions. In 1/sr. By Legendre moments (2 l + 1) / 4 pi g^l (e^(-(1 - g^l) depth) - e^-depth), l > 0,
+// where the first decays by 1 - straight instead: 1 and 2 in closed form, the rest by number of events n, a Poisson number,
+// after which the phase function is that of g^(n + 1). depth: of scattering alone.
+vec3 phase_after_scattering(float cos_scatter, float anisotropy, float straight, vec3 depth) {
+    float g = anisotropy;
+    float second = 1.5 * cos_scatter * cos_scatter - 0.5;
+    vec3 none = exp(-depth);
+    vec3 sum = 3.0 * g * cos_scatter * (exp((straight - 1.0) * depth) - none)
+        + 5.0 * g * g * second * (exp((g * g - 1.0) * depth) - none);
+    vec3 probability = none;
+    float power = g;
+    for (int n = 1; n <= AHEAD_EVENTS; ++n) {
+        probability *= depth / float(n);
+        power *= g;
+        if (power < 0.05) { break; }
+        float base = (1.0 - power) * (1.0 - power) + 2.0 * power * (1.0 - cos_scatter);
+        float beyond = (1.0 - power * power) / (base * sqrt(base)) - 1.0 - power * (3.0 * cos_scatter + 5.0 * power * second);
+        sum += probability * beyond;
+    }
+    return sum / (4.0 * PI);
 }
 
 // Sample it: a cosine distributed by it, for a random number.

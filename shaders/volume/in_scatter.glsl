@@ -48,9 +48,9 @@ vec4 scattered_here(float weights[SLOTS], int light, ViewRay ray, float s, out v
     LightSample arriving = light_at(light, point);
     tau = vec3(0.0);
     if (arriving.irradiance == vec3(0.0)) { return vec4(0.0); }  // a spot's view ends with its cone
-    vec4 depth = light_depth(light, point);
-    tau = depth.rgb;
-    return vec4(arriving.irradiance * scattering_phase(weights, dot(arriving.towards, ray.direction)), depth.a);
+    LightDepth found = light_depth(light, point);
+    tau = found.depth;
+    return vec4(arriving.irradiance * scattering_phase(weights, dot(arriving.towards, ray.direction)), found.visible);
 }
 
 // Between which distances, within metres, a ray is in a cone; rest is 1 - cos of its half angle. Cones are convex, and
@@ -112,8 +112,8 @@ vec2 secant_point(float u, float x) {
 vec3 scatter_from_part(float weights[SLOTS], int light, ViewRay ray, vec2 lit, vec3 sigma) {
     float metres = lit.y - lit.x;
     vec3 tau;
-    vec3 tau_start = light_depth(light, ray.start + lit.x * ray.direction).rgb;
-    vec3 tau_end = light_depth(light, ray.start + lit.y * ray.direction).rgb;
+    vec3 tau_start = light_depth(light, ray.start + lit.x * ray.direction).depth;
+    vec3 tau_end = light_depth(light, ray.start + lit.y * ray.direction).depth;
     vec3 rise = sigma * metres + tau_end - tau_start;
 
     // Where the light is nearest: at distance closest along the ray, height metres off it.

@@ -39,11 +39,22 @@ vec3 point_at(LightRay ray, float axial_depth) {
     return ray.point + (axial_depth - ray.axial_depth) * ray.advance;
 }
 
-// Optical depth of a part of a light's ray behind a node.
-vec3 part_depth(uint link, LightRay ray, float from, float to) {
+// Optical depth on a light's ray to a point.
+struct LightDepth {
+    vec3 depth;
+    vec3 ahead;      // of it, that of scattering in media whose scattering ahead is followed
+    float steepest;  // of the crossings before, in axial depth per texel
+    float visible;   // 0 where an opaque surface is in between
+};
+
+// Adds a part of a light's ray behind a node.
+void add_part(inout LightDepth sum, uint link, LightRay ray, float from, float to) {
 #if VARIES
     uvec4 words = light_media[link - 1u];
     vec3 extinction = vec3(0.0);
+#if SCATTERS_AGAIN
+    vec3 scattering = vec3(0.0);
+#endif
     for (int slot = 0; slot < SLOTS; ++slot) {
         uint count = words[slot / TURNS_PER_WORD] >> uint(TURNS_BITS * (slot % TURNS_PER_WORD));
         float weight = float(count & ((1u << TURNS_BITS) - 1u));
@@ -53,19 +64,24 @@ vec3 part_depth(uint link, LightRay ray, float from, float to) {
         }
         bool stops = (stopping_slots >> slot & 1) != 0;
         extinction += weight * (stops ? vec3(stopping_extinction) : slot_extinction[slot].rgb);
+#if SCATTERS_AGAIN
+        if (scattered_ahead[slot].x > 0.0) { scattering += weight * slot_scattering[slot].rgb; }
+#endif
     }
-    return extinction * ((to - from) * ray.metres);
+    sum.depth += extinction * ((to - from) * ray.metres);
+#if SCATTERS_AGAIN
+    sum.ahead += scattering * ((to - from) * ray.metres);
+#endif
 #else
-    return light_media[link - 1u].rgb * ((to - from) * ray.metres);
+    sum.depth += light_media[link - 1u].rgb * ((to - from) * ray.metres);
 #endif
 }
 
-// Optical depth to the point of a ray, by the crossings of a texel, moved along their faces to this very ray; w: the
-// steepest of these, in axial depth per texel. offset: of the point from the texel's center.
-vec4 texel_light_depth(uint cell, vec2 offset, LightRay ray) {
-    vec3 depth = vec3(0.0);
+// Optical depth to the point of a ray, by the crossings of a texel, moved along their faces to this very ray. offset: of
+// the point from the texel's center.
+LightDepth texel_light_depth(uint cell, vec2 offset, LightRay ray) {
+    LightDepth sum = LightDepth(vec3(0.0), vec3(0.0), 0.0, 1.0);
     float last = 0.0;
-    float steepest = 0.0;
     uint behind = 0u;
     uint link = light_heads[cell];
     bool before = true;
@@ -77,17 +93,17 @@ vec4 texel_light_depth(uint cell, vec2 offset, LightRay ray) {
             uvec4 node = light_nodes[link - 1u];
             vec2 slope = uintBitsToFloat(node.zw);
             moved = float(crossing_step(node.x)) / float(axial_steps()) + dot(slope, offset);
-            steepest = max(steepest, max(abs(slope.x), abs(slope.y)));
+            sum.steepest = max(sum.steepest, max(abs(slope.x), abs(slope.y)));
             before = moved <= ray.axial_depth;
             next = node.y;
         }
         moved = max(min(moved, ray.axial_depth), last);
-        if (behind != 0u && moved > last) { depth += part_depth(behind, ray, last, moved); }
+        if (behind != 0u && moved > last) { add_part(sum, behind, ray, last, moved); }
         last = moved;
         behind = link;
         link = next;
     }
-    return vec4(depth, steepest);
+    return sum;
 }
 
 // Which of the six views of a cube looks at a point, given from the light.
@@ -97,10 +113,9 @@ int cube_face(vec3 from_light) {
     return 2 * axis + (from_light[axis] < 0.0 ? 1 : 0);
 }
 
-// Optical depth from a light to a point within a body, given from the center of the media; w: 0 where an opaque surface
-// is in between. The texel around the point decides it. Only next to a silhouette, where faces curve away within a texel,
+// Optical depth from a light to a point within a body, given from the center of the media. The texel around the point decides it. Only next to a silhouette, where faces curve away within a texel,
 // the four texels around the point do, the more so the less steep their faces are.
-vec4 light_depth(int light, vec3 point) {
+LightDepth light_depth(int light, vec3 point) {
     vec4 source = light_position[light];
     vec4 views = scatter_light_views[light];  // number of the first, how many, texels along a side, first texel
     int face = int(abs(views.y)) == 1 ? 0 : cube_face(point - source.xyz);
@@ -115,14 +130,14 @@ vec4 light_depth(int light, vec3 point) {
     vec2 offset = position - floor(position) - 0.5;
     uint cell = light_cell(cells, texel);
 #if SHADOWS
-    if (axial_depth > light_ends[cell] + 1.5 / views.z) { return vec4(0.0); }
+    if (axial_depth > light_ends[cell] + 1.5 / views.z) { return LightDepth(vec3(0.0), vec3(0.0), 0.0, 0.0); }
 #endif
     vec3 travel = source.w == 0.0 ? -source.xyz : point - source.xyz;
     vec3 advance = travel / max(dot(scatter_views[4 * view + 3].xyz, travel), 1e-30);
     LightRay ray = LightRay(point, axial_depth, advance, length(advance));
-    vec4 depth = texel_light_depth(cell, offset, ray);
-    if (light_heads[cell] != 0u && depth.w < STEEP_IN_LIGHT_VIEW) { return vec4(depth.rgb, 1.0); }
-    vec3 sum = vec3(0.0);
+    LightDepth found = texel_light_depth(cell, offset, ray);
+    if (light_heads[cell] != 0u && found.steepest < STEEP_IN_LIGHT_VIEW) { return found; }
+    LightDepth sum = LightDepth(vec3(0.0), vec3(0.0), 0.0, 1.0);
     float total = 0.0;
     ivec2 corner = texel - ivec2(lessThan(offset, vec2(0.0)));
     vec2 fraction = offset + vec2(texel - corner);
@@ -130,11 +145,14 @@ vec4 light_depth(int light, vec3 point) {
         ivec2 aside = ivec2(i & 1, i >> 1);
         uint other = light_cell(cells, corner + aside);
         if (light_heads[other] == 0u) { continue; }
-        depth = texel_light_depth(other, fraction - vec2(aside), ray);
+        found = texel_light_depth(other, fraction - vec2(aside), ray);
         vec2 weights = mix(1.0 - fraction, fraction, vec2(aside));
-        float weight = (weights.x * weights.y + 1e-4) / (depth.w * depth.w + 1e-9);
-        sum += weight * depth.rgb;
+        float weight = (weights.x * weights.y + 1e-4) / (found.steepest * found.steepest + 1e-9);
+        sum.depth += weight * found.depth;
+        sum.ahead += weight * found.ahead;
         total += weight;
     }
-    return vec4(sum / max(total, 1e-30), 1.0);
+    sum.depth /= max(total, 1e-30);
+    sum.ahead /= max(total, 1e-30);
+    return sum;
 }

@@ -49,6 +49,25 @@ vec2 metres_at_fraction(float fraction, int light, ViewRay ray, float metres) {
     return vec2(clamp(closest + height * tangent, 0.0, metres), angle * height * (1.0 + tangent * tangent));
 }
 
+#if SCATTERS_AGAIN
+// One light's radiance that reaches a point of the ray and is scattered towards its beginning there, per metre, however
+// often it was scattered ahead before.
+vec3 scattered_from_light(float weights[SLOTS], int light, vec3 point, vec3 direction) {
+    LightSample arriving = light_at(light, point);
+    if (arriving.irradiance == vec3(0.0)) { return vec3(0.0); }
+    LightDepth path = light_depth(light, point);
+    float cos_scatter = dot(arriving.towards, direction);
+    vec3 sum = transmittance(path.depth) * scattering_phase(weights, cos_scatter);
+    for (int slot = 0; slot < SLOTS; ++slot) {
+        if (weights[slot] > 0.0 && scattered_ahead[slot].x > 0.0) {
+            vec3 again = phase_after_scattering(cos_scatter, scattered_ahead[slot].x, scattered_ahead[slot].y, path.ahead);
+            sum += weights[slot] * slot_scattering[slot].rgb * transmittance(path.depth - path.ahead) * again;
+        }
+    }
+    return path.visible * arriving.irradiance * sum;
+}
+#endif
+
 struct Marched {
     vec3 color;  // at the segment's beginning
     vec3 depth;
@@ -76,7 +95,7 @@ Marched march_pass(float weights[SLOTS], int variable, ViewRay ray, float metres
             source += here[slot] * slot_emission[slot].rgb;
 #if SCATTERS_AGAIN
             if (here[slot] > 0.0) {
-                source += here[slot] * slot_scattering[slot].rgb * scattered_before(slot, ray.start + at.x * ray.direction);
+                source += here[slot] * slot_scattering[slot].rgb * scattered_before(slot, ray.start + at.x * ray.direction, -ray.direction);
             }
 #endif
         }
@@ -93,9 +112,13 @@ Marched march_pass(float weights[SLOTS], int variable, ViewRay ray, float metres
         for (int light = 0; light < scatter_light_count; ++light) {
             bool angular = march_rule == MARCH_EQUIANGULAR && light_position[light].w != 0.0;
             if (angular ? light != variable : variable >= 0) { continue; }
+#if SCATTERS_AGAIN
+            source += scattered_from_light(here, light, ray.start + at.x * ray.direction, ray.direction);
+#else
             vec3 tau;
             vec4 lit = scattered_here(here, light, ray, at.x, tau);
             source += lit.a * lit.rgb * transmittance(tau);
+#endif
         }
         vec3 color = march_rule == MARCH_EXPONENTIAL
             ? emitted_radiance(source, sigma, end - begin)

@@ -1,14 +1,30 @@
-// Light that comes from all around to points in media without an interface: what has been scattered before, and the
-// environment. A medium scatters sigma_s times as much into each metre of a ray. Points count from the center of the media.
+// Light that a medium without an interface scatters into a direction, in all orders. Points count from the center of the
+// media; direction: in which light travels.
+//
+// The radiance of a beam in a medium that scatters ahead has Legendre moments that decay as exp(-(sigma_t - sigma_s g^l) s)
+// as long as it has turned little (Goudsmit & Saunderson 1940). Those of order 0 and 1 spread in space, too: cells hold
+// them, by diffusion and discrete ordinates. All others are found here at each point, from the optical depth to the light:
+// a small-angle solution for what is peaked, a diffuse one for the rest (Romanova 1962; Budak, Klyuykov & Korkin 2010).
 
 #include <Density>
+#include "lib/phase.glsl"
 
-uniform sampler3D scattered_light;  // grids of all bodies, one behind the other along z
+uniform sampler3D scattered_light;  // grids of all bodies, one behind the other along z: mean radiance, and its gradient
 
-vec3 scattered_before(int slot, vec3 point) {
+// From the environment and lights, on its second event and later ones; and from the environment on its first.
+vec3 scattered_before(int slot, vec3 point, vec3 direction) {
     vec4 low = scattered_low[slot];
     vec4 grid = scattered_grid[slot];
     if (low.w == 0.0) { return vec3(0.0); }
+    vec3 size = vec3(textureSize(scattered_light, 0));
     vec3 at = clamp((point - low.xyz) * low.w, vec3(0.5), grid.xyz - 0.5);
-    return textureLod(scattered_light, (at + vec3(0.0, 0.0, grid.w)) / vec3(textureSize(scattered_light, 0)), 0.0).rgb;
+    at = (at + vec3(0.0, 0.0, grid.w)) / size;
+    vec3 mean = textureLod(scattered_light, at, 0.0).rgb;
+    if (scattered_ahead[slot].x > 0.0) {
+        vec3 next = vec3(0.0, 0.0, grid.z / size.z);
+        mean += direction.x * textureLod(scattered_light, at + next, 0.0).rgb;
+        mean += direction.y * textureLod(scattered_light, at + 2.0 * next, 0.0).rgb;
+        mean += direction.z * textureLod(scattered_light, at + 3.0 * next, 0.0).rgb;
+    }
+    return mean;
 }

@@ -63,13 +63,35 @@ def swept(
     -------
     fluence : (x, y, z, 3) float64
     """
-    fluence = np.zeros(emission.shape)
+    return swept_moments(extinction, emission[None], arriving, directions, solid_angles, step)[0]
+
+
+def swept_moments(
+    extinction: Array, emission: Array, arriving: Array, directions: Array, solid_angles: Array, step: float
+) -> Array:
+    """Fluence and vector flux in cells as of `swept`, for cells that may send more light in one direction than others.
+
+    Parameters
+    ----------
+    emission : (m, x, y, z, 3) float64
+        Radiance for each metre that cells send in all directions; and with m = 4 its gradient, whose product with the
+        direction of travel is added to it.
+
+    Returns
+    -------
+    moments : (m, x, y, z, 3) float64
+        Fluence; and with m = 4 the flux, the net power that crosses a unit of area, along x, y and z.
+    """
+    travel = -directions.T
+    weights = solid_angles * np.vstack([np.ones(len(directions)), travel])[: len(emission)]
+    sums = np.zeros(emission.shape)
     for axis in range(3):
         for alike in _alike(directions, axis):
             sweep = _Sweep.along(directions[alike.numbers], axis, alike.signs, step)
-            matter, source, found = (np.moveaxis(values, axis, 0) for values in (extinction, emission, fluence))
-            sweep.run(matter, source, found, arriving[alike.numbers], solid_angles[alike.numbers])
-    return fluence
+            matter = np.moveaxis(extinction, axis, 0)
+            source, found = (np.moveaxis(values, axis + 1, 0) for values in (emission, sums))
+            sweep.run(matter, source, found, arriving[alike.numbers], weights[:, alike.numbers])
+    return sums
 
 
 def condensed(extinction: Array, directions: Array, step: float) -> Array:
@@ -133,19 +155,21 @@ class _Sweep:
         length = (step / ahead).astype(np.float32)[:, None, None, None]
         return cls(signs[0] > 0.0, (near[0], near[1]), tuple(beside), length)
 
-    def run(self, extinction: Array, emission: Array, fluence: Array, arriving: Array, solid_angles: Array) -> None:
-        """Add the fluence of these directions to slices (x, y, z, 3) of an array."""
+    def run(self, extinction: Array, emission: Array, sums: Array, arriving: Array, weights: Array) -> None:
+        """Add the weighted radiance of these directions to slices (x, m, y, z, 3) of an array."""
         count, (_, n, m, channels) = len(arriving), extinction.shape
         light = np.empty((count, n + 1, m + 1, channels), np.float32)
         light[...] = arriving[:, None, None, :]
-        weights = solid_angles.astype(np.float32)
+        weights = weights.astype(np.float32)
+        travel = np.ascontiguousarray((weights[1:] / weights[0]).T)
         for i in range(len(extinction))[:: -1 if self.backwards else 1]:
             sigma, source = extinction[i].astype(np.float32), emission[i].astype(np.float32)
+            sent = source[0] if len(source) == 1 else source[0] + np.tensordot(travel, source[1:], axes=1)
             # All that leaves a cell gets into those of the next slice: nothing is lost between them.
-            edge = self._between(light)
-            mean, rest = _means(sigma * self.length)
-            light[:, *self.here] = edge * np.exp(-sigma * self.length) + source * self.length * mean
-            fluence[i] += np.tensordot(weights, edge * mean + rest * source * self.length, axes=1)
+            edge, depth, sent = self._between(light), sigma * self.length, sent * self.length
+            mean, rest = _means(depth)
+            light[:, *self.here] = edge * np.exp(-depth) + sent * mean
+            sums[i] += np.tensordot(weights, edge * mean + rest * sent, axes=1)
 
     def _between(self, values: Floats) -> Floats:
         """(g, n, m, c): values of the previous slice, interpolated where the directions come from."""
@@ -179,6 +203,25 @@ MOST_ROUNDS, ENOUGH = 8, 1e-2
 #: Earlier rounds that are mixed with the last one into the start of the next.
 MIXED = 2
 
+#: Mean cosine of scattering from which on pictures see in which direction light goes in a volume.
+LEAST_AHEAD = 0.05
+
+#: Optical depth of a cell up to which cells keep two moments of what is scattered ahead.
+TWO_MOMENTS_DEPTH = 0.5
+
+
+def straight_fraction(anisotropy: float, cell_depth: float) -> float:
+    """Fraction of scattered light that counts as unscattered, so that the rest is scattered nearly to all sides.
+
+    g^2 makes the mean cosine of the rest g / (1 + g) and its second Legendre moment 0 (Joseph, Wiscombe & Weinman 1976,
+    "The delta-Eddington approximation for radiative flux transfer"). In cells of a large scattering depth a sweep spreads
+    light farther than one step: there it is g, and the rest goes to all sides alike, as similarity has it.
+    """
+    if anisotropy < LEAST_AHEAD:
+        return anisotropy
+    least = 1.0 - TWO_MOMENTS_DEPTH / max(cell_depth, np.finfo(np.float64).tiny)
+    return min(max(anisotropy**2, least), anisotropy)
+
 #: Optical depth across a cell beyond which its medium counts as no denser.
 MOST_DEPTH = 2.0
 
@@ -201,23 +244,27 @@ class VolumeField:
     mean_radiance : (x, y, z, 3) float32
         Of what has been scattered, and of the unscattered environment: a medium scatters sigma_s times as much of it
         into each metre of a ray. Spread beyond the body.
-    low : (3,) float64
-        Corner of the grid in metres.
-    step : float
-        Side of a cell in metres.
-    steps : int
-        Iterations of the solver.
+    gradient : tuple of 3 (x, y, z, 3) float32, or of none
+        Of a medium that scatters ahead: 3 g J / 4 pi along x, y and z, with the vector flux J of the same light. Its
+        product with the direction of travel is added to the mean: light is scattered on where it goes already.
+    mean_cosine : float
+        g of this medium; 0 without a gradient.
+    straight : float
+        Fraction of scattered light that counts as unscattered here, beyond what rays find of each light themselves.
     """
 
     mean_radiance: npt.NDArray[np.float32]
     low: Array
     step: float
     steps: int
+    gradient: tuple[Floats, ...] = ()
+    mean_cosine: float = 0.0
+    straight: float = 0.0
 
     @property
     def volumes(self) -> tuple[npt.NDArray[np.float32], ...]:
         """Arrays (x, y, z, 3) that pictures look up."""
-        return (self.mean_radiance,)
+        return (self.mean_radiance, *self.gradient)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,17 +323,23 @@ class DiffusingVolume:
     @np.errstate(under="ignore")
     def __init__(self, volume: VolumeGrid, medium: Medium, *, warm_starts: bool = False) -> None:
         self._volume, self._medium, self._warm_starts = volume, medium, warm_starts
-        self._reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
-        reduced = np.asarray(medium.absorption) + self._reduced
+        scattering, absorption, step = np.asarray(medium.scattering), np.asarray(medium.absorption), volume.grid.cells.step
+        self._reduced = scattering * (1.0 - medium.anisotropy)
         # What is denser looks the same, and its skin would be lost in a cell.
-        most = MOST_DEPTH / max(float(reduced.max()) * volume.grid.cells.step, np.finfo(np.float64).tiny)
+        most = MOST_DEPTH / max(float((absorption + self._reduced).max()) * step, np.finfo(np.float64).tiny)
         self._density = np.minimum(volume.density, most)
-        self._extinction = self._density[..., None] * reduced
+        self._peak = straight_fraction(medium.anisotropy, float((scattering * self._density.max()).max()) * step)
+        turning = scattering * (1.0 - self._peak)
+        #: Mean cosine of what counts as scattered, and the moments over directions that are found.
+        self._cosine = (medium.anisotropy - self._peak) / (1.0 - self._peak)
+        self._orders = 4 if self._ahead > 0.0 else 1
+        self._turning = self._density[..., None] * turning
+        extinction = self._density[..., None] * (absorption + turning)
         # Sweeps are right in cells that light gets through; in others diffusion is, and rounds would not end.
-        self._resolved = 1.0 / (1.0 + (self._extinction * volume.grid.cells.step) ** 2)
+        self._resolved = 1.0 / (1.0 + (extinction * step) ** 2)
         self._directions = even_directions(ORDINATES)
-        self._swept = condensed(self._extinction, self._directions, volume.grid.cells.step)
-        self._turned = self._swept - self._density[..., None] * np.asarray(medium.absorption)
+        self._swept = condensed(extinction, self._directions, step)
+        self._turned = self._swept - self._density[..., None] * absorption
         self._solid_angles = nearest_parts(self._directions)[1]
         self._systems = [
             None if scattering == 0.0 else _system(volume, self._density, absorption, scattering)
@@ -306,53 +359,78 @@ class DiffusingVolume:
                     system.forget()
         sky = self._sky(scene)
         stops = None if photons is None else photons.stops
-        unturned, ahead = _from_lights(volume, self._density, scene, medium, stops)
-        bent = 0.0 if photons is None else photons.cells.coarse(photons.fluence)
+        unturned, ahead = self._from_lights(scene, stops)
         emission = 4.0 * np.pi * self._density[..., None] * np.asarray(medium.emission)
-        scattered, steps = self._scattered(sky, unturned + bent, emission)
+        if photons is not None:
+            emission = emission + self._density[..., None] * self._reduced * photons.cells.coarse(photons.fluence)
+        scattered, steps = self._scattered(sky + unturned, emission)
+        moments = sky + scattered
         # Light that is scattered back more than ahead gets less deep than reduced coefficients say: what they add twice
         # is taken away, and no more than there is.
-        found = np.maximum(sky + scattered + (1.0 - medium.anisotropy) * ahead, 0.0)
+        moments[0] = np.maximum(moments[0] + (1.0 - min(medium.anisotropy, 0.0)) * ahead, 0.0)
         # Beyond the body each cell has what the nearest inside has, for what is interpolated at its surface.
-        nearest = distance_transform_edt(~volume.inside, return_distances=False, return_indices=True)
-        mean, cells = found[tuple(nearest)] / (4.0 * np.pi), volume.grid.cells
+        nearest = tuple(distance_transform_edt(~volume.inside, return_distances=False, return_indices=True))
+        mean, *gradient = moments[:, *nearest] / (4.0 * np.pi)
+        gradient = [3.0 * self._ahead * part for part in gradient]
+        cells = volume.grid.cells
         step = cells.step
         if photons is not None:
             # Rays find none of it at lights: all that is scattered the first time is here, too.
             step = photons.cells.step
             mean = _finer(mean, photons.cells.finer) + (1.0 - medium.anisotropy) / (4.0 * np.pi) * photons.fluence
-        return VolumeField(np.ascontiguousarray(mean, np.float32), cells.low, step, steps)
+            gradient = [_finer(part, photons.cells.finer) for part in gradient]
+        volumes = tuple(np.ascontiguousarray(part, np.float32) for part in (mean, *gradient))
+        return VolumeField(volumes[0], cells.low, step, steps, volumes[1:], self._ahead, self._peak)
+
+    @property
+    def _ahead(self) -> float:
+        """Mean cosine of a medium that scatters ahead, else 0: then only means over directions are found."""
+        return self._medium.anisotropy if self._medium.anisotropy >= LEAST_AHEAD else 0.0
+
+    def _from_lights(self, scene: Scene, stops: RayCaster | None) -> tuple[Array, Array]:
+        """Moments (m, x, y, z, 3) of lights without events but forward ones, and fluence after forward events."""
+        absorption, scattering = np.asarray(self._medium.absorption), np.asarray(self._medium.scattering)
+        extinctions = absorption + (1.0 - self._peak) * scattering, absorption + scattering
+        unturned, ahead = _from_lights(self._volume, self._density, scene, extinctions, stops)
+        return unturned[: self._orders], ahead
 
     def _sky(self, scene: Scene) -> Array:
-        """(x, y, z, 3): fluence of the environment's light that nothing has scattered."""
+        """(m, x, y, z, 3): moments of the environment's light that nothing has scattered."""
         directions = even_directions(DIRECTIONS)
         solid_angles = nearest_parts(directions)[1]
         radiance = environment_parts(scene.environment, directions) / solid_angles[:, None]
+        nothing = np.zeros((self._orders, *self._swept.shape))
         if not radiance.any():
-            return np.zeros(self._extinction.shape)
-        nothing = np.zeros(self._extinction.shape)
-        return swept(self._swept, nothing, radiance, directions, solid_angles, self._volume.grid.cells.step)
+            return nothing
+        return swept_moments(self._swept, nothing, radiance, directions, solid_angles, self._volume.grid.cells.step)
 
-    def _scattered(self, sky: Array, unturned: Array, emission: Array) -> tuple[Array, int]:
-        """Fluence of light that has been scattered or emitted, (x, y, z, 3), and steps of the solver."""
+    def _scattered(self, unturned: Array, emission: Array) -> tuple[Array, int]:
+        """Moments of light that has been scattered or emitted, (m, x, y, z, 3), and steps of the solver."""
         step = self._volume.grid.cells.step
         dark = np.zeros((ORDINATES, 3))
-        first = self._turned * sky + self._density[..., None] * self._reduced * unturned + emission
-        fluence, steps = self._diffused(first)
+        # The mean of what cells send is that of what gets to them; its gradient as much as the phase function keeps.
+        kept = np.array([1.0, *[3.0 * self._cosine] * (self._orders - 1)])[:, None, None, None, None]
+        first = kept * self._turned * unturned
+        first[0] += emission
+        moments = np.zeros_like(first)
+        moments[0], steps = self._diffused(first[0])
         mixed = _Mixed()
         for _ in range(MOST_ROUNDS):
-            source = (first + self._turned * fluence) / (4.0 * np.pi)
-            found = swept(self._swept, source, dark, self._directions, self._solid_angles, step)
-            changed = self._resolved * (found - fluence)
+            source = (first + kept * self._turned * moments) / (4.0 * np.pi)
+            found = swept_moments(self._swept, source, dark, self._directions, self._solid_angles, step)
+            changed = found - moments
+            changed[0] *= self._resolved
             # What the round has changed scatters again: diffusion finds where that goes.
-            rest, taken = self._diffused(self._turned * changed)
+            rest, taken = self._diffused(self._turned * changed[0])
             steps += taken
-            better = np.maximum(mixed.next(fluence, changed + rest), 0.0)
-            change = np.abs(better - fluence).max(initial=0.0)
-            fluence = better
-            if change <= ENOUGH * fluence.max(initial=0.0):
+            changed[0] += rest
+            better = mixed.next(moments, changed)
+            better[0] = np.maximum(better[0], 0.0)
+            change = np.abs(better - moments).max(initial=0.0)
+            moments = better
+            if change <= ENOUGH * moments[0].max(initial=0.0):
                 break
-        return fluence, steps
+        return moments, steps
 
     def _diffused(self, power: Array) -> tuple[Array, int]:
         """Fluence (x, y, z, 3) by diffusion, for powers per volume, and steps; 0 outside."""
@@ -375,7 +453,7 @@ class _Mixed:
         self._rounds: list[tuple[Array, Array]] = []
 
     def next(self, start: Array, change: Array) -> Array:
-        """Start (x, y, z, 3) of the next round, from the start and the change of the last one."""
+        """Start (..., 3) of the next round, from the start and the change of the last one."""
         found = start + change
         if self._rounds:
             for channel in range(3):
@@ -385,7 +463,7 @@ class _Mixed:
                     for k, last in enumerate((own, changed))
                 )
                 weights = np.linalg.lstsq(changes, changed)[0]
-                found[..., channel] -= ((starts + changes) @ weights).reshape(found.shape[:3])
+                found[..., channel] -= ((starts + changes) @ weights).reshape(found.shape[:-1])
         self._rounds = [*self._rounds, (start, change)][-MIXED:]
         return found
 
@@ -415,15 +493,14 @@ def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: flo
 
 
 def _from_lights(
-    volume: VolumeGrid, density: Array, scene: Scene, medium: Medium, stops: RayCaster | None = None
+    volume: VolumeGrid, density: Array, scene: Scene, extinctions: tuple[Array, Array], stops: RayCaster | None = None
 ) -> tuple[Array, Array]:
-    """(x, y, z, 3) twice: fluence of lights without events but forward ones, and its part after forward events.
+    """Moments (4, x, y, z, 3) of lights without events but forward ones, and fluence (x, y, z, 3) after forward events.
 
-    `stops` are surfaces that none of it passes.
+    `extinctions` (3,), (3,) are that of other events and that of all; `stops` are surfaces that none of it passes.
     """
     grid, body = volume.grid, volume.body
-    unturned, ahead = np.zeros((2, *density.shape, 3))
-    reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
+    unturned, ahead = np.zeros((4, *density.shape, 3)), np.zeros((*density.shape, 3))
     cells, inside = grid.cells, grid.number >= 0
     points = cells.low + cells.step * cells.center[inside]
     for light in scene.lights:
@@ -450,9 +527,11 @@ def _from_lights(
         before = np.maximum(column - 0.5 * own, 0.0)
         turned, all_turned = (
             power * optics.transmittance(sigma * before[:, None]) * optics.mean_transmittance(sigma * own[:, None])
-            for sigma in (reduced, np.asarray(medium.extinction))
+            for sigma in extinctions
         )
-        unturned[inside] += turned
+        travel = (points - place) / np.maximum(np.linalg.norm(points - place, axis=1), _STILL)[:, None]
+        unturned[0, inside] += turned
+        unturned[1:, inside] += travel.T[..., None] * turned
         ahead[inside] += turned - all_turned
     return unturned, ahead
 

@@ -111,11 +111,13 @@ def ground_uniforms(light: DiffusedTexture | None, center: Array) -> dict[str, n
 def slot_grids(light: DiffusedTexture | None, slots: Sequence[Slot], center: Array) -> dict[str, Array]:
     """Fields of the Density block: grids of the slots whose light is known, for positions from `center`."""
     low, grid = np.zeros((2, MAX_SLOTS, 4))
+    ahead = np.zeros((MAX_SLOTS, 4))
     for i, slot in enumerate(slots):
         if light is not None and (field := light.fields.volumes.get(slot.objects[0])) is not None:
             low[i] = *(field.low - center), 1.0 / field.step
             grid[i] = *field.mean_radiance.shape[:3], light.first_layers[slot.objects[0]]
-    return {"scattered_low": low, "scattered_grid": grid}
+            ahead[i, :2] = field.mean_cosine, field.straight
+    return {"scattered_low": low, "scattered_grid": grid, "scattered_ahead": ahead}
 
 
 class DiffusionCache:

@@ -351,6 +351,8 @@ DENSITY = UniformBlock(
         ("density_grid", "f4", (MAX_SLOTS, 4)),  # voxels along x, y and z; the first layer in the texture of all grids
         ("scattered_low", "f4", (MAX_SLOTS, 4)),  # corner of the cells of light scattered before; cells in a metre
         ("scattered_grid", "f4", (MAX_SLOTS, 4)),  # cells along x, y and z; the first layer in the texture of all
+        # Mean cosine of scattering, 0 where cells do not know directions; fraction that counts as unscattered in cells
+        ("scattered_ahead", "f4", (MAX_SLOTS, 4)),
     ),
 )
 
