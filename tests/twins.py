@@ -215,6 +215,12 @@ def _phase_arguments(values: np.ndarray) -> list[np.ndarray]:
     return [PHASES[numbers.astype(int)], at]
 
 
+def _after_scattering_arguments() -> list[np.ndarray]:
+    cosines, g = np.clip(COSINES[::3], -1, 1), np.array([0.0, 0.3, 0.85, 0.97])
+    *others, depth = _mixed(cosines, g, np.array([0.0, 0.7]), np.geomspace(1e-6, 200.0, 25))
+    return [*others, _triples(depth)]
+
+
 #: Within the box, on its boundary, and what rounding puts outside.
 ALONG = np.concatenate([np.linspace(0, 1, 13), [-1e-6, 1 + 1e-6, 1e-30, 1 - 1e-7]])
 
@@ -302,6 +308,7 @@ ARGUMENTS = {
     "draine": _mixed(np.clip(COSINES, -1, 1), ANISOTROPIES, np.array([0.0, 1.0, 30.0, 1e4])),
     "draine_cosine": _mixed(UNIT, ANISOTROPIES[1:-1], np.array([0.0, 1.0, 30.0])),
     "phase_value": _phase_arguments(np.clip(COSINES, -1, 1)),
+    "phase_after_scattering": _after_scattering_arguments(),
     "phase_cosine": _phase_arguments(UNIT),
     "reflected_direction": _directions_and_normals()[:2],
     "refracted_direction": _directions_and_normals(),
@@ -358,6 +365,7 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
     "henyey_greenstein": 64.0,  # a power of 1.5 of a small difference
     "draine": 64.0,
     "phase_value": 64.0,
+    "phase_after_scattering": 256.0,  # the same, 16 times
     "equirectangular_uv": 4096.0,
     "tone_agx": 64.0,  # powers
 }
@@ -366,6 +374,7 @@ FLOOR = {
     "filmed_facing": 2e-4,  # the same, over 1 - (1 - cos)^5, which is above 0.2 here
     "microfacet_normal": 1e-5,  # near normal incidence the axes across it are as wrong as its sine is small
     "kept_on_side": 4e-7,
+    "phase_after_scattering": 4e-6,  # differences of moments up to 8 times that of order 0
     "fresnel_dielectric": 2e-7,
     "refracted_cosine": 1e-7,
     # Cosines of some 50 radians, good to a rounding of those; mixed by a matrix whose rows add up to 5.
@@ -454,7 +463,8 @@ def assert_equals_twin(
     """Fail where what a function has found is off by more than float32 allows, times `slack`."""
     found = np.asarray(found, np.float64)
     wide = [a.astype(np.float64) for a in arguments]
-    if (library in {"optics", "two_stream", "diffusion"} or name.startswith("slab_")) and returns == "vec3":
+    by_channel = library in {"optics", "two_stream", "diffusion"} or name.startswith(("slab_", "phase_after"))
+    if by_channel and returns == "vec3":
         wide = [a[:, None] if a.ndim == 1 else a for a in wide]
     with np.errstate(under="ignore"):
         exact = np.asarray(getattr(MODULES[library], name)(*wide))

@@ -2,11 +2,12 @@
 // of travel before and after an event, 1 straight on; phase: the four parameters of a phase function, which is a mixture: x: g of
 // Henyey and Greenstein, the mean cosine, -1 < g < 1; y, z: g and alpha of Draine; w: the fraction of the light that the latter scatters.
 // Each function is the float32 twin of the same name in translucent/formulas/phase.py, where the sources are cited: Henyey &
-// Greenstein 1941; Witt 1977; Draine 2003; Jendersie & d'Eon 2023.
+// Greenstein 1941; Witt 1977; Draine 2003; Jendersie & d'Eon 2023; Goudsmit & Saunderson 1940.
 
 #include <constants>
 
-const int AHEAD_EVENTS = 16;  // after which a Legendre moment of order 3 is small unless g > 0.98
+const int AHEAD_EVENTS = 16;  // in sums: later ones leave Legendre moments of order 3 and more small, unless g > 0.98
+const float LEAST_POWER = 0.05;  // of g: after as many events these moments are not seen
 const int DRAINE_STEPS = 24;  // of Newton's method, or halvings of its bracket
 
 // In 1/sr. Turned around for g < 0, the base does not cancel.
@@ -58,8 +59,8 @@ float phase_value(vec4 phase, float cos_scatter) {
     return phase.w == 0.0 ? value : value + phase.w * draine(cos_scatter, phase.y, phase.z);
 }
 
-// Phase function of light that a medium has scattered before on its path from a light, times the probability of that; without
-// its mean over all directions. In 1/sr. By Legendre moments (2 l + 1) / 4 pi g^l (e^(-(1 - g^l) depth) - e^-depth), l > 0,
+// Phase function of light that was scattered before on its path from a light, times the probability that it was; less its
+// mean over all directions. In 1/sr. anisotropy: g, 0 to 1. By Legendre moments (2 l + 1) / 4 pi g^l (e^(-(1 - g^l) depth) - e^-depth), l > 0,
 // where the first decays by 1 - straight instead: 1 and 2 in closed form, the rest by number of events n, a Poisson number,
 // after which the phase function is that of g^(n + 1). depth: of scattering alone.
 vec3 phase_after_scattering(float cos_scatter, float anisotropy, float straight, vec3 depth) {
@@ -73,7 +74,7 @@ vec3 phase_after_scattering(float cos_scatter, float anisotropy, float straight,
     for (int n = 1; n <= AHEAD_EVENTS; ++n) {
         probability *= depth / float(n);
         power *= g;
-        if (power < 0.05) { break; }
+        if (power < LEAST_POWER) { break; }
         float base = (1.0 - power) * (1.0 - power) + 2.0 * power * (1.0 - cos_scatter);
         float beyond = (1.0 - power * power) / (base * sqrt(base)) - 1.0 - power * (3.0 * cos_scatter + 5.0 * power * second);
         sum += probability * beyond;

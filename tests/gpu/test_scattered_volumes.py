@@ -18,6 +18,7 @@ SIZE = (12, 12)
 SKY = tl.Environment.gradient((0.2, 0.1, 0.05), (1, 1, 1))
 DARK = tl.Environment.constant((0, 0, 0))
 SUN = tl.DirectionalLight((-1, -0.7, -0.3), (3, 3, 3))
+BEHIND = tl.DirectionalLight((0.4, 0.1, 1.0), (3, 3, 3))
 CAMERA = tl.Camera.look_at((0.6, 0.5, 2.2), (0, 0, 0), fov_y=24.0)
 ALBEDO = np.array([0.99, 0.98, 0.96])
 HALF = np.diag([0.5, 0.5, 0.5, 1.0])
@@ -56,6 +57,7 @@ TRUTHS = {
     "sun": (cloud([SUN], DARK), 0.08),
     "profile": (cloud([], SKY, density=tl.LinearDensity(1, 1.0, 0.05)), 0.03),
     "ahead": (cloud([], SKY, 40.0, anisotropy=0.8), 0.12),
+    "behind": (cloud([BEHIND], DARK, anisotropy=0.85), 0.12),
 }
 
 

@@ -18,6 +18,7 @@ from translucent.formulas.phase import (
     WaterDroplets,
     henyey_greenstein,
     parse_phase,
+    phase_after_scattering,
     phase_cosine,
 )
 from translucent.reference import phase as reference
@@ -159,3 +160,16 @@ def test_droplets_scatter_as_mie_has_it() -> None:
     means = [WaterDroplets(d).mean_cosine for d in (5e-6, 1e-5, 2e-5, 5e-5)]
     assert all(0.82 < mean < 0.90 for mean in means)
     assert means == sorted(means)
+
+
+@pytest.mark.parametrize("g", [0.3, 0.85])
+@pytest.mark.parametrize("depth", [0.2, 3.0])
+def test_light_that_was_scattered_ahead_has_the_moments_of_its_path(g: float, depth: float) -> None:
+    """Of order l: g^l (e^(-(1 - g^l) depth) - e^-depth), but 0 of order 0; that of order 1 decays as it is told to."""
+    cosine, weight = np.polynomial.legendre.leggauss(400)
+    found = phase_after_scattering(cosine, g, g * g, depth)
+    moments = 2.0 * np.pi * (weight * found) @ np.polynomial.legendre.legvander(cosine, 7)
+    powers = g ** np.arange(8)
+    kept = np.array([1.0, g * g, *powers[2:]])
+    expected = powers * (np.exp((kept - 1.0) * depth) - np.exp(-depth))
+    np.testing.assert_allclose(moments, [0.0, *expected[1:]], atol=1e-3)

@@ -2,12 +2,14 @@
 
 Discrete ordinates on a grid of cells, from a start by diffusion, which also finds what each round leaves over: a few
 rounds are enough however often light is scattered (diffusion synthetic acceleration, Alcouffe 1977; Adams & Larsen
-2002). Directions matter to what is scattered once alone, so that isotropic events with reduced coefficients do.
+2002). A fraction of the scattered light counts as unscattered, so that two moments of the rest are enough, the fluence
+and the flux (delta-Eddington). What the peak of a phase function does to light of lights, rays find by themselves: see
+``shaders/volume/scattered_light.glsl``.
 
 References
 ----------
-Kunasz & Auer 1988, "Short characteristic integration of radiative transfer problems"; Chandrasekhar 1950 for discrete
-ordinates.
+Joseph, Wiscombe & Weinman 1976, "The delta-Eddington approximation for radiative flux transfer"; Kunasz & Auer 1988,
+"Short characteristic integration of radiative transfer problems"; Chandrasekhar 1950 for discrete ordinates.
 """
 
 from __future__ import annotations
@@ -63,7 +65,8 @@ def swept(
     -------
     fluence : (x, y, z, 3) float64
     """
-    return swept_moments(extinction, emission[None], arriving, directions, solid_angles, step)[0]
+    moments = swept_moments(extinction, emission[None], arriving, directions, solid_angles, step)
+    return np.asarray(moments[0])
 
 
 def swept_moments(
@@ -213,14 +216,15 @@ TWO_MOMENTS_DEPTH = 0.5
 def straight_fraction(anisotropy: float, cell_depth: float) -> float:
     """Fraction of scattered light that counts as unscattered, so that the rest is scattered nearly to all sides.
 
-    g^2 makes the mean cosine of the rest g / (1 + g) and its second Legendre moment 0 (Joseph, Wiscombe & Weinman 1976,
-    "The delta-Eddington approximation for radiative flux transfer"). In cells of a large scattering depth a sweep spreads
-    light farther than one step: there it is g, and the rest goes to all sides alike, as similarity has it.
+    g^2 makes the mean cosine of the rest g / (1 + g) and its second Legendre moment 0 (delta-Eddington, see above). In
+    cells of a large scattering depth a sweep spreads light farther than to the next event: there it is g, and the rest
+    goes to all sides alike, as similarity has it.
     """
     if anisotropy < LEAST_AHEAD:
         return anisotropy
     least = 1.0 - TWO_MOMENTS_DEPTH / max(cell_depth, np.finfo(np.float64).tiny)
     return min(max(anisotropy**2, least), anisotropy)
+
 
 #: Optical depth across a cell beyond which its medium counts as no denser.
 MOST_DEPTH = 2.0
@@ -323,7 +327,11 @@ class DiffusingVolume:
     @np.errstate(under="ignore")
     def __init__(self, volume: VolumeGrid, medium: Medium, *, warm_starts: bool = False) -> None:
         self._volume, self._medium, self._warm_starts = volume, medium, warm_starts
-        scattering, absorption, step = np.asarray(medium.scattering), np.asarray(medium.absorption), volume.grid.cells.step
+        scattering, absorption, step = (
+            np.asarray(medium.scattering),
+            np.asarray(medium.absorption),
+            volume.grid.cells.step,
+        )
         self._reduced = scattering * (1.0 - medium.anisotropy)
         # What is denser looks the same, and its skin would be lost in a cell.
         most = MOST_DEPTH / max(float((absorption + self._reduced).max()) * step, np.finfo(np.float64).tiny)
@@ -363,7 +371,7 @@ class DiffusingVolume:
         emission = 4.0 * np.pi * self._density[..., None] * np.asarray(medium.emission)
         if photons is not None:
             emission = emission + self._density[..., None] * self._reduced * photons.cells.coarse(photons.fluence)
-        scattered, steps = self._scattered(sky + unturned, emission)
+        scattered, steps = self._scattered(self._turned * sky + self._turning * unturned, emission)
         moments = sky + scattered
         # Light that is scattered back more than ahead gets less deep than reduced coefficients say: what they add twice
         # is taken away, and no more than there is.
@@ -404,13 +412,16 @@ class DiffusingVolume:
             return nothing
         return swept_moments(self._swept, nothing, radiance, directions, solid_angles, self._volume.grid.cells.step)
 
-    def _scattered(self, unturned: Array, emission: Array) -> tuple[Array, int]:
-        """Moments of light that has been scattered or emitted, (m, x, y, z, 3), and steps of the solver."""
+    def _scattered(self, events: Array, emission: Array) -> tuple[Array, int]:
+        """Moments of light that has been scattered or emitted, (m, x, y, z, 3), and steps of the solver.
+
+        `events` are the moments of what is scattered for the first time, for each metre, and `emission` is power.
+        """
         step = self._volume.grid.cells.step
         dark = np.zeros((ORDINATES, 3))
         # The mean of what cells send is that of what gets to them; its gradient as much as the phase function keeps.
         kept = np.array([1.0, *[3.0 * self._cosine] * (self._orders - 1)])[:, None, None, None, None]
-        first = kept * self._turned * unturned
+        first = kept * events
         first[0] += emission
         moments = np.zeros_like(first)
         moments[0], steps = self._diffused(first[0])

@@ -8,7 +8,7 @@ References
 Henyey & Greenstein 1941, "Diffuse radiation in the galaxy"; Witt 1977, "Multiple scattering in reflection nebulae", for
 directions by chance; Draine 2003, "Scattering by interstellar dust grains"; Jendersie & d'Eon 2023, "An approximate Mie
 scattering function for fog and cloud rendering"; Cornette & Shanks 1992 is Draine's with alpha = 1, and Rayleigh 1871
-with g = 0 besides.
+with g = 0 besides. Goudsmit & Saunderson 1940, "Multiple scattering of electrons", for what follows many events.
 """
 
 from __future__ import annotations
@@ -114,6 +114,53 @@ def phase_cosine(phase: npt.ArrayLike, share: npt.ArrayLike) -> Array:
     second = np.clip((share - weight) / np.where(weight < 1, 1.0 - weight, 1.0), 0.0, 1.0)
     draines = (weight > 0) & (share <= weight)
     return np.where(draines, draine_cosine(first, draine_g, alpha), henyey_greenstein_cosine(second, g))
+
+
+#: Number of events up to which `phase_after_scattering` is a sum: later ones leave Legendre moments of order 3 and more
+#: small, unless g is above 0.98.
+AHEAD_EVENTS = 16
+
+#: Mean cosine after several events below which their phase function has no moment of order 3 and more that is seen.
+LEAST_POWER = 0.05
+
+
+def phase_after_scattering(
+    cos_scatter: npt.ArrayLike, anisotropy: npt.ArrayLike, straight: npt.ArrayLike, depth: npt.ArrayLike
+) -> Array:
+    """Phase function in 1/sr, less its mean over all directions, of light that was scattered before on its path.
+
+    It is multiplied by the probability that it was. In a medium that scatters ahead, a beam at an optical depth of
+    scattering has the Legendre moments exp(-(1 - g^l) depth), as long as it has turned little; the unscattered part of
+    it exp(-depth) (Goudsmit & Saunderson 1940). So after one more event (2 l + 1) / 4 pi g^l times their difference is
+    the moment of order l. It equals a sum over a Poisson number n of events before, after which the phase function is
+    that of g^(n + 1): orders 1 and 2 are in closed form here, and only the others are this sum.
+
+    Parameters
+    ----------
+    cos_scatter : array_like
+        Cosine between the directions of travel from the light and after the event.
+    anisotropy : array_like
+        g, 0 to 1.
+    straight : array_like
+        Fraction of scattered light that counts as unscattered in what is found of order 1 otherwise: that moment
+        decays with 1 - straight here, not with 1 - g.
+    depth : array_like
+        Optical depth of scattering before, without absorption.
+    """
+    g, kept = np.asarray(anisotropy, np.float64), np.asarray(straight, np.float64)
+    cosine, depth = np.asarray(cos_scatter, np.float64), np.asarray(depth, np.float64)
+    second = 1.5 * cosine * cosine - 0.5
+    with np.errstate(under="ignore"):
+        none = np.exp(-depth)
+        total = 3.0 * g * cosine * (np.exp((kept - 1.0) * depth) - none)
+        total = total + 5.0 * g * g * second * (np.exp((g * g - 1.0) * depth) - none)
+        probability, power = none, g
+        for n in range(1, AHEAD_EVENTS + 1):
+            probability, power = probability * depth / n, power * g
+            lower = 1.0 + power * (3.0 * cosine + 5.0 * power * second)
+            beyond = 4.0 * np.pi * henyey_greenstein(cosine, power) - lower
+            total = total + np.where(power < LEAST_POWER, 0.0, probability * beyond)
+        return np.asarray(total / (4.0 * np.pi))
 
 
 #: Largest number of moments of a phase function.
