@@ -53,6 +53,25 @@ SHADERS: dict[str, tuple[str, dict[str, int]]] = {
 #: Pure functions of the library, as one text `library`.
 LIBRARY = ("lib/optics.glsl", "lib/interface.glsl")
 
+#: Functions that web/src/webgpu imports from generated/nodes.ts, of these shaders.
+NODES: dict[str, tuple[str, ...]] = {
+    "thickness/signed_depth.frag": ("root_or_more", "count_with_fraction"),
+    "thickness/recentered.glsl": ("recentered",),
+    "thickness/signed_thickness.frag": (
+        "view_ray",
+        "whole_count",
+        "fraction_of_count",
+        "is_balanced",
+        "misplaced_length",
+        "is_length",
+    ),
+    "lib/optics.glsl": ("fresnel_dielectric",),
+    "lib/interface.glsl": ("refracted_direction", "reflected_direction"),
+}
+
+#: Switches of these, all off.
+SWITCHED = {"thickness/signed_depth.frag": ("OPAQUE", "SPECTRAL"), "thickness/signed_thickness.frag": ("SPECTRAL",)}
+
 #: Numbers that it takes from there.
 NUMBERS = {
     "NOTHING": float(CONSTANTS["NOTHING"]),
@@ -66,6 +85,9 @@ _BLOCK = re.compile(r"^layout\(std140, row_major\) uniform \w+ \{\n(.*?)^\};\n",
 _HEAD = re.compile(r"^#version .*\n|^precision .*\n", re.M)
 _INPUT = re.compile(r"^in \w+ (\w+);\n", re.M)
 _COMMENT = re.compile(r"[ \t]*//.*$", re.M)
+_DEFINE = re.compile(r"^#define (\w+) (.+)\n", re.M)
+_FUNCTION = re.compile(r"^\w+ (\w+)\([^;{]*\) \{\n.*?^\}\n", re.M | re.S)
+_UNIFORM = re.compile(r"^uniform (\w+) (\w+);\n", re.M)
 
 
 def for_three(text: str) -> str:
@@ -99,6 +121,30 @@ def library() -> str:
     text = "".join(part for part in dict.fromkeys(parts) if not part.startswith("#define PI "))
     names = re.findall(r"^\w+ (\w+)\(", text, flags=re.M)
     return re.sub(rf"\b({'|'.join(names)})\b(?=\()", r"tl_\1", text)
+
+
+def functions(file: str, names: tuple[str, ...]) -> str:
+    """Some functions of a shader, pure: constants are spelled out, and uniforms are parameters."""
+    text = for_three(lift(file, dict.fromkeys(SWITCHED.get(file, ()), 0), "webgl2").text)
+    for name, value in _DEFINE.findall(text):
+        text = re.sub(rf"\b{name}\b", value, _DEFINE.sub("", text))
+    found = {one[1]: one[0] for one in _FUNCTION.finditer(text)}
+    for type_, uniform in _UNIFORM.findall(text):
+        for name, code in found.items():
+            if re.search(rf"\b{uniform}\b", code):
+                found[name] = code.replace(") {", f", {type_} {uniform}) {{", 1)
+    return "".join(found[name] for name in names)
+
+
+def generate_nodes() -> None:
+    """Write web/src/generated/nodes.ts: functions of shaders/ as nodes of three, which its transpiler makes."""
+    code = "".join(functions(file, names) for file, names in NODES.items())
+    done = subprocess.run(["node", "nodes.mjs"], cwd=WEB, input=code, stdout=subprocess.PIPE, encoding="utf-8", check=False)
+    if done.returncode:
+        raise InputError("nodes of web/src/generated", f"the transpiler ended with code {done.returncode}", "see above")
+    text = re.sub(r"^(?:export )?const (\w+) =", r"export const \1: any =", done.stdout, flags=re.M)
+    text = re.sub(r"^// Three.js Transpiler.*\n+", "", text).replace("'three/tsl'", '"three/tsl"')
+    _write(GENERATED / "nodes.ts", "// @ts-nocheck\n// Generated from shaders/ by tools/build_web.py; do not edit.\n" + text)
 
 
 def _write(path: Path, text: str) -> None:
@@ -146,6 +192,7 @@ def main() -> None:
             if arguments.if_npm:
                 return print(f"web/dist is not built, so that {MISSED}: {error}")
             raise
+        generate_nodes()
         _run("node", "build.mjs")
         write_example()
         if arguments.types:

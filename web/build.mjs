@@ -12,10 +12,21 @@ const WITHOUT_RENDERER = {
   setup: (build) => build.onResolve({ filter: /^three$/ }, () => ({ path: resolve("src/viewer/three.js") })),
 };
 
+// What both renderers share comes from the three that the other one is in.
+const WITHOUT_WEBGL = {
+  name: "without-webgl",
+  setup: (build) =>
+    build.onResolve({ filter: /^three$/ }, ({ pluginData, resolveDir }) =>
+      pluginData ? undefined : build.resolve("three/webgpu", { resolveDir, kind: "import-statement", pluginData: true }),
+    ),
+};
+
 const BUNDLES = [
   { entry: "src/index.ts", out: "dist/translucent-three.js", ...MODULE },
+  { entry: "src/webgpu.ts", out: "dist/webgpu.js", ...MODULE, plugins: [WITHOUT_WEBGL] },
   // For classic scripts and pages from disk: everything, three included, as the global `translucentThree`.
   { entry: "src/browser.ts", out: "dist/translucent-three.browser.js", globalName: "translucentThree", ...SCRIPT },
+  { entry: "src/webgpu.browser.ts", out: "dist/webgpu.browser.js", globalName: "translucentThree", ...SCRIPT, plugins: [WITHOUT_WEBGL] },
   { entry: "examples/glb/main.ts", out: "dist/example-glb.js", ...SCRIPT },
   // The page of `translucent page`.
   { entry: "page/main.js", out: "dist/page.js", ...SCRIPT, plugins: [WITHOUT_RENDERER] },

@@ -14,12 +14,14 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-#: WebGL2 in software, no sandbox (tests may run as root), and nothing that asks for a network.
+#: WebGL2 and WebGPU (over a Vulkan) in software, no sandbox (tests may run as root), and nothing that asks for a network.
 CHROMIUM_OPTIONS = [
     "--no-sandbox",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
+    "--enable-unsafe-webgpu",
+    "--use-webgpu-adapter=swiftshader",
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",

@@ -424,7 +424,7 @@ PRIMITIVES = """({ camera, size }) => tools.withRenderer(size, (renderer) => {
         body.rotation.set(0.4, 0.7, 0.1);
         pass.options.bodies = [body];
         const found = tools.measured(pass, body, camera);
-        return [name, { ...found, weight: pass.standIns.get(body).uniforms.count_weight.value }];
+        return [name, { ...found, weight: pass.standIns.kept.get(body).uniforms.count_weight.value }];
     }));
 })"""
 

@@ -51,7 +51,10 @@ globalThis.tools = (() => {
 
   // What the pass reads back, as base64.
   function pixels(pass) {
-    const { width, height, thickness, count, valid, covered } = pass.read();
+    return encoded(pass.read());
+  }
+
+  function encoded({ width, height, thickness, count, valid, covered }) {
     return { width, height, thickness: base64(thickness), count: base64(count), valid: base64(valid), covered: base64(covered) };
   }
 
@@ -73,5 +76,5 @@ globalThis.tools = (() => {
     return { ...pixels(pass), precision: pass.precision };
   }
 
-  return { withRenderer, measured, bytes, base64, geometry, mesh, camera, renderer, pixels };
+  return { withRenderer, measured, bytes, base64, geometry, mesh, camera, renderer, pixels, encoded };
 })();

@@ -17,46 +17,24 @@ import {
   WebGLRenderTarget,
 } from "three";
 import type { Camera, Material, Object3D, Texture, WebGLRenderer } from "three";
-import { StandIn, checkBody, visibleMeshes } from "./bodies.js";
+import { StandIns, areSpectral, bends, setExtinction } from "./bodies.js";
+import type { StandIn } from "./bodies.js";
 import { TranslucentError } from "./errors.js";
-import { extinctionOf } from "./extinction.js";
 import { checkOptions, checkView } from "./options.js";
+import type { ThicknessOptions, ThicknessPixels } from "./options.js";
 import { COVERAGE_FLOOR, NOTHING, OPEN_WEIGHTS, ROUNDING } from "./generated/shaders.js";
 import { expectedCount, place, seesFrom } from "./placement.js";
 import type { DepthRange, View } from "./placement.js";
 import { last, nearest, resolveUniforms, resolving, summing } from "./programs.js";
 import { isClosed } from "./topology.js";
+import { bodyUniforms } from "./uniforms.js";
 
 /** Numbers that paths are added up in. */
 export type Precision = "float32" | "float16";
 
-export interface ExactThicknessOptions {
-  /** Meshes whose inside is measured, with all below them, or a test of a mesh. Default: those with a TranslucentMaterial. */
-  bodies?: Object3D[] | ((mesh: Mesh) => boolean);
-  /** Meshes that end rays, or a test of a mesh; `[]` for none. Default: all others that write depth and are not transparent. */
-  opaque?: Object3D[] | ((mesh: Mesh) => boolean);
-  /** Pixels of the picture. Default: those of the renderer's canvas, also after it is resized. */
-  size?: [number, number];
+export interface ExactThicknessOptions extends ThicknessOptions {
   /** Precision of the sums. Default: float32 where the browser can add it up, float16 elsewhere. */
   precision?: Precision;
-  /** Measure the optical depth of each channel, too: always, never, or where media differ ("auto", the default). */
-  opticalDepth?: "auto" | boolean;
-  /** Find where rays leave bodies: always, never, or where a material bends them ("auto", the default). */
-  exits?: "auto" | boolean;
-}
-
-/** Pixels that `read` returns; row 0 is the top one. */
-export interface ThicknessPixels {
-  width: number;
-  height: number;
-  /** Metres inside bodies; 0 where `valid` is. */
-  thickness: Float32Array;
-  /** Exits minus entries ahead of the eye. */
-  count: Float32Array;
-  /** 0 where a hole, or a face wound wrongly, leaves no number to trust. */
-  valid: Uint8Array;
-  /** 1 where a ray meets a body. */
-  covered: Uint8Array;
 }
 
 // Rounding of a sum in 16 bits: 11 bits of each number, over a handful of faces.
@@ -77,7 +55,7 @@ export class ExactThicknessPass {
   options: ExactThicknessOptions;
   /** Diagonal of the box around all bodies at the last `render`, in metres. */
   diagonal = 1;
-  private standIns = new Map<Mesh, StandIn>();
+  private readonly standIns = new StandIns(bodyUniforms);
   private sums: WebGLRenderTarget | null = null;
   private last: WebGLRenderTarget | null = null;
   private ends: WebGLRenderTarget | null = null;
@@ -94,7 +72,7 @@ export class ExactThicknessPass {
     if (!(renderer as { isWebGLRenderer?: boolean }).isWebGLRenderer) {
       throw new TranslucentError("ExactThicknessPass", "the renderer is no WebGLRenderer", "use three's WebGLRenderer, on WebGL2");
     }
-    checkOptions(options);
+    checkOptions(options, "ExactThicknessPass", ["float32", "float16"]);
     this.renderer = renderer;
     this.options = options;
     void this.precision; // refuses a renderer that can add up nothing
@@ -144,10 +122,10 @@ export class ExactThicknessPass {
     const { renderer } = this;
     const gl = renderer.getContext() as WebGL2RenderingContext;
     if (gl.isContextLost()) return false;
-    checkOptions(this.options);
+    checkOptions(this.options, "ExactThicknessPass", ["float32", "float16"]);
     if (scene.matrixWorldAutoUpdate) scene.updateMatrixWorld();
     if (camera.parent === null && camera.matrixWorldAutoUpdate) camera.updateMatrixWorld();
-    const [bodies, opaque] = this.sort(scene, camera);
+    const [bodies, opaque] = this.standIns.sort(scene, camera, this.options);
     checkView(renderer, camera, [...bodies, ...opaque].map((one) => one.mesh));
     const [width, height] = this.size();
     const subpixel = 0.5 ** (gl.getParameter(gl.SUBPIXEL_BITS) as number);
@@ -158,7 +136,8 @@ export class ExactThicknessPass {
       media.union(one.worldBox);
     }
     for (const one of opaque) one.measure();
-    const spectral = this.isSpectral(bodies);
+    const several = this.options.opticalDepth ?? "auto";
+    const spectral = several === "auto" ? areSpectral(bodies) : several;
     const bending = this.options.exits ?? "auto";
     const exits = bending === "auto" ? bodies.some((one) => bends(one.mesh)) : bending;
     this.prepare(width, height, spectral, opaque.length > 0, exits);
@@ -231,8 +210,7 @@ export class ExactThicknessPass {
 
   /** Free all that is on the graphics card; the pass may be used again. */
   dispose(): void {
-    for (const one of this.standIns.values()) one.dispose();
-    this.standIns.clear();
+    this.standIns.dispose();
     for (const key of Object.keys(this.resolvers)) {
       this.resolvers[key].dispose();
       delete this.resolvers[key];
@@ -241,36 +219,6 @@ export class ExactThicknessPass {
     for (const target of [this.sums, this.ends, this.last, this.result]) target?.dispose();
     this.sums = this.ends = this.last = this.result = null;
     this.layout = "";
-  }
-
-  /** Bodies, and what ends rays. */
-  private sort(scene: Object3D, camera: Camera): [StandIn[], StandIn[]] {
-    const { bodies, opaque } = this.options;
-    const all = visibleMeshes(scene, camera);
-    const chosen = Array.isArray(bodies) ? below(bodies, camera) : all.filter(bodies ?? isTranslucent);
-    chosen.forEach(checkBody);
-    const inside = new Set<Mesh>(chosen);
-    const ends = Array.isArray(opaque) ? below(opaque, camera) : all.filter(opaque ?? endsRays);
-    const kept = new Map<Mesh, StandIn>();
-    const standIn = (mesh: Mesh): StandIn => {
-      const one = kept.get(mesh) ?? this.standIns.get(mesh) ?? new StandIn(mesh);
-      kept.set(mesh, one);
-      return one;
-    };
-    const sorted: [StandIn[], StandIn[]] = [
-      chosen.map(standIn),
-      ends.filter((mesh) => !inside.has(mesh) && mesh.geometry.getAttribute("position")).map(standIn),
-    ];
-    for (const [mesh, one] of this.standIns) if (!kept.has(mesh)) one.dispose();
-    this.standIns = kept;
-    return sorted;
-  }
-
-  private isSpectral(bodies: StandIn[]): boolean {
-    const asked = this.options.opticalDepth ?? "auto";
-    if (asked !== "auto") return asked;
-    const media = new Set(bodies.map((one) => extinctionOf(materials(one.mesh)[0]).join()));
-    return media.size > 1;
   }
 
   private openWeight(number: number): number {
@@ -405,33 +353,4 @@ export class ExactThicknessPass {
     renderer.info.autoReset = saved.info;
     renderer.setRenderTarget(saved.target, saved.face, saved.level);
   }
-}
-
-/** Denser than this is opaque anyway, and its products stay finite. */
-function setExtinction(one: StandIn, diagonal: number): void {
-  const [r, g, b] = extinctionOf(materials(one.mesh)[0]).map((sigma) => Math.min(sigma, NOTHING / diagonal));
-  one.uniforms.extinction.value.set(r, g, b, 0);
-}
-
-function bends(mesh: Mesh): boolean {
-  return materials(mesh).some((one) => ((one as { ior?: number }).ior ?? 1) > 1);
-}
-
-function below(roots: Object3D[], camera: Camera): Mesh[] {
-  for (const root of roots) if (root.children.length === 0) checkBody(root);
-  return [...new Set(roots.flatMap((root) => visibleMeshes(root, camera)))];
-}
-
-function isTranslucent(mesh: Mesh): boolean {
-  return materials(mesh).some((one) => (one as { isTranslucentMaterial?: boolean }).isTranslucentMaterial);
-}
-
-function endsRays(mesh: Mesh): boolean {
-  const all = materials(mesh);
-  const transmissive = (one: Material): boolean => ((one as { transmission?: number }).transmission ?? 0) > 0;
-  return all.every((one) => one.visible && one.depthWrite && !one.transparent && !transmissive(one));
-}
-
-function materials(mesh: Mesh): Material[] {
-  return Array.isArray(mesh.material) ? mesh.material : [mesh.material];
 }

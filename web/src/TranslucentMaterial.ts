@@ -86,6 +86,7 @@ vec3 exactTransmitted(vec3 p, vec3 n, float roughness, float ior, float fallback
   float along = thickness;
   float filled = 1.0;
   float crossings = 1.0;
+  float longest = 1e30;
   vec3 outside = inside;
   if (exactUse[1] && valid) {
     // To where the bent ray is behind the last surface: in steps, then halving them, then by the tangent plane there.
@@ -111,11 +112,16 @@ vec3 exactTransmitted(vec3 p, vec3 n, float roughness, float ior, float fallback
       along = clamp(tangent, low - exactDiagonal / float(STEPS), high + exactDiagonal / float(STEPS));
       along = max(along, 0.0);
     }
-    // Of the way to the last surface, the share that is inside.
+    // Of the way to the last surface, the share that is inside. Where a strand ends before another the bent ray crosses a
+    // gap: no more than is on either, and on as the ray came.
     filled = reach > thickness ? thickness / reach : 1.0;
+    vec4 other = exactTexel(exactPath, there);
+    longest = max(thickness, other.b > 0.5 ? other.r : 0.0) / max(dot(inside, ray), 0.1);
     vec3 normal = normalize((viewMatrix * vec4(exitNormal, 0.0)).xyz);
     float cosine = dot(inside, normal);
-    if (dot(exitNormal, exitNormal) > 0.25 && cosine > 0.0) {
+    bool gap = along * filled > longest;
+    if (gap) { outside = ray; }
+    if (!gap && dot(exitNormal, exitNormal) > 0.25 && cosine > 0.0) {
       vec3 leaving = tl_refracted_direction(inside, -normal, 1.0 / ior);
       bool leaves = dot(leaving, leaving) > 0.25;
       outside = leaves ? leaving : tl_reflected_direction(inside, -normal);
@@ -125,7 +131,7 @@ vec3 exactTransmitted(vec3 p, vec3 n, float roughness, float ior, float fallback
   }
   // Per metre of the straight ray, of all media on it.
   vec3 extinction = exactUse[0] && thickness > 0.0 ? exactTexel(exactOpticalDepth, place).rgb / thickness : exactExtinction;
-  return kept * tl_transmittance(extinction * (along * filled * crossings)) * exactBehind(p + along * inside, outside, roughness, ior);
+  return kept * tl_transmittance(extinction * (min(along * filled, longest) * crossings)) * exactBehind(p + along * inside, outside, roughness, ior);
 }
 #endif
 `;

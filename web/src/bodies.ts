@@ -1,20 +1,24 @@
 /** The meshes of a scene that fill space or end rays, and their stand-ins in the scenes that the pass draws. */
 import { Box3, InstancedMesh, Matrix4, Mesh, SkinnedMesh } from "three";
 import type { BufferGeometry, Camera, Material, Object3D, Vector3 } from "three";
-import { TranslucentError } from "./errors.js";
-import { bodyUniforms } from "./programs.js";
-import type { BodyUniforms } from "./programs.js";
+import { TranslucentError, nameOf } from "./errors.js";
+import { extinctionOf, materials } from "./extinction.js";
+import { NOTHING } from "./generated/shaders.js";
+import type { ThicknessOptions } from "./options.js";
+import type { BodyUniforms } from "./uniforms.js";
 
 /** A mesh as the pass draws it: one geometry, other materials; nothing of the user's own scene is touched. */
 export class StandIn {
-  readonly uniforms: BodyUniforms = bodyUniforms();
   readonly box = new Box3();
   readonly worldBox = new Box3();
   private drawn: Mesh | null = null;
   private geometry: BufferGeometry | null = null;
   private readonly made = new Map<string, Material>();
 
-  constructor(readonly mesh: Mesh) {}
+  constructor(
+    readonly mesh: Mesh,
+    readonly uniforms: BodyUniforms,
+  ) {}
 
   get instanced(): InstancedMesh | null {
     return (this.mesh as InstancedMesh).isInstancedMesh ? (this.mesh as InstancedMesh) : null;
@@ -112,7 +116,7 @@ export function visibleMeshes(root: Object3D, camera: Camera): Mesh[] {
 
 /** Refuse what has no inside that this pass can measure. */
 export function checkBody(object: Object3D): asserts object is Mesh {
-  const name = object.name ? `${object.type} "${object.name}"` : object.type;
+  const name = nameOf(object);
   const flags = object as unknown as Record<string, boolean>;
   if (!flags.isMesh) throw new TranslucentError(name, "it has no triangles, so no inside", "give meshes as bodies");
   if (flags.isBatchedMesh) {
@@ -122,4 +126,68 @@ export function checkBody(object: Object3D): asserts object is Mesh {
   if (!geometry.getAttribute("position")) {
     throw new TranslucentError(name, "its geometry has no positions", "give a geometry with triangles");
   }
+}
+
+/** Stand-ins of the meshes of a scene, kept from picture to picture. */
+export class StandIns {
+  private kept = new Map<Mesh, StandIn>();
+
+  constructor(private readonly uniforms: () => BodyUniforms) {}
+
+  /** Bodies, and what ends rays. */
+  sort(scene: Object3D, camera: Camera, { bodies, opaque }: ThicknessOptions): [StandIn[], StandIn[]] {
+    const all = visibleMeshes(scene, camera);
+    const chosen = Array.isArray(bodies) ? below(bodies, camera) : all.filter(bodies ?? isTranslucent);
+    chosen.forEach(checkBody);
+    const inside = new Set<Mesh>(chosen);
+    const ends = Array.isArray(opaque) ? below(opaque, camera) : all.filter(opaque ?? endsRays);
+    const kept = new Map<Mesh, StandIn>();
+    const standIn = (mesh: Mesh): StandIn => {
+      const one = kept.get(mesh) ?? this.kept.get(mesh) ?? new StandIn(mesh, this.uniforms());
+      kept.set(mesh, one);
+      return one;
+    };
+    const sorted: [StandIn[], StandIn[]] = [
+      chosen.map(standIn),
+      ends.filter((mesh) => !inside.has(mesh) && mesh.geometry.getAttribute("position")).map(standIn),
+    ];
+    for (const [mesh, one] of this.kept) if (!kept.has(mesh)) one.dispose();
+    this.kept = kept;
+    return sorted;
+  }
+
+  dispose(): void {
+    for (const one of this.kept.values()) one.dispose();
+    this.kept.clear();
+  }
+}
+
+/** Tell whether bodies are of several media. */
+export function areSpectral(bodies: StandIn[]): boolean {
+  return new Set(bodies.map((one) => extinctionOf(materials(one.mesh)[0]).join())).size > 1;
+}
+
+/** Denser than this is opaque anyway, and its products stay finite. */
+export function setExtinction(one: StandIn, diagonal: number): void {
+  const [r, g, b] = extinctionOf(materials(one.mesh)[0]).map((sigma) => Math.min(sigma, NOTHING / diagonal));
+  one.uniforms.extinction.value.set(r, g, b, 0);
+}
+
+export function bends(mesh: Mesh): boolean {
+  return materials(mesh).some((one) => ((one as { ior?: number }).ior ?? 1) > 1);
+}
+
+function below(roots: Object3D[], camera: Camera): Mesh[] {
+  for (const root of roots) if (root.children.length === 0) checkBody(root);
+  return [...new Set(roots.flatMap((root) => visibleMeshes(root, camera)))];
+}
+
+function isTranslucent(mesh: Mesh): boolean {
+  return materials(mesh).some((one) => (one as { isTranslucentMaterial?: boolean }).isTranslucentMaterial);
+}
+
+function endsRays(mesh: Mesh): boolean {
+  const all = materials(mesh);
+  const transmissive = (one: Material): boolean => ((one as { transmission?: number }).transmission ?? 0) > 0;
+  return all.every((one) => one.visible && one.depthWrite && !one.transparent && !transmissive(one));
 }

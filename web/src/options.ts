@@ -1,7 +1,35 @@
 /** What a pass is given: options by name, and cameras and clipping that it cannot follow. */
-import type { Camera, Material, Mesh, WebGLRenderer } from "three";
-import type { ExactThicknessOptions } from "./ExactThicknessPass.js";
-import { TranslucentError } from "./errors.js";
+import type { Camera, Mesh, Object3D, Plane } from "three";
+import { TranslucentError, nameOf } from "./errors.js";
+import { materials } from "./extinction.js";
+
+/** What is measured, and what ends rays. */
+export interface ThicknessOptions {
+  /** Meshes whose inside is measured, with all below them, or a test of a mesh. Default: those with a TranslucentMaterial. */
+  bodies?: Object3D[] | ((mesh: Mesh) => boolean);
+  /** Meshes that end rays, or a test of a mesh; `[]` for none. Default: all others that write depth and are not transparent. */
+  opaque?: Object3D[] | ((mesh: Mesh) => boolean);
+  /** Pixels of the picture. Default: those of the renderer's canvas, also after it is resized. */
+  size?: [number, number];
+  /** Measure the optical depth of each channel, too: always, never, or where media differ ("auto", the default). */
+  opticalDepth?: "auto" | boolean;
+  /** Find where rays leave bodies: always, never, or where a material bends them ("auto", the default). */
+  exits?: "auto" | boolean;
+}
+
+/** Pixels that `read` returns; row 0 is the top one. */
+export interface ThicknessPixels {
+  width: number;
+  height: number;
+  /** Metres inside bodies; 0 where `valid` is. */
+  thickness: Float32Array;
+  /** Exits minus entries ahead of the eye. */
+  count: Float32Array;
+  /** 0 where a hole, or a face wound wrongly, leaves no number to trust. */
+  valid: Uint8Array;
+  /** 1 where a ray meets a body. */
+  covered: Uint8Array;
+}
 
 type Rule = [(value: unknown) => boolean, string];
 
@@ -22,24 +50,23 @@ const SIZE: Rule = [
   "give [width, height] in pixels",
 ];
 
-const RULES: Record<keyof ExactThicknessOptions, Rule> = {
-  bodies: OBJECTS,
-  opaque: OBJECTS,
-  size: SIZE,
-  precision: choice("float32", "float16"),
-  opticalDepth: choice("auto", true, false),
-  exits: choice("auto", true, false),
-};
-
-/** Refuse options that are unknown, or of a wrong kind. */
-export function checkOptions(options: ExactThicknessOptions): void {
+/** Refuse options that are unknown, or of a wrong kind; `of` names whose they are. */
+export function checkOptions(options: ThicknessOptions, of: string, precisions: string[]): void {
   if (typeof options !== "object" || options === null) {
-    throw new TranslucentError("options of ExactThicknessPass", `they are ${textOf(options)}`, "give an object, as { exits: true }");
+    throw new TranslucentError(`options of ${of}`, `they are ${textOf(options)}`, "give an object, as { exits: true }");
   }
+  const rules: Record<string, Rule | undefined> = {
+    bodies: OBJECTS,
+    opaque: OBJECTS,
+    size: SIZE,
+    precision: choice(...precisions),
+    opticalDepth: choice("auto", true, false),
+    exits: choice("auto", true, false),
+  };
   for (const [name, value] of Object.entries(options)) {
-    const rule = (RULES as Record<string, Rule | undefined>)[name];
-    const what = `option ${name} of ExactThicknessPass`;
-    if (!rule) throw new TranslucentError(what, "there is no such option", `use one of ${Object.keys(RULES).join(", ")}`);
+    const rule = rules[name];
+    const what = `option ${name} of ${of}`;
+    if (!rule) throw new TranslucentError(what, "there is no such option", `use one of ${Object.keys(rules).join(", ")}`);
     if (value !== undefined && !rule[0](value)) throw new TranslucentError(what, `it is ${textOf(value)}`, rule[1]);
   }
 }
@@ -52,23 +79,26 @@ function textOf(value: unknown): string {
   return name && name !== "Object" ? `a ${name}` : "an object";
 }
 
+/** A renderer's planes that cut; WebGPURenderer has none of its own. */
+interface Clipping {
+  clippingPlanes?: Plane[];
+  localClippingEnabled?: boolean;
+}
+
 /** Refuse cameras of several pictures, and planes that cut off parts of what is measured. */
-export function checkView(renderer: WebGLRenderer, camera: Camera, meshes: Mesh[]): void {
+export function checkView(renderer: Clipping, camera: Camera, meshes: Mesh[]): void {
   if ((camera as { isArrayCamera?: boolean }).isArrayCamera) {
     throw new TranslucentError("an ArrayCamera", "it has several pictures, and the pass measures one", "render each of its cameras by itself");
   }
   const cut = "the pass measures whole bodies, and would not be of what is seen";
-  if (renderer.clippingPlanes.length > 0) {
+  if (renderer.clippingPlanes?.length) {
     throw new TranslucentError("renderer.clippingPlanes", cut, "remove them, or cut the geometry");
   }
+  const inGroup = (mesh: Object3D | null): boolean =>
+    mesh !== null && ((mesh as { isClippingGroup?: boolean }).isClippingGroup === true || inGroup(mesh.parent));
+  const grouped = meshes.find(inGroup);
+  if (grouped) throw new TranslucentError(`the ClippingGroup of ${nameOf(grouped)}`, cut, "use a Group, or cut the geometry");
   if (!renderer.localClippingEnabled) return;
-  const clipped = meshes.find((mesh) => materialsOf(mesh).some((one) => (one.clippingPlanes?.length ?? 0) > 0));
-  if (clipped) {
-    const name = clipped.name ? `${clipped.type} "${clipped.name}"` : clipped.type;
-    throw new TranslucentError(`clippingPlanes of ${name}`, cut, "remove them, or cut the geometry");
-  }
-}
-
-function materialsOf(mesh: Mesh): Material[] {
-  return Array.isArray(mesh.material) ? mesh.material : [mesh.material];
+  const clipped = meshes.find((mesh) => materials(mesh).some((one) => (one.clippingPlanes?.length ?? 0) > 0));
+  if (clipped) throw new TranslucentError(`clippingPlanes of ${nameOf(clipped)}`, cut, "remove them, or cut the geometry");
 }

@@ -4,7 +4,7 @@ import type { Camera } from "three";
 import { sumOfInstances } from "./bodies.js";
 import type { StandIn } from "./bodies.js";
 import { NEAR_SURFACE, NOTHING } from "./generated/shaders.js";
-import type { BodyUniforms } from "./programs.js";
+import type { BodyUniforms } from "./uniforms.js";
 import { isClosed, windingNumber } from "./topology.js";
 
 /** Distances along the camera's axis that media span. */
