@@ -30,6 +30,8 @@ WEB = ROOT / "web"
 GENERATED = WEB / "src" / "generated"
 STAMP = WEB / "node_modules" / ".package-lock.sha256"
 
+HEAD = "// Generated from shaders/ by tools/build_web.py; do not edit.\n"
+
 #: What misses it.
 MISSED = "`translucent page` and `tl.view` have no viewer, and tests in a browser skip"
 
@@ -108,10 +110,9 @@ def _fields(block: str, code: str) -> list[str]:
 def generate() -> None:
     """Write web/src/generated/shaders.ts, where it differs from what is there."""
     texts = {name: for_three(lift(file, switches, "webgl2").text) for name, (file, switches) in SHADERS.items()}
-    head = "// Generated from shaders/ by tools/build_web.py; do not edit.\n"
     values = {**NUMBERS, **texts, "library": library()}
     script = "".join(f"export const {name} = {json.dumps(value)};\n" for name, value in values.items())
-    _write(GENERATED / "shaders.ts", head + script)
+    _write(GENERATED / "shaders.ts", HEAD + script)
 
 
 def library() -> str:
@@ -139,12 +140,14 @@ def functions(file: str, names: tuple[str, ...]) -> str:
 def generate_nodes() -> None:
     """Write web/src/generated/nodes.ts: functions of shaders/ as nodes of three, which its transpiler makes."""
     code = "".join(functions(file, names) for file, names in NODES.items())
-    done = subprocess.run(["node", "nodes.mjs"], cwd=WEB, input=code, stdout=subprocess.PIPE, encoding="utf-8", check=False)
+    done = subprocess.run(
+        ["node", "nodes.mjs"], cwd=WEB, input=code, stdout=subprocess.PIPE, encoding="utf-8", check=False
+    )
     if done.returncode:
         raise InputError("nodes of web/src/generated", f"the transpiler ended with code {done.returncode}", "see above")
     text = re.sub(r"^(?:export )?const (\w+) =", r"export const \1: any =", done.stdout, flags=re.M)
     text = re.sub(r"^// Three.js Transpiler.*\n+", "", text).replace("'three/tsl'", '"three/tsl"')
-    _write(GENERATED / "nodes.ts", "// @ts-nocheck\n// Generated from shaders/ by tools/build_web.py; do not edit.\n" + text)
+    _write(GENERATED / "nodes.ts", f"// @ts-nocheck\n{HEAD}{text}")
 
 
 def _write(path: Path, text: str) -> None:

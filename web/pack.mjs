@@ -1,4 +1,4 @@
-// Before `npm pack` and `npm publish`: bundles and types of what is there now. Needs the shaders of `make web`.
+// Before `npm pack` and `npm publish`: bundles and types of what is there now. Needs the shaders and nodes of `make web`.
 import { spawnSync } from "node:child_process";
 import { existsSync, readFileSync, rmSync } from "node:fs";
 
@@ -7,7 +7,7 @@ if (!existsSync("src/generated/shaders.ts")) {
   process.exit(1);
 }
 rmSync("dist/types", { recursive: true, force: true });
-for (const command of [["build.mjs"], ["node_modules/typescript/bin/tsc", "-p", "."]]) {
+for (const command of [["build.mjs", "--package"], ["node_modules/typescript/bin/tsc", "-p", "."]]) {
   const { status } = spawnSync(process.execPath, command, { stdio: ["ignore", "inherit", "inherit"] });
   if (status !== 0) process.exit(status ?? 1);
 }

@@ -14,8 +14,17 @@ if TYPE_CHECKING:
 WEB = Path(__file__).resolve().parents[2] / "web"
 TYPEDOC = WEB / "node_modules" / "typedoc" / "bin" / "typedoc"
 
+#: Sources by what imports name.
+ENTRIES = {
+    "translucent-three": "index",
+    "translucent-three/webgpu": "webgpu",
+    "translucent-three/react": "react",
+    "translucent-three/gltf-transform": "gltf-transform",
+}
+
 OPTIONS = (
-    *("--plugin", "typedoc-plugin-markdown", "--entryPoints", "src/index.ts", "--readme", "none", "--router", "module"),
+    *("--plugin", "typedoc-plugin-markdown", "--readme", "none", "--router", "module"),
+    *(word for name in ENTRIES.values() for word in ("--entryPoints", f"src/{name}.ts")),
     *("--hideBreadcrumbs", "--hidePageHeader", "--disableSources", "--excludePrivate", "--excludeProtected"),
     *("--excludeExternals", "--useCodeBlocks", "--parametersFormat", "table", "--propertiesFormat", "table"),
     *("--logLevel", "Error"),
@@ -24,10 +33,11 @@ OPTIONS = (
 ABSENT = "This site was built without npm. `make web`, then `make docs`, writes the reference here.\n"
 
 
-def as_section(text: str) -> str:
+def as_section(text: str, entry: str) -> str:
     """Text of TypeDoc for the middle of a page: without its title, and with code in place of links to deep headings."""
     body = re.sub(r"\A# .*\n", "", text)
-    return re.sub(r"\[(`[^`]+`)\]\(#[^)]*\)", r"\1", body)
+    body = re.sub(r"^## (.+)$", lambda found: f"## {found[1]} of `{entry}`", body, flags=re.M)
+    return re.sub(r"\[(`[^`]+`)\]\([^)]*#[^)]*\)", r"\1", body)
 
 
 def write_reference(app: Sphinx) -> None:
@@ -36,7 +46,10 @@ def write_reference(app: Sphinx) -> None:
     if TYPEDOC.is_file():
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run(["node", TYPEDOC, *OPTIONS, "--out", folder], cwd=WEB, check=True)
-            text = as_section((Path(folder) / "README.md").read_text(encoding="utf-8"))
+            pages = {
+                entry: (Path(folder) / f"{name}.md").read_text(encoding="utf-8") for entry, name in ENTRIES.items()
+            }
+            text = "\n".join(as_section(page, entry) for entry, page in pages.items())
     path = Path(app.srcdir) / "generated" / "typescript.md"
     path.parent.mkdir(exist_ok=True)
     path.write_text(text, encoding="utf-8")

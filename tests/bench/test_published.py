@@ -127,9 +127,11 @@ def test_the_front_page_has_a_scene_or_a_picture(
 
 
 def test_the_reference_of_the_web_module_has_no_links_to_headings_that_are_too_deep() -> None:
-    written = "# name\n\n## Classes\n\n[`Pass`](#pass) takes [three](https://threejs.org) and [`Pass[]`](#pass-2).\n"
-    page = extension("typescript_reference").as_section(written)
-    assert page == "\n## Classes\n\n`Pass` takes [three](https://threejs.org) and `Pass[]`.\n"
+    written = (
+        "# name\n\n## Classes\n\n[`Pass`](#pass) takes [three](https://threejs.org) and [`Pass[]`](index.md#pass-2).\n"
+    )
+    page = extension("typescript_reference").as_section(written, "translucent-three")
+    assert page == "\n## Classes of `translucent-three`\n\n`Pass` takes [three](https://threejs.org) and `Pass[]`.\n"
 
 
 def test_pages_include_what_is_written() -> None:

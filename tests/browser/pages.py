@@ -14,7 +14,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-#: WebGL2 and WebGPU (over a Vulkan) in software, no sandbox (tests may run as root), and nothing that asks for a network.
+#: WebGL2 and WebGPU (over Vulkan) in software, no sandbox (tests may run as root), nothing that asks for a network.
 CHROMIUM_OPTIONS = [
     "--no-sandbox",
     "--use-angle=swiftshader",
@@ -22,6 +22,8 @@ CHROMIUM_OPTIONS = [
     "--ignore-gpu-blocklist",
     "--enable-unsafe-webgpu",
     "--use-webgpu-adapter=swiftshader",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",

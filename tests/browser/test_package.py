@@ -15,7 +15,7 @@ WEB = Path(__file__).resolve().parents[2] / "web"
 GENERATED = WEB / "src" / "generated" / "shaders.ts"
 
 #: Where the page is served from, which no network knows.
-ORIGIN = "http://pages.test"
+ORIGIN = "https://pages.test"
 _KINDS = {".html": "text/html", ".js": "text/javascript"}
 
 
@@ -36,26 +36,75 @@ def packed(package: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["npm", "pack", "--offline"], cwd=package, capture_output=True, encoding="utf-8", check=False)
 
 
-def test_a_pack_builds_and_holds_bundle_map_sources_and_types(package: Path) -> None:
+@pytest.fixture
+def contents(package: Path) -> dict[str, bytes]:
+    """Files of the tarball, by name."""
     done = packed(package)
     assert done.returncode == 0, done.stderr
     with tarfile.open(next(package.glob("*.tgz"))) as archive:
-        files = {
-            member.name.removeprefix("package/"): archive.extractfile(member) for member in archive if member.isfile()
+        return {
+            member.name.removeprefix("package/"): archive.extractfile(member).read()  # type: ignore[union-attr]
+            for member in archive
+            if member.isfile()
         }
-        described = json.load(files["package.json"])  # type: ignore[arg-type]
-        mapped = json.load(files["dist/translucent-three.js.map"])  # type: ignore[arg-type]
-    assert {described["types"].removeprefix("./"), described["exports"]["."]["default"].removeprefix("./")} <= set(
-        files
-    )
-    assert {"README.md", "LICENSE", "dist/types/TranslucentMaterial.d.ts", "dist/types/ExactThicknessPass.d.ts"} <= set(
-        files
-    )
-    sources = {Path("dist", source) for source in mapped["sources"]}
-    assert {"src/index.ts", "src/options.ts", "src/generated/shaders.ts"} <= set(files)
-    assert [one for one in sources if one.as_posix().replace("dist/../", "") not in files] == []
+
+
+#: A page of somebody who has the package and three.js alone.
+STRANGER = """<!doctype html>
+<script type="importmap">
+{ "imports": { "three": "/three/three.module.js", "translucent-three": "/package/dist/translucent-three.js" } }
+</script>
+<script type="module">
+import * as THREE from "three";
+import { ExactThicknessPass, TranslucentMaterial } from "translucent-three";
+const renderer = new THREE.WebGLRenderer();
+renderer.setSize(64, 64);
+document.body.append(renderer.domElement);
+const camera = new THREE.PerspectiveCamera(30, 1, 0.1, 10);
+camera.position.z = 5;
+const scene = new THREE.Scene().add(new THREE.DirectionalLight());
+const pass = new ExactThicknessPass(renderer);
+const jade = new TranslucentMaterial({ pass, ior: 1.5, attenuationColor: "#2e8b57", attenuationDistance: 0.5 });
+scene.add(new THREE.Mesh(new THREE.SphereGeometry(1, 64, 32), jade));
+pass.render(scene, camera);
+renderer.render(scene, camera);
+globalThis.thickness = pass.at(32, 32);
+</script>
+"""
+
+
+def test_the_tarball_is_all_that_a_page_needs(chromium: Any, contents: dict[str, bytes]) -> None:
+    described = json.loads(contents["package.json"])
+    for entry in described["exports"].values():
+        if isinstance(entry, dict):
+            assert {path.removeprefix("./") for path in entry.values()} <= set(contents)
+    assert {"README.md", "LICENSE", "src/index.ts", "src/generated/shaders.ts"} <= set(contents)
+    maps = [name for name in contents if name.endswith(".js.map")]
+    assert len(maps) == 4
+    for name in maps:
+        sources = [source.removeprefix("../") for source in json.loads(contents[name])["sources"]]
+        assert [source for source in sources if source not in contents] == []
     assert described["author"] == "the translucent authors"
-    assert not [name for name in files if "viewer" in name or name.startswith("node_modules")]
+    assert not [name for name in contents if "viewer" in name or name.startswith("node_modules")]
+
+    def serve(route: Any) -> None:
+        path = route.request.url.removeprefix(f"{ORIGIN}/")
+        if path == "":
+            return route.fulfill(body=STRANGER, content_type="text/html")
+        room, _, name = path.partition("/")
+        three = WEB / "node_modules" / "three" / "build" / name
+        body = contents[name] if room == "package" else three.read_bytes()
+        return route.fulfill(body=body, content_type="text/javascript")
+
+    context = chromium.new_context(viewport={"width": 64, "height": 64})
+    try:
+        page = context.new_page()
+        page.route(f"{ORIGIN}/**", serve)
+        page.goto(f"{ORIGIN}/")
+        page.wait_for_function("() => globalThis.thickness")
+        assert page.evaluate("thickness") == pytest.approx(2.0, abs=0.01)
+    finally:
+        context.close()
 
 
 def test_a_pack_without_shaders_says_what_makes_them(package: Path) -> None:
@@ -66,7 +115,8 @@ def test_a_pack_without_shaders_says_what_makes_them(package: Path) -> None:
     assert not list(package.glob("*.tgz"))
 
 
-def test_an_import_map_needs_no_build(chromium: Any, web_dist: Path) -> None:
+@pytest.mark.parametrize("example", ["import-map", "webgpu"])
+def test_an_import_map_needs_no_build(chromium: Any, web_dist: Path, example: str) -> None:
     if not (WEB / "node_modules" / "three" / "build" / "three.module.js").is_file():
         pytest.skip("three is not there: run `make web`")
 
@@ -80,9 +130,14 @@ def test_an_import_map_needs_no_build(chromium: Any, web_dist: Path) -> None:
         page = context.new_page()
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.route(f"{ORIGIN}/**", serve)
-        page.goto(f"{ORIGIN}/examples/import-map/index.html")
-        page.wait_for_function("() => globalThis.pass?.texture")
-        thickest = page.evaluate("() => pass.read().thickness.reduce((a, b) => Math.max(a, b), 0)")
+        page.goto(f"{ORIGIN}/examples/{example}/index.html")
+        if example == "webgpu" and not page.evaluate("async () => Boolean(await navigator.gpu?.requestAdapter())"):
+            pytest.skip("this Chromium has no WebGPU adapter")
+        page.wait_for_function("() => globalThis.metres || globalThis.pass?.texture")
+        thickest = page.evaluate(
+            "async () => (globalThis.metres ? await metres() : pass.read()).thickness"
+            ".reduce((a, b) => Math.max(a, b), 0)"
+        )
         # The tube of the knot is 12 mm thick, and rays cross it several times at most.
         assert 0.011 < thickest < 0.06
         assert errors == []

@@ -10,6 +10,7 @@ import pytest
 import translucent as tl
 from tests.browser.pages import WebPage, decoded, encoded
 from tests.browser.thickness import Truth, described, described_camera, framing, rounded
+from translucent.assets import mesh_path
 from translucent.geometry.solids import Sphere
 
 SIZE = (64, 64)
@@ -87,6 +88,30 @@ def test_a_ball_of_glass_turns_the_world_upside_down(pictures: list[Any], three_
     # What it leaves out is light that is mirrored inside, and the horizon that maps of three.js blur.
     assert errors[0] < 0.15 * truth[inside].mean()
     assert errors[1] > 3.0 * errors[0]
+
+
+def test_a_bent_ray_does_not_fill_the_gap_of_a_hollow_body(three_page: WebPage) -> None:
+    """It ends on the far wall of a goblet, and between them is air: else walls are dark, and turn the sky around."""
+    goblet = rounded(tl.load_mesh(mesh_path("goblet")))
+    camera, distance = framing(goblet), DISTANCE * goblet.diagonal / BALL.diagonal
+    asked = {
+        "mesh": described(goblet),
+        "normals": encoded(goblet.vertex_normals, "f4"),
+        "camera": described_camera(camera, SIZE),
+        "size": SIZE,
+        "medium": {"color": COLOR, "distance": distance},
+        "kinds": [{"ior": 1.5}],
+    }
+    (drawn,) = (decoded(one).reshape(*SIZE, 4)[::-1, :, :3] for one in three_page.run(DRAWN, asked))
+    medium = tl.Medium.from_color(COLOR, distance=distance, ior=1.5)
+    rows = np.where(np.arange(64) < 32, 1.0, 0.5)[:, None, None] * np.ones((1, 128, 3))
+    scene = tl.Scene([tl.Object(goblet, medium=medium)], camera, environment=tl.Environment.image(rows))
+    with tl.Renderer() as renderer:
+        truth = renderer.render(scene, SIZE, samples=1, interfaces=tl.TracedInterfaces(depth=8)).radiance
+    crossed = Truth.of(goblet, camera, SIZE).crossed
+    inside = tl.interior(crossed) & (crossed > 0)
+    error = np.sqrt(np.mean((drawn - truth)[inside] ** 2)) / truth[inside].mean()
+    assert error < 0.25  # with the gap filled: 0.4
 
 
 UNMEASURED = """() => tools.withRenderer([16, 16], (renderer) => {

@@ -191,7 +191,8 @@ VARIANTS = """async ({ ball, camera, size }) => {
   const instanced = new THREE.InstancedMesh(tools.geometry(ball), new THREE.MeshBasicMaterial(), 2);
   places.forEach((place, i) => instanced.setMatrixAt(i, place));
   const larger = tools.geometry(ball);
-  larger.morphAttributes.position = [larger.getAttribute("position").clone().applyMatrix4(new THREE.Matrix4().makeScale(3, 3, 3))];
+  const three_times = new THREE.Matrix4().makeScale(3, 3, 3);
+  larger.morphAttributes.position = [larger.getAttribute("position").clone().applyMatrix4(three_times)];
   const morphed = new THREE.Mesh(larger, new THREE.MeshBasicMaterial());
   morphed.morphTargetInfluences[0] = 0.25;
   const scaled = tools.mesh(ball);
@@ -199,7 +200,8 @@ VARIANTS = """async ({ ball, camera, size }) => {
   const rigged = tools.geometry(ball);
   const n = rigged.getAttribute("position").count;
   rigged.setAttribute("skinIndex", new THREE.Uint16BufferAttribute(new Uint16Array(4 * n), 4));
-  rigged.setAttribute("skinWeight", new THREE.Float32BufferAttribute(Float32Array.from({ length: 4 * n }, (_, i) => (i % 4 ? 0 : 1)), 4));
+  const weights = Float32Array.from({ length: 4 * n }, (_, i) => (i % 4 ? 0 : 1));
+  rigged.setAttribute("skinWeight", new THREE.Float32BufferAttribute(weights, 4));
   const skinned = new THREE.SkinnedMesh(rigged, new THREE.MeshBasicMaterial());
   const bone = new THREE.Bone();
   skinned.add(bone);
@@ -252,9 +254,9 @@ DRAWN = """async ({ ball, normals, camera, size, color, distance }) => {
     pictures.push(tools.base64(await gpu.readRenderTargetPixelsAsync(target, 0, 0, ...size)));
   };
   const thicknessNode = thickness();
-  const attenuationColor = new THREE.Color().setRGB(...color);
+  const medium = { attenuationColor: new THREE.Color().setRGB(...color), attenuationDistance: distance };
   for (const ior of [1, 1.5]) {
-    body.material = new TranslucentNodeMaterial({ thicknessNode, ior, attenuationColor, attenuationDistance: distance });
+    body.material = new TranslucentNodeMaterial({ thicknessNode, ior, ...medium });
     await draw();
   }
   body.material = body.material.clone();
@@ -262,8 +264,9 @@ DRAWN = """async ({ ball, normals, camera, size, color, distance }) => {
   // Metres as a color, of any material.
   body.material = new THREE.MeshBasicNodeMaterial();
   const metres = new ThicknessNode({ bodies: [body], opticalDepth: true });
-  body.material.colorNode = TSL.vec4(metres.x, TSL.textureLoad(metres.opticalDepth, TSL.ivec2(TSL.screenCoordinate)).rg, 1);
-  Object.assign(body.material, { attenuationColor, attenuationDistance: distance });
+  const depth = TSL.textureLoad(metres.opticalDepth, TSL.ivec2(TSL.screenCoordinate));
+  body.material.colorNode = TSL.vec4(metres.x, depth.rg, 1);
+  Object.assign(body.material, medium);
   await draw();
   return { pictures, clone };
 }"""
