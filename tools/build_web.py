@@ -45,7 +45,7 @@ SHADERS: dict[str, tuple[str, dict[str, int]]] = {
     "spectralDepthBeforeOpaque": ("thickness/signed_depth.frag", {"OPAQUE": 1, "SPECTRAL": 1}),
     "opaqueDepth": (
         "shade/opaque.frag",
-        {"DEPTH_ONLY": 1, "PROJECTED_DEPTH": 0, "SURFACE": 0, "LIGHT_MAP": 0, "SHADOW_MAPS": 0},
+        {"DEPTH_ONLY": 1, "PROJECTED_DEPTH": 0, "SURFACE": 0, "LIGHT_MAP": 0, "SHADOW_MAPS": 0, "DIFFUSED": 0},
     ),
     "recentered": ("thickness/recentered.glsl", {}),
     "thickness": ("thickness/signed_thickness.frag", {"SPECTRAL": 0}),
