@@ -22,6 +22,7 @@ from translucent.assets import mesh_path
 from translucent.bake.scatter_job import Baked, check_scatter
 from translucent.diffusion.harmonics import LitAlone, exit_radiance
 from translucent.formulas.color import linear_to_srgb
+from translucent.geometry.normals import vertex_normals
 from translucent.scene.environment_map import texel_directions
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import showcase, with_roughness
@@ -51,7 +52,7 @@ def of_round_lights(baked: tl.VertexScatter) -> str:
     alone = LitAlone(tl.Object(baked.mesh, medium=baked.medium, surface=tl.Surface(roughness=baked.roughness)), 32)
     errors = []
     for radius in RADII:
-        true = exit_radiance(alone.field(round_light(radius)), baked.mesh.vertices)
+        true = exit_radiance(alone.field(round_light(radius)), baked.mesh.vertices, vertex_normals(baked.mesh))
         errors.append(f"{radius} degrees {nrmse(baked.radiance(round_light(radius).harmonics()), true):.1%}")
     return f"round light  {', '.join(errors)}"
 

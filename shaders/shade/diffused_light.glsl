@@ -4,18 +4,32 @@
 #include "lib/diffusion.glsl"
 #include "shade/diffused_texture.glsl"
 
-// Basic radiance L / n^2 inside an object, below a point of its surface and towards it; cosine: of the direction there;
-// optical_depth: of the path back through the object, on which it has been scattered.
-vec3 subsurface_exitance(int object, vec3 point, float cosine, vec3 optical_depth) {
-    ObjectRow row = object_table_row(object);
-    if (row.diffuses < 0.5) { return vec3(0.0); }
+// Fluence, and flux that enters, at a point of a surface: of each side as much as the normal looks there.
+void light_at_surface(ObjectRow row, vec3 point, vec3 normal, out vec3 fluence, out vec3 entering) {
     vec3 texels = vec3(textureSize(diffused_light, 0));
     vec3 place = point - row.grid_low;
     vec3 at = vec3(dot(place, row.grid_x), dot(place, row.grid_y), dot(place, row.grid_z));
-    at = clamp(at, vec3(0.5), row.grid_size - 0.5);
-    at = (at + vec3(0.0, 0.0, row.first_layer)) / texels;
-    vec3 fluence = textureLod(diffused_light, at, 0.0).rgb;
-    vec3 entering = textureLod(diffused_light, at + vec3(0.0, 0.0, row.grid_size.z / texels.z), 0.0).rgb;
+    at = clamp(at, vec3(0.5), row.grid_size - 0.5) + vec3(0.0, 0.0, row.first_layer);
+    vec3 towards = vec3(dot(normal, row.grid_x), dot(normal, row.grid_y), dot(normal, row.grid_z));
+    float total = dot(towards, towards);
+    vec3 part = total > 0.0 ? towards * towards / total : vec3(1.0 / 3.0);
+    fluence = vec3(0.0);
+    entering = vec3(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+        if (part[axis] == 0.0) { continue; }
+        vec3 side = vec3(towards[axis] < 0.0 ? row.grid_size.x : 0.0, float(axis) * row.grid_size.y, 0.0);
+        fluence += part[axis] * textureLod(diffused_light, (at + side) / texels, 0.0).rgb;
+        entering += part[axis] * textureLod(diffused_light, (at + side + vec3(0.0, 0.0, row.grid_size.z)) / texels, 0.0).rgb;
+    }
+}
+
+// Basic radiance L / n^2 inside an object, below a point of its surface and towards it. normal: outwards, or 0 deep inside; cosine:
+// of the direction there; optical_depth: of the path back through the object, on which it has been scattered.
+vec3 subsurface_exitance(int object, vec3 point, vec3 normal, float cosine, vec3 optical_depth) {
+    ObjectRow row = object_table_row(object);
+    if (row.diffuses < 0.5) { return vec3(0.0); }
+    vec3 fluence, entering;
+    light_at_surface(row, point, normal, fluence, entering);
     // Light that has entered just now can darken the rest no more than to a fifth: where the two do not fit together, as
     // beside the edge of a shadow.
     vec4 fluxes = row.emergent_fluxes;
@@ -39,6 +53,6 @@ vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) {
     return in_scattered * (far + row.in_scattered_near * environment_light(-direction, IN_SCATTERED_ROUGHNESS));
 }
 #else
-vec3 subsurface_exitance(int object, vec3 point, float cosine, vec3 optical_depth) { return vec3(0.0); }
+vec3 subsurface_exitance(int object, vec3 point, vec3 normal, float cosine, vec3 optical_depth) { return vec3(0.0); }
 vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
 #endif

@@ -28,6 +28,7 @@ from translucent.bake.scatter import (
 from translucent.bake.scatter_job import Baked, check_scatter, environments
 from translucent.diffusion.harmonics import LitAlone, exit_radiance
 from translucent.formulas.spherical_harmonics import real_harmonics, scattered_radiance
+from translucent.geometry.normals import vertex_normals
 from translucent.geometry.solids import Sphere
 from translucent.gltf.file import read_gltf
 
@@ -53,7 +54,7 @@ def bear() -> tl.Mesh:
 def jade() -> tuple[Array, LitAlone]:
     """Light baked at the vertices of a bear, and the same as pictures have it."""
     alone = LitAlone(tl.Object(bear(), medium=tl.preset("jade").medium), 16)
-    return alone.transfer().at(bear().vertices), alone
+    return alone.transfer().at(bear().vertices, vertex_normals(bear())), alone
 
 
 @pytest.fixture
@@ -127,7 +128,7 @@ def test_a_body_that_is_turned_turns_its_light() -> None:
 def test_baked_light_is_that_of_pictures(name: str, most: float) -> None:
     """In uniform light and in a gradient, whose harmonics end, to what the solver leaves; in any other nearly."""
     (baked, alone), environment = jade(), environments()[name]
-    true = exit_radiance(alone.field(environment), bear().vertices)
+    true = exit_radiance(alone.field(environment), bear().vertices, vertex_normals(bear()))
     error = scattered_radiance(baked, environment.harmonics()) - true
     assert np.sqrt((error**2).mean()) < most * true.mean()
 

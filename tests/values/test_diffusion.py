@@ -33,6 +33,7 @@ from translucent.diffusion.grid import BodyGrid, box_points, even_densities
 from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import TOLERANCE, _ChannelSystem
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient
+from translucent.geometry.normals import vertex_normals
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.scattering import Diffusion
 from translucent.reference import slabs
@@ -130,10 +131,10 @@ def test_a_lamp_in_the_middle_of_a_ball(absorption: float) -> None:
 
 
 def samples(found: DiffusionField, body: tl.Object) -> Array:
-    """(k, 3): fluence of the cells that the surface crosses, found by the vertices of the mesh."""
-    places = (body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3] - found.low) / found.step
-    x, y, z = np.floor(places).astype(int).T
-    return np.asarray(found.fluence[x, y, z], np.float64)
+    """(k, 3): fluence at the vertices of the mesh."""
+    places = body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3]
+    normals = vertex_normals(body.mesh) @ np.linalg.inv(body.matrix[:3, :3])
+    return found.at_surface(found.fluence, places, normals)
 
 
 @pytest.mark.parametrize("absorption", [0.01, 1.0, 20.0, 1000.0])
@@ -256,7 +257,7 @@ def test_lossless_bodies_give_back_what_enters(mesh: tl.Mesh, scattering: float)
         scattered += beyond / DEEP_EVENTS * grid.cell_at(places.T)[1]
     # The residual is a share of the norm of all sources, weighted by the diagonal: of their sum it may be the root of
     # the number of cells over that of those with sources, three times here.
-    assert interface.exit_share * found.sum() == pytest.approx(float(scattered.sum()), rel=5 * TOLERANCE)
+    assert interface.exit_share * grid.areas @ found == pytest.approx(float(grid.areas @ scattered), rel=5 * TOLERANCE)
 
 
 @pytest.mark.parametrize(("ior", "off"), [(1.0, 0.05), (1.5, 0.08)])

@@ -41,6 +41,7 @@ from translucent.files.paths import OutputFiles, require_file
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.spherical_harmonics import COUNT, scattered_radiance
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.normals import corner_normals, vertex_normals
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.file import GltfFile, write_gltf
 from translucent.media.medium import Medium
@@ -368,10 +369,12 @@ def bake_scatter(
     unwrapped = unwrap(mesh, size, None)
     values, coverage = np.zeros((size, size, COUNT, 3), np.float32), np.zeros((size, size), bool)
     corners, atlas = unwrapped.mesh.vertices[unwrapped.mesh.faces], Atlas(unwrapped.uv, size, size)
+    normals = corner_normals(unwrapped.mesh).reshape(-1, 3, 3)
     rows, overlapping = max(1, BLOCK // size), 0
     for begin in range(0, size, rows):
         texels = atlas.strip(begin, min(begin + rows, size))
-        values[texels.row, texels.column] = transfer.at(blend(corners[texels.face], texels.barycentric))
+        points, towards = (blend(at[texels.face], texels.barycentric) for at in (corners, normals))
+        values[texels.row, texels.column] = transfer.at(points, towards)
         coverage[texels.row, texels.column] = True
         overlapping += int(texels.overlapping.sum())
     pad(values, coverage, padding)
@@ -424,7 +427,7 @@ def bake_vertex_scatter(
     """
     transfer, said = _transfer(body or mesh, medium, resolution, roughness)
     _warn(mesh, said)
-    values = transfer.at(mesh.vertices).astype(np.float32)
+    values = transfer.at(mesh.vertices, vertex_normals(mesh)).astype(np.float32)
     return VertexScatter(values, mesh, medium, roughness, resolution, transfer.cells, tuple(said))
 
 

@@ -300,9 +300,10 @@ def check_scatter(one: Baked, values: Floats, size: tuple[int, int] = (320, 320)
     looks = ScatterCheck()
     for name, environment in environments().items():
         field, ior = alone.field(environment), baked.medium.ior
-        mean, true_mean = scattered_radiance(looked_up, environment.harmonics()), exit_radiance(field, points)
+        mean = scattered_radiance(looked_up, environment.harmonics())
+        true_mean = exit_radiance(field, points, normals)
         passed = 1.0 - optics.fresnel_dielectric(outside, ior)
-        true = field.radiance(points, optics.refracted_cosine(outside, ior)) * passed[:, None]
+        true = field.radiance(points, normals, optics.refracted_cosine(outside, ior)) * passed[:, None]
         leaving = mean * exit_lobe(outside, ior, baked.entering)[:, None]
         pictures = _picture(hit, leaving, size), _picture(hit, true, size)
         looks[name] = ScatterLook(*pictures, hit.reshape(size[::-1]), _nrmse(mean, true_mean), _nrmse(leaving, true))

@@ -139,11 +139,12 @@ class DiffusionFields:
         As if all light was scattered on the rest of their path through the body.
         """
         found = np.zeros(points.shape)
-        cosine = np.abs(dot(directions, normals))
+        along = dot(directions, normals)
+        outwards = np.where(along[:, None] < 0.0, normals, -normals)
         for number, field in self._fields.items():
             own = np.flatnonzero(body == number)
             if own.size:
-                found[own] = field.scattered_radiance(points[own], cosine[own])
+                found[own] = field.scattered_radiance(points[own], outwards[own], np.abs(along[own]))
         return found
 
 

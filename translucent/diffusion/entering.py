@@ -201,7 +201,7 @@ def flux_of(photons: EnteringPhotons, grid: BodyGrid, pose: Pose) -> Array:
     if len(photons.points):
         sample = cKDTree(grid.points).query(pose.inwards(photons.points - pose.shift))[1]
         for channel in range(3):
-            flux[:, channel] = np.bincount(sample, photons.power[:, channel], len(flux)) / grid.area
+            flux[:, channel] = np.bincount(sample, photons.power[:, channel], len(flux)) / grid.areas
     return flux
 
 

@@ -1,4 +1,4 @@
-"""Subsurface light of a body by diffusion, as pictures look it up: two volumes around its surface."""
+"""Subsurface light of a body by diffusion, as pictures look it up: two volumes for each of six sides of its surface."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from functools import cached_property, partial
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.ndimage import map_coordinates
 
 from translucent.arrays import Array
 from translucent.diffusion.entering import (
@@ -30,6 +29,7 @@ from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.keys import dimming_key, environment_key, kept, light_key, may_dim
 from translucent.diffusion.lit_body import LitBody
 from translucent.diffusion.photons import EnteringPhotons
+from translucent.diffusion.sides import read_sides
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_cosine, emergent_fluxes
@@ -39,7 +39,7 @@ from translucent.media.medium import Medium
 from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Object, Scene
 
-#: Values (x, y, z, 3) in cells.
+#: Values in cells: (6, x, y, z, 3) for each side of a surface, or (2 x, 3 y, z, 3) beside each other.
 Volume = npt.NDArray[np.float32]
 
 #: Share by which light that has entered just now can darken the rest, at most: where the two do not fit together, as
@@ -59,9 +59,10 @@ class DiffusionField:
 
     Attributes
     ----------
-    fluence, entering : (x, y, z, 3) float32
-        Of scattered light below the surface; and flux that enters there times the albedo. Spread beyond the surface.
-    scattered : (x, y, z, 3) float32
+    fluence, entering : (6, x, y, z, 3) float32
+        Of scattered light below the surface; and flux that enters there times the albedo; for each side, see
+        `SurfaceSides`.
+    scattered : (6, x, y, z, 3) float32
         Fraction of the paths through the body, from its surface, on which light is scattered; 1 deep inside.
     low : (3,) float64
         Corner of the grid in metres.
@@ -109,45 +110,57 @@ class DiffusionField:
 
     @cached_property
     def volumes(self) -> tuple[Volume, Volume]:
-        """Arrays (x, y, z, 3) that pictures look up: along paths on which all light is scattered."""
-        with np.errstate(under="ignore"):
-            return self.fluence / self.scattered, self.entering / self.scattered
+        """Arrays (2 x, 3 y, z, 3) that pictures look up: along paths on which all light is scattered.
 
-    def radiance(self, points: Array, cosine: Array) -> Array:
+        Sides are beside each other: outwards and inwards along each axis in two columns, the axes in three rows.
+        """
+        with np.errstate(under="ignore"):
+            return _beside(self.fluence / self.scattered), _beside(self.entering / self.scattered)
+
+    def radiance(self, points: Array, normals: Array, cosine: Array) -> Array:
         """(k, 3): basic radiance L / n^2 below points of the surface, towards it: the mean over paths through the body.
 
         Parameters
         ----------
-        points : (k, 3) float64
-            In metres.
+        points, normals : (k, 3) float64
+            In metres; normals outwards.
         cosine : (k,) float64
             Of the directions there, inside.
         """
-        return self._emergent(self.fluence, self.entering, points, cosine)
+        fluence, entering = (self.at_surface(volume, points, normals) for volume in (self.fluence, self.entering))
+        return self._emergent(fluence, entering, cosine)
 
-    def scattered_radiance(self, points: Array, cosine: Array) -> Array:
+    def scattered_radiance(self, points: Array, normals: Array, cosine: Array) -> Array:
         """`radiance` as if all light was scattered on the path through the body: the twin of ``diffused_light.glsl``.
 
         Its file is in ``shaders/shade``. Along a real path the fraction counts that is scattered there.
         """
-        return self._emergent(*self.volumes, points, cosine)
+        with np.errstate(under="ignore"):
+            volumes = self.fluence / self.scattered, self.entering / self.scattered
+        fluence, entering = (self.at_surface(volume, points, normals) for volume in volumes)
+        return self._emergent(fluence, entering, cosine)
 
-    def _emergent(self, fluences: Volume, fluxes: Volume, points: Array, cosine: Array) -> Array:
-        place = ((points - self.low) @ self.turn / self.step - 0.5).T
-        fluence, entering = (
-            np.stack([map_coordinates(values[..., i], place, order=1, mode="nearest") for i in range(3)], axis=1)
-            for values in (fluences, fluxes)
-        )
+    def at_surface(self, volume: Volume, points: Array, normals: Array) -> Array:
+        """(k, n): values (6, x, y, z, n) of cells at points (k, 3) of the surface with normals (k, 3)."""
+        return read_sides(volume, (points - self.low) @ self.turn / self.step, normals @ self.turn)
+
+    def _emergent(self, fluence: Array, entering: Array, cosine: Array) -> Array:
         uniform, rising, fresh, shadowed = self.fluxes
         steady = uniform + self.conductance * rising
         with np.errstate(under="ignore"):
-            entering = np.minimum(entering.astype(np.float64), FRESH * steady / shadowed * fluence)
+            entering = np.minimum(entering, FRESH * steady / shadowed * fluence)
             light = emergent_radiance(
                 fluence, entering, self.albedo, self.conductance, self.mean_cosine, cosine[:, None]
             )
             flux = self.albedo * (fluence * steady - entering * shadowed) + entering * fresh
             scaled = light * self.exit_share * fluence / np.maximum(flux, 1e-30)
             return np.asarray(np.maximum(scaled, 0.0) / (4.0 * np.pi * self.ior**2))
+
+
+def _beside(sides: Volume) -> Volume:
+    """(2 x, 3 y, z, n): values (6, x, y, z, n) of the sides, beside each other."""
+    axes = [np.concatenate([sides[2 * axis], sides[2 * axis + 1]], axis=0) for axis in range(3)]
+    return np.ascontiguousarray(np.concatenate(axes, axis=1))
 
 
 class DiffusingBody:
@@ -284,7 +297,7 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     scattered = np.maximum(found.scattered, LEAST_SCATTERED)
     values = np.concatenate([found.fluence, albedo * found.entering, scattered], axis=1)
     deep = np.concatenate([found.inside, np.zeros_like(found.inside), np.ones_like(found.inside)], axis=1)
-    volume = lit.shape.spreading.volume(values.astype(np.float32), deep.astype(np.float32))
+    volume = lit.shape.sides.volume(values.astype(np.float32), deep.astype(np.float32))
     cosine = emergent_cosine(float(albedo.mean()), medium.ior)
     ahead = np.asarray(medium.scattering) * max(medium.anisotropy, 0.0)
     # Of diffuse light, four times the volume over the area.

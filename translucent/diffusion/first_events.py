@@ -95,13 +95,17 @@ class LayerSolution:
         k in 1/m.
     condition : float
         Of the surface: u' / u there.
-    scale, even, rise, u, slope : (s,) float64
-        At the depth of reading: exp(-k d), and times it cosh(k d), sinh(k d) / k, u and u'.
+    spread : (s,) float64
+        Integral of the density over the distance of `BodyGrid.spread`: what is read is the fluence at the depth of
+        reading, and so much times its derivative.
+    scale, even, rise, slope, u : (s,) float64
+        At the depth of reading: exp(-k d), and times it cosh(k d), sinh(k d) / k, u' and what is read of u.
     """
 
     depth: Array
     attenuation: float
     condition: float
+    spread: Array
     scale: Array
     even: Array
     rise: Array
@@ -109,12 +113,13 @@ class LayerSolution:
     slope: Array
 
     @classmethod
-    def of(cls, depth: Array, attenuation: float, condition: float) -> LayerSolution:
+    def of(cls, depth: Array, attenuation: float, condition: float, spread: Array) -> LayerSolution:
         """Solutions down to depths (s,)."""
         scale = optics.transmittance(attenuation * depth)
         even, rise = 0.5 * (1.0 + scale * scale), depth * optics.mean_transmittance(2.0 * attenuation * depth)
-        u, slope = even + condition * rise, attenuation**2 * rise + condition * even
-        return cls(depth, attenuation, condition, scale, even, rise, u, slope)
+        slope = attenuation**2 * rise + condition * even
+        u = even + condition * rise + spread * slope
+        return cls(depth, attenuation, condition, spread, scale, even, rise, u, slope)
 
     def bend(self) -> Array:
         """(cosh(k d) - 1) / k^2 at the depth of reading, d^2 / 2 where nothing is absorbed."""
@@ -130,8 +135,11 @@ class LayerSolution:
         rate = np.where(np.abs(rate - k) < _ALIKE * rate, rate * (1.0 + _ALIKE), rate)
         passed = optics.transmittance(rate * self.depth[samples])
         factor = rate / ((rate - k) * (rate + k) * u)
-        at_surface = scale * passed - self.even[samples] + rate * self.rise[samples]
-        for_cells = scale * (rate + self.condition) - passed * (rate * u + self.slope[samples])
+        even, rise = self.even[samples], self.rise[samples]
+        at_surface = scale * passed - even + rate * rise
+        at_surface += self.spread[samples] * (rate * (even - scale * passed) - k * k * rise)
+        u_below = even + self.condition * rise
+        for_cells = scale * (rate + self.condition) - passed * (rate * u_below + self.slope[samples])
         return factor * at_surface, factor * for_cells
 
 
@@ -228,11 +236,12 @@ class Events:
 
     def power(self, grid: BodyGrid, samples: Integers, flux: Array) -> Array:
         """(cells,): scattered power in each cell for a flux (k,) that enters at samples (k,), in W."""
+        flux = grid.areas[samples] * flux
         above = np.bincount(samples, self.above * flux, len(grid.points))
         total = np.asarray(grid.below[0].T @ above)
         for cell, weight in self.below:
             total += np.bincount(cell, weight * flux, grid.count)
-        return grid.area * total
+        return total
 
 
 class FirstEvents:

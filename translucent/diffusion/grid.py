@@ -143,6 +143,18 @@ def _intervals(line: Integers, height: Array, sign: Integers) -> tuple[Integers,
 #: Sample points on the surface for each area of a cell's face.
 SAMPLES = 3.0
 
+#: Least area around a sample, as a fraction of the mean.
+LEAST_AREA = 0.1
+
+#: Half the thickness of walls, in cells, up to which the fluence is read halfway through.
+MIDDLE = 1.25
+
+#: Thickness of walls, in cells, below which both sides read cells of each other.
+THIN = 4.0
+
+#: Finer samples for each of these, which measure the area around it.
+FINE = 4.0
+
 #: Fraction of a cell that must be inside for the cell to count: thinner slivers would only make the system stiff.
 LEAST_INSIDE = 0.05
 
@@ -200,7 +212,10 @@ class BodyGrid:
     points, face_normals, normals : (s, 3) float64
         Sample points on the surface, spread evenly.
     area : float
-        Of the surface around each sample, in m^2.
+        Mean of those.
+    areas : (s,) float64
+        Of the surface around each sample, in m^2: samples are only nearly even, and a cell that loses light through too
+        many is too dark.
     body : Object
     """
 
@@ -210,6 +225,7 @@ class BodyGrid:
     face_normals: Array
     normals: Array
     area: float
+    areas: Array
     body: Object
     _crossings: dict[float, tuple[Array, Array]] = field(default_factory=dict)
 
@@ -283,21 +299,76 @@ class BodyGrid:
     @cached_property
     def below(self) -> tuple[sparse.csr_array, Array]:
         """Interpolation of the fluence somewhat below each sample, and its depth there in m, (s,)."""
+        return self._reading[:2]
+
+    @cached_property
+    def spread(self) -> Array:
+        """(s,): metres by which the flux to each sample comes from less deep than where the fluence is read.
+
+        The cells that a sample reads lie at several depths, and each gives a part of the flux: above the deepest one
+        not all of it flows, and the fluence falls less towards the surface than it should. With weights that sum to
+        A(z) down to a depth z it is too high by the flux over D times the integral of A (1 - A). In a wall of few cells
+        the cells that the other side reads, with weights that sum to B(z), give some of it where it is taken, and the
+        difference between both sides is that over (A - B)^2: of 2 B (1 - A) less each side has half.
+        """
+        weights, heights = self._reading[2:]
+
+        def later(one: Integers, first: Array, other: Integers, second: Array) -> Array:
+            """Mean over the cells of both by how much the second is deeper, where it is."""
+            deeper = np.maximum(second[:, None, :] - first[:, :, None], 0.0)
+            return np.asarray(np.einsum("si,sj,sij->s", weights[one], weights[other], deeper))
+
+        samples = np.arange(len(weights))
+        found = np.mean([later(samples, heights, other, heights[other]) for other in self.nearest.T], axis=0)
+        thin, across = self._across
+        normal = self.face_normals
+        aside = (self.points[thin] - self.points[across]) / self.cells.step
+        found[thin] -= later(across, (aside * normal[thin]).sum(axis=1)[:, None] - heights[across], thin, heights[thin])
+        return np.asarray(found * self.cells.step)
+
+    @cached_property
+    def thickness(self) -> Array:
+        """(s,): metres straight down from each sample to where the body ends."""
+        start, into = self.points - START * self.cells.step * self.face_normals, np.linalg.inv(self.body.matrix)
+        local = start @ into[:3, :3].T + into[:3, 3], -self.face_normals @ into[:3, :3].T
+        return np.asarray(ray_caster_of(self.body.mesh).nearest(*local)[1])
+
+    @cached_property
+    def _across(self) -> tuple[Integers, Integers]:
+        """Samples of walls less than `THIN` cells thick, and the nearest sample on the other side of each."""
+        thin = np.flatnonzero(self.thickness < THIN * self.cells.step)
+        ends = self.points[thin] - self.thickness[thin, None] * self.face_normals[thin]
+        return thin, nearest_samples(self.points, self.face_normals, self.area, ends, -self.face_normals[thin])
+
+    @cached_property
+    def _reading(self) -> tuple[sparse.csr_array, Array, Array, Array]:
+        """See `below`; and weights and depths in cells (s, 8) of the cells that are read."""
         cells, weights = np.zeros((len(self.points), 8), np.int64), np.zeros((len(self.points), 8))
         depth, missing = np.zeros(len(self.points)), np.arange(len(self.points))
+        heights = np.zeros_like(weights)
+        middle = 0.5 * self.thickness / self.cells.step
+        # Halfway through walls of few cells, for both sides in the same place: so the one-dimensional solutions below
+        # both meet there, and are that of a slab.
+        deepest = np.where(middle < MIDDLE, middle, np.maximum(2.0 * MIDDLE - middle, PROBE_DEPTHS[0]))
         for target in PROBE_DEPTHS:
-            probe = self.probe(self.points[missing] - target * self.cells.step * self.face_normals[missing])
-            found = self._depth(probe, missing)
-            taken = (probe.around > LEAST_AROUND) & (found > 0.3 * target)
+            below = np.minimum(target, middle) if target < PROBE_DEPTHS[0] else deepest
+            probe = self.probe(
+                self.points[missing] - (below[missing] * self.cells.step)[:, None] * self.face_normals[missing]
+            )
+            every = self._depths(probe, missing)
+            found = (probe.weights * every).sum(axis=1)
+            halfway = below[missing] == middle[missing]
+            taken = (probe.around > np.where(halfway, 0.0, LEAST_AROUND)) & (found > 0.3 * below[missing])
             at = missing[taken]
             cells[at], weights[at], depth[at] = probe.cells[taken], probe.weights[taken], found[taken]
+            heights[at] = every[taken]
             missing = missing[~taken]
         at, nearest = self._nearest(missing)
         cells[at, 0], weights[at, 0] = nearest, 1.0
         used = weights > 0.0
         starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
         read = sparse.csr_array((weights[used], cells[used], starts), (len(self.points), self.count))
-        return read, np.maximum(depth, LEAST_DEPTH) * self.cells.step
+        return read, np.maximum(depth, LEAST_DEPTH) * self.cells.step, weights, heights
 
     @cached_property
     def blocks(self) -> Integers:
@@ -325,7 +396,7 @@ class BodyGrid:
         volume = np.zeros(self.count)
         for place in _LAYER_PLACES:
             probe = self.probe(self.points - (place * depth)[:, None] * self.face_normals)
-            part = probe.weights * (self.area * depth / len(_LAYER_PLACES))[:, None]
+            part = probe.weights * (self.areas * depth / len(_LAYER_PLACES))[:, None]
             volume += np.bincount(probe.cells.ravel(), part.ravel(), self.count)
         return volume
 
@@ -342,7 +413,7 @@ class BodyGrid:
     def cores(self) -> Array:
         """(cells,): volume in m^3 of each cell without its layers; with these, all are the volume of the body."""
         rest = np.maximum(self.volumes - self.layers, 0.0)
-        target = self.volumes.sum() - self.area * self.below[1].sum()
+        target = self.volumes.sum() - self.areas @ self.below[1]
         return np.asarray(rest * min(max(target, 0.0) / max(rest.sum(), np.finfo(np.float64).tiny), 1.0))
 
     def probe(self, points: Array) -> Probe:
@@ -376,11 +447,11 @@ class BodyGrid:
         number = self.number.ravel()
         return np.maximum(number, 0), np.where(number >= 0, self.cells.inside.ravel(), 0.0)
 
-    def _depth(self, probe: Probe, samples: Integers) -> Array:
-        """(k,): depth below samples (k,) at which the fluence is read, in cells: of the centroid of what is read."""
+    def _depths(self, probe: Probe, samples: Integers) -> Array:
+        """(k, 8): depths below samples (k,) of the cells that are read, in cells."""
         places = (self.points[samples] - self.cells.low) / self.cells.step
-        center = np.einsum("kc,kci->ki", probe.weights, self.cells.center.reshape(-1, 3)[probe.places])
-        return np.asarray(((places - center) * self.face_normals[samples]).sum(axis=1))
+        centers = self.cells.center.reshape(-1, 3)[probe.places]
+        return np.asarray(np.einsum("kci,ki->kc", places[:, None] - centers, self.face_normals[samples]))
 
     def _nearest(self, samples: Integers) -> tuple[Integers, Integers]:
         """Those of samples (k,) that have no cells around a point below them but one near, and the number of that."""
@@ -465,7 +536,26 @@ def body_grid(body: Object, step: float) -> BodyGrid:
     normals = np.einsum("sc,sci->si", weights, at_corners[face]) @ np.linalg.inv(matrix)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), face_normals)
-    return BodyGrid(cells, number, points, face_normals, normals, area, body)
+    areas = _areas(corners[faces], points, face_normals, area)
+    return BodyGrid(cells, number, points, face_normals, normals, area, areas, body)
+
+
+def _areas(triangles: Array, points: Array, normals: Array, mean: float) -> Array:
+    """(s,): area nearest to each sample, on its side of the surface, by more samples: m^2 with this `mean`."""
+    dense, dense_normals, *_ = _surface_samples(triangles, FINE / mean)
+    nearest = nearest_samples(points, normals, mean, dense, dense_normals)
+    counts = np.maximum(np.bincount(nearest, minlength=len(points)), LEAST_AREA * FINE)
+    return np.asarray(counts * (mean * len(points) / counts.sum()))
+
+
+def nearest_samples(points: Array, normals: Array, area: float, places: Array, towards: Array) -> Integers:
+    """(k,): nearest of samples (s, 3) to places (k, 3) that look `towards` (k, 3), with about their normals.
+
+    Samples that look elsewhere are as much farther away as they are wide.
+    """
+    size = np.sqrt(area)
+    tree = cKDTree(np.concatenate([points, size * normals], axis=1))
+    return np.asarray(tree.query(np.concatenate([places, size * towards], axis=1))[1], np.int64)
 
 
 def _surface_samples(triangles: Array, density: float) -> tuple[Array, Array, Integers, Array, float]:

@@ -14,12 +14,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import map_coordinates
 
 from translucent.arrays import Array, Floats
 from translucent.diffusion.entering import MAP_HEIGHT
 from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.diffusion.lit_body import lit_body
+from translucent.diffusion.sides import read_sides
 from translucent.errors import InputError
 from translucent.formulas.spherical_harmonics import BAND_0, COUNT, real_harmonics
 from translucent.planning.scattering import Diffusion
@@ -38,7 +38,7 @@ class Transfer:
 
     Attributes
     ----------
-    values : (x, y, z, 9, 3) float32
+    values : (6, x, y, z, 9, 3) float32
         See `at`.
     low, turn : (3,), (3, 3) float64
         Corner of the grid in metres, and its axes, in columns.
@@ -54,23 +54,16 @@ class Transfer:
     step: float
     cells: int
 
-    def at(self, points: Array) -> Array:
-        """(k, 9, 3): mean subsurface radiance of points (k, 3) of the surface for a unit of each harmonic."""
-        flat = self.values.reshape(*self.values.shape[:3], -1)
-        return _read(flat, self, points).reshape(-1, COUNT, 3)
+    def at(self, points: Array, normals: Array) -> Array:
+        """(k, 9, 3): mean subsurface radiance of points of the surface, normals (k, 3), for a unit of each harmonic."""
+        flat = self.values.reshape(*self.values.shape[:4], -1)
+        places = (points - self.low) @ self.turn / self.step
+        return read_sides(flat, places, normals @ self.turn).reshape(-1, COUNT, 3)
 
 
-def exit_radiance(field: DiffusionField, points: Array) -> Array:
-    """(k, 3): mean radiance, flux over pi, that the diffused light of a body has outside at points (k, 3)."""
-    return field.exit_share / np.pi * _read(field.fluence, field, points)
-
-
-def _read(volume: Floats, grid: Transfer | DiffusionField, points: Array) -> Array:
-    place = ((points - grid.low) @ grid.turn / grid.step - 0.5).T
-    channels = [
-        map_coordinates(volume[..., i], place, np.float64, order=1, mode="nearest") for i in range(volume.shape[-1])
-    ]
-    return np.stack(channels, axis=1)
+def exit_radiance(field: DiffusionField, points: Array, normals: Array) -> Array:
+    """(k, 3): mean radiance, flux over pi, that the diffused light has outside at points with normals (k, 3)."""
+    return field.exit_share / np.pi * field.at_surface(field.fluence, points, normals)
 
 
 class LitAlone:
@@ -112,7 +105,7 @@ class LitAlone:
             If the solver does not get there.
         """
         uniform = self.field(Environment.constant((1, 1, 1)))
-        values = np.empty((*uniform.fluence.shape[:3], COUNT, 3), np.float32)
+        values = np.empty((*uniform.fluence.shape[:4], COUNT, 3), np.float32)
         values[..., 0, :] = BAND_0 * uniform.fluence
         for i in range(1, COUNT):
             values[..., i, :] = self.field(_harmonic(i)).fluence - UNIFORM * uniform.fluence

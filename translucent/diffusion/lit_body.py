@@ -16,84 +16,14 @@ from translucent.diffusion.entering import BEFORE, Occluders, Pose, Sky, sky_of,
 from translucent.diffusion.exchange import Exchange, OpaqueSurfaces, Patches
 from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, Densities, body_grid, densities
+from translucent.diffusion.sides import SurfaceSides
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.ray_caster import ray_caster_of
 from translucent.scene.scene import Object
 
-#: Cells by which values at the surface are spread beyond the cells that it crosses.
-SPREAD = 3
-
 #: Samples of a surface for each one at which paths through other bodies are found.
 SAMPLES_FOR_PATH = 4
-
-
-@dataclass(frozen=True, eq=False)
-class Spreading:
-    """Means of samples' values in the cells where they lie, spread to cells around. Cells farther inside have others.
-
-    Attributes
-    ----------
-    means : (c, s) csr_array
-        Of the samples in each of the cells that have some.
-    rings : list of csr_array
-        Rings of cells around the known ones, from the inside out: means of the known cells among the 26 around.
-    cells : (n,) int64
-        Places in the flat grid, of the cells that have samples and of each ring.
-    deep, numbers : (m,), (m,) int64
-        Places of the other cells in the system, and their numbers.
-    shape : tuple of 3 int
-    """
-
-    means: sparse.csr_array
-    rings: list[sparse.csr_array]
-    cells: Integers
-    deep: Integers
-    numbers: Integers
-    shape: tuple[int, ...]
-
-    @classmethod
-    def of(cls, grid: BodyGrid) -> Spreading:
-        """Spread over a grid."""
-        shape = grid.number.shape
-        place = np.floor((grid.points - grid.cells.low) / grid.cells.step).astype(int)
-        at = np.ravel_multi_index(tuple(np.clip(place, 0, np.array(shape) - 1).T), shape)
-        cells, row, count = np.unique(at, return_inverse=True, return_counts=True)
-        means = sparse.csr_array((1.0 / count[row], (row, np.arange(len(at)))), (len(cells), len(at)), np.float32)
-        # The grid gets a border, in which nothing is known.
-        wide = tuple(side + 2 for side in shape)
-        numbered = np.full(wide, -2)
-        numbered[1:-1, 1:-1, 1:-1] = -1
-        flat, inner = numbered.ravel(), np.flatnonzero(numbered == -1)
-        x, y, z = np.indices((3, 3, 3)).reshape(3, -1) - 1
-        around = (x * wide[1] + y) * wide[2] + z
-        known, rings = inner[cells], []
-        last, flat[known] = known, np.arange(len(known))
-        for _ in range(SPREAD):
-            near = np.zeros(len(flat), bool)
-            near[last[:, None] + around] = True
-            last = np.flatnonzero(near & (flat == -1))
-            column = flat[last[:, None] + around]
-            each = (column >= 0).sum(axis=1)
-            size, starts = (len(last), len(known)), np.concatenate([[0], np.cumsum(each)])
-            weights = np.repeat(1.0 / each, each).astype(np.float32)
-            rings.append(sparse.csr_array((weights, column[column >= 0], starts), size))
-            flat[last] = len(known) + np.arange(len(last))
-            known = np.concatenate([known, last])
-        number = grid.number.ravel()
-        deep = np.flatnonzero((flat[inner] < 0) & (number >= 0))
-        place = np.zeros(len(flat), np.int64)
-        place[inner] = np.arange(len(inner))
-        return cls(means, rings, place[known], deep, number[deep], shape)
-
-    def volume(self, values: Floats, deep: Floats) -> Floats:
-        """(x, y, z, n) float32: values (s, n) of the samples, spread, and `deep` (cells, n) farther inside."""
-        filled = self.means @ values
-        for ring in self.rings:
-            filled = np.concatenate([filled, ring @ filled])
-        volume = np.zeros((int(np.prod(self.shape)), values.shape[1]), np.float32)
-        volume[self.cells], volume[self.deep] = filled, deep[self.numbers]
-        return volume.reshape(*self.shape, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +63,9 @@ class BodyShape:
     _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
 
     @cached_property
-    def spreading(self) -> Spreading:
+    def sides(self) -> SurfaceSides:
         """From the samples of its surface to the cells around it."""
-        return Spreading.of(self.grid)
+        return SurfaceSides.of(self.grid)
 
     @cached_property
     def densities(self) -> Densities:

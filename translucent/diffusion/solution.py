@@ -378,7 +378,8 @@ class _ChannelSystem:
         self._albedo = scattering / extinction
         d = float(diffusion_coefficient(absorption, scattering))
         self._read, depth = grid.below[0], dense.depth
-        layer = LayerSolution.of(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
+        spread = grid.spread * (self._read @ dense.cells)
+        layer = LayerSolution.of(depth, float(np.sqrt(absorption / d)), interface.conductance / d, spread)
         self._relative = 1.0 / layer.u
         self._attenuated = layer.scale * self._relative
         # 4 V / S is the mean chord (Cauchy).
@@ -388,11 +389,11 @@ class _ChannelSystem:
         self._all = paths.samples
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
         # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
-        self._emitted_near = layer.bend() / d * self._relative
-        below = grid.area * (layer.rise + layer.condition * layer.bend()) * self._relative
+        self._emitted_near = (layer.bend() + spread * layer.rise) / d * self._relative
+        below = grid.areas * (layer.rise + layer.condition * layer.bend()) * self._relative
         self._emitted_cells = dense.cells * grid.cores + self._read.T @ below
-        lost = grid.area * d * layer.slope * self._relative
-        absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
+        lost = grid.areas * d * layer.slope * self._relative
+        absorbing = np.maximum(grid.cores, _LEAST_ABSORBING * grid.volumes)
         absorbed = absorption * dense.cells * absorbing
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
         self._correction = np.ones(len(depth))
@@ -417,9 +418,9 @@ class _ChannelSystem:
         cells, _ = self._cells.solved(source, self._cells.even(source), ROUGH)
         found = (self._read @ cells) * self._attenuated + self._diffuse.near
         found, target = found[self._grid.nearest].mean(axis=1), self.scattered
-        # The sum over all samples is right.
-        least = np.finfo(np.float64).tiny
-        correction = target / max(target.sum(), least) * found.sum() / np.maximum(found, least)
+        # The sum over the surface is right.
+        least, areas = np.finfo(np.float64).tiny, self._grid.areas
+        correction = target / max(float(areas @ target), least) * float(areas @ found) / np.maximum(found, least)
         return np.asarray(np.clip(correction, LEAST_CORRECTION, MOST_CORRECTION))
 
     def directional(self, entering: Array, mirrored: Array, paths: EntryPaths) -> _DirectionalEffects:

@@ -26,6 +26,13 @@ def corner_normals(mesh: Mesh) -> Array:
     return smooth_normals(mesh.vertices, mesh.faces, unit_normals(mesh.vertices, mesh.faces))
 
 
+def vertex_normals(mesh: Mesh) -> Array:
+    """(n, 3): sums of the `corner_normals` at each vertex, across creases; 0 where no face uses it."""
+    corners, at_corners = mesh.faces.ravel(), corner_normals(mesh).reshape(-1, 3)
+    sums = (np.bincount(corners, at_corners[:, axis], len(mesh.vertices)) for axis in range(3))
+    return np.stack(tuple(sums), axis=1)
+
+
 def smooth_normals(vertices: Array, faces: npt.NDArray[np.integer], normals: Array) -> Array:
     """(m, 3, 3): a unit normal for each corner of faces (m, 3).
 

@@ -79,7 +79,7 @@ class DiffusedTexture:
                 "grid_x": field.turn[:, 0] / field.step,
                 "grid_y": field.turn[:, 1] / field.step,
                 "grid_z": field.turn[:, 2] / field.step,
-                "grid_size": field.fluence.shape[:3],
+                "grid_size": field.fluence.shape[1:4],
                 "first_layer": self.first_layers[number],
                 "albedo": field.albedo,
                 "conductance": field.conductance,
