@@ -65,11 +65,27 @@ def test_lines_of_pyvistas_own_documentation_go_on_here() -> None:
     assert tl.load_mesh(sphere).volume == pytest.approx(sphere.volume, rel=1e-5)
     tl.attach(sphere, tl.bake_vertex_thickness(sphere, rays=4))
     assert sphere["thickness"].shape == (sphere.n_points,)
-    with pytest.raises(tl.InputError, match=r"triangulate"):
-        tl.load_mesh(pyvista.Cube())
     tl.load_mesh(pyvista.Cube().triangulate())
-    with pytest.raises(tl.InputError, match=r"extract_surface"):
-        tl.load_mesh(pyvista.ImageData(dimensions=(3, 3, 3)))
+
+
+def test_what_is_no_surface_of_pyvista_is_refused_with_its_own_call() -> None:
+    pyvista = pytest.importorskip("pyvista", reason="pyvista is not installed")
+    sphere, points = pyvista.Sphere(), np.eye(3)
+    for thing, sentence in (
+        (pyvista.PolyData(), r"it has no points and no faces"),
+        (pyvista.PolyData(points), r"it has 3 points and no faces; make a surface of points, cloud\.reconstruct"),
+        (pyvista.PointSet(points), r"it has 3 points and no faces"),
+        (pyvista.Line(), r"it has 2 points and 1 lines and no faces; .*line\.tube"),
+        (pyvista.Cube(), r"not all of its faces are triangles; triangulate it: mesh\.triangulate\(\)"),
+        (sphere.strip(), r"strips of triangles; triangulate it: mesh\.triangulate\(\)"),
+        (pyvista.MultiBlock([sphere]), r"MultiBlock is no surface; .*extract_surface\(\)\.triangulate\(\)"),
+        (sphere.cast_to_unstructured_grid(), r"UnstructuredGrid is no surface; .*extract_surface"),
+        (pyvista.ImageData(dimensions=(3, 3, 3)), r"ImageData is no surface"),
+        (pyvista.Table({"a": points[0]}), r"of type Table"),
+    ):
+        for take in (tl.load_mesh, tl.show, tl.Object):
+            with pytest.raises(tl.InputError, match=sentence):
+                take(thing)
 
 
 def test_polydata_has_the_volume_of_the_mesh(ball: trimesh.Trimesh) -> None:

@@ -84,12 +84,26 @@ def foreign_parts(thing: Any) -> list[Part] | None:
         return [part for one in thing.dump() for part in foreign_parts(one) or () if len(part[1])]
     for points, corners in _NAMES:
         if hasattr(thing, points) and hasattr(thing, corners):
-            vertices = _numbers(thing, points)
-            return [(vertices, _triangles(thing, corners), _uv(thing, len(vertices)))]
-    if hasattr(thing, "extract_surface"):  # grids and blocks of PyVista
+            vertices, faces = _numbers(thing, points), _triangles(thing, corners)
+            if not len(faces) and hasattr(thing, "extract_surface"):
+                raise _faceless(thing)
+            return [(vertices, faces, _uv(thing, len(vertices)))]
+    if hasattr(thing, "extract_surface"):  # grids, blocks and points of PyVista
+        if not getattr(thing, "n_cells", 1):
+            raise _faceless(thing)
         do = "give its surface: grid.extract_surface().triangulate()"
-        raise InputError(f"mesh {foreign_name(thing)!r}", f"a {type(thing).__name__} is no surface", do)
+        raise InputError(f"mesh {foreign_name(thing)!r}", f"{type(thing).__name__} is no surface", do)
     return None
+
+
+def _faceless(thing: Any) -> InputError:
+    """Error about points and lines of PyVista, and about what is empty."""
+    counts = [(getattr(thing, f"n_{name}", 0), name) for name in ("points", "lines")]
+    found = " and ".join(f"{count} {name}" for count, name in counts if count)
+    surface = "points, cloud.reconstruct_surface().triangulate(), or of lines, line.tube(radius=1).triangulate()"
+    return InputError(
+        f"mesh {foreign_name(thing)!r}", f"it has {found or 'no points'} and no faces", f"make a surface of {surface}"
+    )
 
 
 def _numbers(thing: Any, name: str) -> Array:
