@@ -70,7 +70,7 @@ def test_own_presets_are_found_by_name_and_listed(folder: Path, run: Run) -> Non
         told = run("presets", "show", name).err
         assert words in told
         assert "bad.toml', line 1, [tea]; " in told
-    assert run("presets", "--search", "red wine").out.splitlines()[1].startswith("merlot ")
+    assert run("presets", "--search", "red wine").out.splitlines()[1].startswith("red_wine ")
     assert run("presets", "--group", "paper").code == run("presets", "--search", "paper bag").code == 2
 
 
@@ -100,8 +100,8 @@ def test_every_preset_has_a_group_and_a_search_finds_it() -> None:
     ("words", "first"),
     [
         ("wax", "wax"),
-        ("glass", "bottle_glass"),
-        ("milk", "skim_milk"),
+        ("glass", "crystal"),
+        ("milk", "whole_milk"),
         ("whole milk", "whole_milk"),
         ("jade", "jade"),
     ],
@@ -109,7 +109,7 @@ def test_every_preset_has_a_group_and_a_search_finds_it() -> None:
 def test_a_search_finds_names_before_groups(words: str, first: str) -> None:
     found = list(matching(tl.presets(), words))
     assert found[0] == first
-    named = [words.split()[0] in name for name in found]
+    named = [words.split()[0] in " ".join([name, *tl.preset(name).aliases]) for name in found]
     assert named == sorted(named, reverse=True)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 import translucent as tl
 from translucent.geometry.solids import Box, Sphere
+from translucent.media.colors import parse_color
 from translucent.scene.grounds import before_page, page_radiance
 from translucent.scene.showcase import DEFAULT_COLOR, default_medium, framing, showcase
 from translucent.scene.stages import (
@@ -234,3 +235,23 @@ def test_default_media_are_as_bright_in_compact_meshes_as_in_slender_ones() -> N
     for mesh, distance in ((ball, 0.4), (plate, 0.15 * plate.diagonal)):
         medium = default_medium(mesh, None)
         assert np.allclose(medium.transmittance(distance), DEFAULT_COLOR, rtol=0.01)
+
+
+def test_a_ground_has_a_color_or_is_left_out() -> None:
+    scene = tl.showcase(BOX, GLASS, SIZE, stage="none")
+    painted, bare = (tl.staged(scene, "studio", ground=one) for one in ("#204060", "none"))
+    np.testing.assert_allclose(painted.objects[-1].base_color, parse_color("#204060"))
+    assert painted.objects[-1].surface.color_texture is None
+    assert len(bare.objects) == len(scene.objects)
+    assert len(bare.lights) == len(painted.lights)
+    with pytest.raises(tl.InputError, match="color 'blu'"):
+        tl.staged(scene, "studio", ground="blu")
+
+
+def test_far_away_the_studio_is_as_bright_as_its_backdrop() -> None:
+    # Then a ground that mirrors the backdrop has its radiance at every angle, and there is no horizon.
+    chosen = stage_named("studio")
+    environment, (key,) = chosen.environment(), chosen.keys
+    irradiance = environment.irradiance_on((0, 1, 0)) + np.sin(np.radians(key.elevation)) * np.array(key.irradiance)
+    far = chosen.far * np.asarray(chosen.ground.color) * irradiance / np.pi
+    np.testing.assert_allclose(far, environment.lighting(np.array([0.0, 0.02, -1.0])), rtol=0.06)

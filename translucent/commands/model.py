@@ -81,6 +81,8 @@ class SceneRequest:
         Of the interfaces of media.
     stage : str, optional
         None is the default one, where it suits what the model and the options bring with them.
+    ground : str, optional
+        Color of what it has as a ground, or none.
     media : sequence of NamedMedium
         Media and roughness of single objects.
     variant, time : optional
@@ -97,6 +99,7 @@ class SceneRequest:
     environment_shadows: int | None = None
     roughness: float | None = None
     stage: str | None = "none"
+    ground: str | None = None
     media: Sequence[NamedMedium] = ()
     variant: str | None = None
     time: float | None = None
@@ -163,7 +166,9 @@ def read_scene(model: str, requested: SceneRequest) -> Scene:
             view = options.direction, options.fit
             camera = framing(scene.objects, requested.size, fov, (0.0, 1.0, 0.0), chosen, *view)
             scene = dataclasses.replace(scene, camera=camera)
-        scene = staged(scene, chosen, requested.environment, turn)
+        scene = staged(scene, chosen, requested.environment, turn, requested.ground)
+    elif requested.ground is not None:
+        raise InputError(f"--ground {requested.ground}", "there is no stage", "add --stage studio, or leave it out")
     count = requested.environment_shadows
     return scene if count is None else dataclasses.replace(scene, environment_shadows=count)
 

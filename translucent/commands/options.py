@@ -473,6 +473,12 @@ def stage_option() -> Any:
     return option(metavar="S", help=words)
 
 
+def ground_option() -> Any:
+    """Field for the color of what a stage's model stands on."""
+    words = "Color of the ground of the stage; none leaves it out. Shadows alone: --transparent. Default: the stage's."
+    return option(metavar="C", help=words)
+
+
 def roughness_option() -> Any:
     """Field for the surfaces of media."""
     reported = "Of the interfaces of media, 0 (polished) to 1. Default: the preset's, else the file's, or 0."

@@ -39,6 +39,7 @@ from translucent.commands.options import (
     ChoiceOptions,
     FileOptions,
     LookOptions,
+    ground_option,
     group,
     option,
     overwrite_option,
@@ -128,6 +129,7 @@ class RenderOptions:
     size: str = option("1280x720", metavar="WxH", help="Size of the picture in pixels.")
     camera: CameraOptions = group(CameraOptions)
     stage: str | None = stage_option()
+    ground: str | None = ground_option()
     look: LookOptions = group(LookOptions)
     choices: ChoiceOptions = group(ChoiceOptions)
     samples: int = option(16, metavar="N", help="Samples per pixel, for smooth edges.")
@@ -203,6 +205,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
         environment_shadows=given.choices.environment_shadows,
         roughness=given.medium.surface_roughness(given.look.roughness),
         stage=NO_STAGE if given.opaque_with or (given.system and given.stage is None) else given.stage,
+        ground=given.ground,
         media=read_objects(given.object_names),
         variant=given.variant,
         time=given.time,

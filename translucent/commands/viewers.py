@@ -29,6 +29,7 @@ from translucent.commands.options import (
     FileOptions,
     LookOptions,
     VerbCommand,
+    ground_option,
     group,
     option,
     overwrite_option,
@@ -149,6 +150,7 @@ class PageOptions:
     size: str = option("1280x800", metavar="WxH", help="Of the poster, and of what the view frames.")
     camera: CameraOptions = group(CameraOptions)
     stage: str | None = stage_option()
+    ground: str | None = ground_option()
     look: LookOptions = group(LookOptions)
     choices: ChoiceOptions = group(ChoiceOptions, without=("paths", "caustics", "adaptive"))
     samples: int = option(16, metavar="N", help="Samples per pixel while nothing moves.")
@@ -197,6 +199,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
         environment_shadows=given.choices.environment_shadows,
         roughness=given.medium.surface_roughness(look.roughness),
         stage=given.stage,
+        ground=given.ground,
     )
     scene = read_scene(model, requested)
     require_translucent(model, scene)

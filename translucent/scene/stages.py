@@ -18,11 +18,12 @@ from translucent.errors import InputError, close_names, did_you_mean
 from translucent.geometry.grouping import used_vertices
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.support import Support
+from translucent.media.colors import ColorLike, reflectance
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PositionalLight, SpotLight
 from translucent.scene.scene import Light, Object, Scene
-from translucent.scene.studio import dark_studio_map
+from translucent.scene.studio import cove_map, dark_studio_map
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Falloff
 
@@ -93,10 +94,11 @@ STAGED_TONE = "neutral"
 STAGES = {
     "studio": Stage(
         Surface(color=(0.74, 0.74, 0.75), roughness=0.25),
-        lambda: Environment.studio(exposure=-1.0),
-        (KeyLight(-42.0, 52.0, (2.15, 2.08, 1.98)),),
+        # Far away the ground is as bright as the backdrop: then it mirrors what it is, and no horizon is seen.
+        lambda: Environment.image(cove_map(), exposure=-0.55),
+        (KeyLight(-42.0, 52.0, (1.3, 1.25, 1.18)),),
         height=20.0,
-        far=0.3,
+        far=0.45,
     ),
     "light-table": Stage(
         Surface(color=(0.5, 0.5, 0.5), roughness=0.25, emissive=(0.55, 0.56, 0.58)),
@@ -157,6 +159,9 @@ SHADOW_SEEN = 0.7
 #: Sine of the elevation of lights below which shadows have no end to make room for.
 LOWEST = 0.3
 
+#: Color of a ground that is left out.
+NO_GROUND = "none"
+
 #: What messages call the ground.
 GROUND_NAME = "ground"
 
@@ -169,6 +174,7 @@ def staged(
     stage: str | Stage = DEFAULT_STAGE,
     environment: Environment | None = None,
     turn: float = 0.0,
+    ground: ColorLike | None = None,
 ) -> AnyScene:
     """Scene on a stage: its objects on a ground, lit as its camera sees them; +Y is up.
 
@@ -184,6 +190,9 @@ def staged(
         In place of the stage's, whose lights stay out, too.
     turn : float
         Of the stage with its lights and its environment about +Y, in degrees, counterclockwise as seen from above.
+    ground : str or array_like (3,), optional
+        Color of the ground, which it has far away, too; ``none``: no ground, but the stage's light. Default: the
+        stage's.
 
     Raises
     ------
@@ -197,13 +206,14 @@ def staged(
         do = 'make it without one, as by tl.showcase(mesh, medium, stage="none")'
         raise InputError("a stage for a scene", "it has a ground that catches shadows", do)
     axes = view_axes(scene.camera) @ _about_y(turn).T
-    ground = Object(ground_mesh(scene, axes), surface=_ground_surface(chosen), shadow_catcher=True)
+    surface = _ground_surface(chosen, ground)
+    floor = (Object(ground_mesh(scene, axes), surface=surface, shadow_catcher=True),) if surface else ()
     lights = scene.lights or (() if environment else tuple(_light(key, axes) for key in chosen.keys))
     azimuth = float(np.degrees(np.arctan2(axes[2, 0], -axes[2, 2])))
     made = environment or dataclasses.replace(chosen.environment(), rotation=-azimuth)
     return dataclasses.replace(
         scene,
-        objects=(*scene.objects, ground),
+        objects=(*scene.objects, *floor),
         lights=lights,
         environment=made,
         environment_shadows=scene.environment_shadows or ENVIRONMENT_SHADOWS,
@@ -248,8 +258,12 @@ def with_shadows(points: Array, lights: Sequence[Light]) -> Array:
     return np.concatenate([points, *shadows])
 
 
-def _ground_surface(stage: Stage) -> Surface:
+def _ground_surface(stage: Stage, color: ColorLike | None) -> Surface | None:
     """Surface of the ground: its base color is darker far away, as if the lights stood near the model."""
+    if isinstance(color, str) and color == NO_GROUND:
+        return None
+    if color is not None:
+        return dataclasses.replace(stage.ground, color=reflectance(color, GROUND_NAME), double_sided=False)
     if stage.far == 1.0:
         return dataclasses.replace(stage.ground, double_sided=False)
     return dataclasses.replace(stage.ground, double_sided=False, color_texture=_falloff(stage.far))

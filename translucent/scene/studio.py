@@ -73,6 +73,24 @@ def dark_studio_radiance(directions: npt.ArrayLike) -> Array:
     return _with_panels(np.broadcast_to(np.asarray(DARK), towards.shape).copy(), towards, PANELS[1:])
 
 
+#: Radiance of the backdrop of `cove_map`, as a fraction of that of the studio.
+COVE_BACKDROP = 0.56
+
+
+@lru_cache(maxsize=1)
+def cove_map() -> EnvironmentMap:
+    """Environment map of the studio with a darker backdrop, as bright as a ground that goes over into it; made once."""
+    return EnvironmentMap.from_formula(cove_radiance, STUDIO_HEIGHT)
+
+
+def cove_radiance(directions: npt.ArrayLike) -> Array:
+    """Radiance (..., 3) from unit vectors (..., 3): the studio's, with the darker backdrop."""
+    towards = np.asarray(directions, dtype=np.float64)
+    red, green, blue = (COVE_BACKDROP * value for value in PANELS[0].radiance)
+    backdrop = PANELS[0]._replace(radiance=(red, green, blue))
+    return _with_panels(_room(towards[..., 1]), towards, (backdrop, *PANELS[1:]))
+
+
 @lru_cache(maxsize=1)
 def studio_map() -> EnvironmentMap:
     """Environment map of the studio; made once."""
