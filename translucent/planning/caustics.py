@@ -19,7 +19,7 @@ from translucent.planning.methods import Method
 from translucent.planning.methods.base import check_count
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.surface_textures import varies_at_hits
-from translucent.scene.lights import DirectionalLight, PositionalLight
+from translucent.scene.lights import DirectionalLight, PositionalLight, with_whole_spheres
 from translucent.scene.scene import Light, Object, Scene, object_names
 
 #: Largest number of photons of a frame: a software rasterizer follows so many in some minutes.
@@ -291,7 +291,8 @@ def photon_aims(scene: Scene, center: Array, photons: int) -> list[PhotonAim]:
     """
     turning = indices(scene, lambda body: body.has_interface or _displaces(scene, body))
     clouds = [_corners(scene.objects[number], center) for number in turning]
-    aims = [aim for light in scene.lights for aim in _aims(scene, light, clouds, center) if aim.weight > 0.0]
+    lights = with_whole_spheres(scene.lights)
+    aims = [aim for light in lights for aim in _aims(scene, light, clouds, center) if aim.weight > 0.0]
     total = sum(aim.weight for aim in aims)
     return [replace(aim, photons=max(round(photons * aim.weight / total), 1)) for aim in aims]
 

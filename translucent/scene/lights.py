@@ -288,6 +288,22 @@ def without_spheres(lights: Sequence[Light], most: int) -> tuple[Light, ...]:
     )
 
 
+def with_whole_spheres(lights: Sequence[Light]) -> tuple[Light, ...]:
+    """The lights with one point light at the center of each sphere, of its size, in place of its points."""
+    found: dict[object, Light] = {}
+    for light in lights:
+        key: object = light
+        if isinstance(light, _PointOfSphere) and (radius := light.disc[3]) > 0.0:
+            center, size = np.asarray(light.position) + light.disc[:3], (0.0, 0.0, 0.0, radius)
+            key = radius, *np.rint(1e6 * center / radius).tolist()
+            light = _PointOfSphere(center, light.intensity, radius, size)
+            if (known := found.get(key)) is not None:
+                assert isinstance(known, PointLight)
+                light = replace(light, intensity=np.asarray(known.intensity) + np.asarray(light.intensity))
+        found[key] = light
+    return tuple(found.values())
+
+
 def _unit(value: npt.ArrayLike) -> Array:
     direction = _vector("light direction", value)
     if (largest := float(np.abs(direction).max())) > 0 and not 1e-100 < largest < 1e100:
