@@ -183,8 +183,9 @@ class Renderer:
             How to show light that media scatter more than once: as it diffuses in the body, as a flat layer gives it
             back, or not at all; None lets the planner pick for each body.
         caustics : Caustics, optional
-            Photons that carry the light of lamps through interfaces, and by their mirrors, onto opaque objects and
-            into media. None, the default: no caustics.
+            Photons that carry the light of lights through interfaces, and by their mirrors, onto opaque objects and
+            into media. None, the default: some where a clear body gathers light on an opaque object and they take less
+            than a third of the time of the picture, as with 16 samples. `Caustics(0)`: none.
         shadows : ShadowMaps, optional
             How sharp shadows on opaque objects are. Without OpenGL they are traced.
         denoise : bool
@@ -239,6 +240,7 @@ class Renderer:
             _check_backdrop(backdrop, size)
         elif backdrop is not None:
             raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
+        request = dataclasses.replace(request, pixels=size[0] * size[1])
         plan = self.plan_requested(scene, request)
         if request.denoise:
             require_package("pyoidn", "denoise", "render with more samples")  # before any work is done

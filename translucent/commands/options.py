@@ -581,7 +581,8 @@ class ChoiceOptions:
         flag_value=1_000_000,
         metavar="[N]",
         help="Let N photons carry the light of point, spot and directional lights through interfaces onto opaque "
-        "objects, into fog, wax and milk. Default: none; without N: a million; at most 2^30. Four times as many halve "
+        "objects, into fog, wax and milk. Default: some where a clear body gathers light on something opaque, if they "
+        "take less than a third of the time; 0: none; without N: a million; at most 2^30. Four times as many halve "
         "the noise.",
     )
     shadow_size: int | None = option(

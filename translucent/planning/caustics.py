@@ -50,7 +50,7 @@ class Caustics:
     Parameters
     ----------
     photons : int
-        Of a frame, 1 to 2^30.
+        Of a frame, up to 2^30; 0 for none, also where the planner would choose some.
     seed : int
         Of the random numbers, 0 to 2^32 - 1.
 
@@ -68,7 +68,7 @@ class Caustics:
     cost_of_a_million: ClassVar[float] = 4000.0
 
     def __post_init__(self) -> None:
-        check_count("Caustics photons", self.photons, MAX_PHOTONS, example=1_000_000)
+        check_count("Caustics photons", self.photons, MAX_PHOTONS, least=0, example=1_000_000)
         check_count("Caustics seed", self.seed, (1 << 32) - 1, least=0, example=0)
 
     @property
@@ -86,6 +86,42 @@ SECONDS_OF_A_PHOTON = 2.5e-5
 
 #: Passes that show light of media: the reason of the first one in a plan names the photons in them.
 _CARRYING = PassName.LIGHT_VIEWS, PassName.TRACED, PassName.SURFACES
+
+
+#: Seconds of a processor core on a software rasterizer, of which only ratios count: a sample of a pixel, and each light
+#: on it; a photon that shaders follow; and in each of four samples a pixel of what photons land on.
+PIXEL_SAMPLE, LIGHT_SAMPLE, PHOTON, RECEIVER = 3.1e-7, 3.4e-7, 2.3e-6, 4.2e-7
+
+#: Samples that have photons, at most.
+PHOTON_SAMPLES = 4
+
+#: Part of the time of a picture that photons may take unrequested, and how many each pixel gets then, least and most.
+UNREQUESTED, PHOTONS_OF_A_PIXEL = 1.0 / 3.0, (1.0, 4.0)
+
+
+def affordable_caustics(scene: Scene, samples: int, pixels: int, *, embree: bool) -> Caustics | None:
+    """Photons that a picture gets unrequested; None where they would take more than a third of its time.
+
+    Estimated is the time of s samples of P pixels with L lights, s P (a + b L), against that of N photons in r samples,
+    r P c + N d, as measured: `PIXEL_SAMPLE`, `LIGHT_SAMPLE`, `RECEIVER`, `PHOTON`.
+
+    Parameters
+    ----------
+    scene : Scene
+        With points in place of sphere lights.
+    samples : int
+    pixels : int
+        Of the picture; 0 if they are not known.
+    embree : bool
+        Embree finds what photons hit.
+    """
+    if not pixels or scene.camera.window is not None or not gathers_light(scene):
+        return None
+    allowed = UNREQUESTED * samples * (PIXEL_SAMPLE + LIGHT_SAMPLE * len(scene.lights))
+    photon = PHOTON * (EMBREE_COST if embree else 1.0)
+    least, most = PHOTONS_OF_A_PIXEL
+    each = min((allowed - min(samples, PHOTON_SAMPLES) * RECEIVER) / photon, most)
+    return Caustics(min(round(each * pixels), MAX_PHOTONS)) if each >= least else None
 
 
 def opaque_to_shadows(scene: Scene) -> frozenset[int]:
@@ -117,7 +153,7 @@ def check_caustics(scene: Scene, method: Method | None, lit: tuple[int, ...]) ->
 
 
 def passes_with_caustics(
-    passes: tuple[PassSpec, ...], scene: Scene, caustics: Caustics, lit: tuple[int, ...], hits: str
+    passes: tuple[PassSpec, ...], scene: Scene, caustics: Caustics, lit: tuple[int, ...], hits: str, why: str
 ) -> tuple[PassSpec, ...]:
     """The passes of a plan in their order, with the passes that photons need; `hits` is what finds their surfaces."""
     names = [one.name for one in passes]
@@ -128,23 +164,23 @@ def passes_with_caustics(
         if one.name is PassName.OPAQUE:
             opaque = indices(scene, lambda item: item.medium is None)
             cost = caustics.cost_of_a_million * caustics.photons / 1e6 * (EMBREE_COST if hits == "embree" else 1.0)
-            reason = f"{_landing(scene, caustics)}; {HITS[hits]} finds what they hit"
+            reason = f"{_landing(scene, caustics, why)}; {HITS[hits]} finds what they hit"
             steps.append(PassSpec(PassName.CAUSTICS, reason, opaque, 1, cost=cost))
         elif one.name is PassName.SHADE and scene.opaque:
-            steps[-1] = _shaded_with(steps[-1], scene, caustics)
+            steps[-1] = _shaded_with(steps[-1], scene, caustics, why)
     return tuple(steps)
 
 
-def _shaded_with(step: PassSpec, scene: Scene, caustics: Caustics) -> PassSpec:
+def _shaded_with(step: PassSpec, scene: Scene, caustics: Caustics, why: str) -> PassSpec:
     """Pass that shades opaque objects without OpenGL, with the photons that land on them."""
     seconds = caustics.photons * SECONDS_OF_A_PHOTON * len(scene.objects)
-    landed = f"{_landing(scene, caustics)}, followed on the processor, about {seconds:.2g} s"
+    landed = f"{_landing(scene, caustics, why)}, followed on the processor, about {seconds:.2g} s"
     return replace(step, reason=f"{step.reason}; {landed}")
 
 
-def _landing(scene: Scene, caustics: Caustics) -> str:
+def _landing(scene: Scene, caustics: Caustics, why: str) -> str:
     return (
-        f"requested: {caustics.photons:,} photons from {count_of(tuple(range(len(scene.lights))), 'light', 'lights')} "
+        f"{why}: {caustics.photons:,} photons from {count_of(tuple(range(len(scene.lights))), 'light', 'lights')} "
         f"through {_bending(scene)}, added to what opaque objects reflect diffusely"
     )
 
@@ -196,6 +232,13 @@ def _check_paths(scene: Scene, lit: tuple[int, ...]) -> None:
         raise InputError("caustics", found, "give it an inside, or no roughness")
 
 
+def gathers_light(scene: Scene) -> bool:
+    """True if clear bodies bend light of lights onto opaque objects, and photons are followed by OpenGL alone."""
+    refused = [body for body in scene.bodies if body.density is not None or body.covers or body.sheet_thickness]
+    scatters = any(body.medium is not None and body.medium.scatters for body in scene.bodies)
+    return bool(caustics_to_request(scene)) and not refused and not scatters
+
+
 def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
     """Note on light that clear bodies gather in their shadows, which photons would show; empty without such light."""
     clear = [
@@ -209,7 +252,10 @@ def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
     ]
     if not clear or not scene.lights or not scene.opaque:
         return ()
-    text = f"the bright spot in the shadow of {object_names(clear)}: --caustics (tl.Caustics()) shows it"
+    text = (
+        f"the bright spot in the shadow of {object_names(clear)}, several times as bright as the ground, and the dark "
+        "around it: --caustics (tl.Caustics()) shows both"
+    )
     return (Note(NoteKind.CAUSTICS, text),)
 
 

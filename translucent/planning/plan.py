@@ -25,7 +25,9 @@ from translucent.planning.bodies import (
     solids_of,
 )
 from translucent.planning.caustics import (
+    UNREQUESTED,
     Caustics,
+    affordable_caustics,
     caustics_left_out,
     caustics_to_request,
     check_caustics,
@@ -126,6 +128,8 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
     """
     check_scene(scene)
     machine = capabilities or Capabilities()
+    if request.caustics is not None and not request.caustics.photons:
+        request = replace(request, caustics=None, pixels=0)
     if request.over_backdrop:
         _check_backdrop(scene, request)
     diagnose_together(body.mesh for body in scene.bodies if body.sheet_thickness is None)
@@ -162,7 +166,10 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
     unmodelled = (*found.unmodelled, *spheres)
     found = replace(found, request=request, unmodelled=unmodelled, remarks=(*found.remarks, *remarks(scene)))
     if request.caustics is not None:
-        found = _with_caustics(found, scene, request.caustics, machine)
+        found = _with_caustics(found, scene, request.caustics, machine, "requested")
+    elif (unrequested := _unrequested_caustics(found, scene, request, machine)) is not None:
+        why = f"a light, a clear body and a ground, in less than {UNREQUESTED:.0%} of the time of the picture"
+        found = _with_caustics(found, scene, unrequested, machine, why)
     elif paths is None:
         found = replace(found, unmodelled=(*found.unmodelled, *caustics_to_request(scene)))
     if request.denoise:
@@ -416,7 +423,20 @@ def _followed(scene: Scene, interfaces: InterfaceMode | None) -> InterfaceMode |
     return interfaces if interfaces is not None and interfaces.traced else TracedInterfaces(depth=USUAL_DEPTH)
 
 
-def _with_caustics(found: RenderPlan, scene: Scene, caustics: Caustics, machine: Capabilities) -> RenderPlan:
+def _unrequested_caustics(
+    found: RenderPlan, scene: Scene, request: RenderRequest, machine: Capabilities
+) -> Caustics | None:
+    """Photons for a picture that is better with them, and hardly slower."""
+    method = request.method
+    if not machine.opengl or request.over_backdrop or request.transparent or found.paths is not None:
+        return None
+    if method is not None and method.makes_sheets:
+        return None
+    hits = found.hits or chosen_hits("Caustics", None, machine.software, machine.shader_storage)[0]
+    return affordable_caustics(scene, request.samples, request.pixels, embree=hits == "embree")
+
+
+def _with_caustics(found: RenderPlan, scene: Scene, caustics: Caustics, machine: Capabilities, why: str) -> RenderPlan:
     """The plan with photons; refuses them where none could land, or the method follows none."""
     volumes = found.treated(Treatment.VOLUME)
     lit = lit_by_photons(scene, found.treated(Treatment.VOLUME, Treatment.DIFFUSION))
@@ -426,7 +446,7 @@ def _with_caustics(found: RenderPlan, scene: Scene, caustics: Caustics, machine:
         hits, slower = chosen_hits("Caustics", None, machine.software, machine.shader_storage)
     return replace(
         found,
-        passes=passes_with_caustics(found.passes, scene, caustics, lit, hits),
+        passes=passes_with_caustics(found.passes, scene, caustics, lit, hits, why),
         hits=hits,
         remarks=(*found.remarks, *([Note(NoteKind.SLOW_HITS, slower)] if slower else [])),
         unmodelled=(*found.unmodelled, *caustics_left_out(scene, lit, volumes, machine.opengl)),

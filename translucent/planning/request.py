@@ -44,6 +44,8 @@ class RenderRequest(Flags):
     transparent : bool
     denoise : bool
         Take noise out of the picture when it is drawn.
+    pixels : int
+        Of the picture, by which the planner weighs what takes as long however large it is; 0 if they are not known.
     over_backdrop : bool
         Everything opaque is a picture that is drawn elsewhere.
     **flags : bool
@@ -64,6 +66,7 @@ class RenderRequest(Flags):
     transparent: bool = False
     denoise: bool = False
     over_backdrop: bool = False
+    pixels: int = 0
 
     def __post_init__(self) -> None:
         if not isinstance(self.samples, int) or not 1 <= self.samples <= MAX_SAMPLES:

@@ -124,9 +124,12 @@ class PhotonPaths(InterfacePaths):
         return found
 
     def _add_ends(self, live: LiveRays, flight: _Flight, chosen: Integers) -> None:
-        live, wall = live.where(chosen), flight.wall.where(chosen)
-        kept = np.flatnonzero(np.isfinite(wall.distance) & self.redirected[live.owner])
-        live, wall = live.where(kept), wall.where(kept)
+        """Photons that leave the scene land nowhere."""
+
+    def _reflect(self, live: LiveRays, flight: _Flight, hit: Integers) -> LiveRays:
+        """Land photons on opaque objects, where they end."""
+        kept = hit[self.redirected[live.owner[hit]]]
+        none, live, wall = live.where(hit[:0]), live.where(kept), flight.wall.where(kept)
         normals = np.zeros((len(live), 3))
         for item in np.unique(wall.item):
             own = wall.item == item
@@ -136,6 +139,7 @@ class PhotonPaths(InterfacePaths):
             points = live.rays.origins + wall.distance[:, None] * live.rays.directions
             power = self.power[live.owner] * live.throughput
         self.parts.append(LandedPhotons(points, normals, power, wall.item))
+        return none
 
 
 def _emitted(scene: Scene, light: Light, some: Integers, photons: int, rng: np.random.Generator) -> tuple[Rays, Array]:

@@ -30,8 +30,8 @@ _RECEIVED = ("photon_irradiance", "opaque_axial_depth", "receiver_normal")
 #: Photons of a pixel from which on they stay in it; fewer are spread. With 4 and 16 errors of pictures are larger.
 ENOUGH = 8.0
 
-#: Samples with photons, in frames of so many samples at least: drawing what they land on takes a fifth of the time of
-#: a sample. Of the Sobol points of samples the second four lie in the four quarters of a pixel, their mean in its middle.
+#: Samples with photons, in frames of so many samples at least: drawing what they land on takes a fifth of a sample's
+#: time. Of the Sobol points the second four lie in the four quarters of a pixel, and their mean in its middle.
 ROUNDS, ROUNDS_FROM = range(4, 8), 8
 
 #: Photons that are followed together: 48 bytes each are kept of them.
