@@ -437,3 +437,26 @@ def test_geometries_of_three_are_closed(three_page: WebPage) -> None:
         assert pixels["weight"] == 1  # more: open
         assert found.covered.sum() > 5_000
         assert found.valid.all()
+
+
+SLIVERS = """({ size, angles }) => tools.withRenderer(size, (renderer) => {
+    const { THREE, ExactThicknessPass } = translucentThree;
+    const camera = new THREE.PerspectiveCamera(30, size[0] / size[1], 0.01, 1);
+    camera.position.z = 0.15;
+    const knot = new THREE.Mesh(new THREE.TorusKnotGeometry(0.02, 0.006, 128, 24));
+    const pass = new ExactThicknessPass(renderer, { bodies: [knot] });
+    return angles.map((angle) => {
+        knot.rotation.y = angle;
+        pass.render(knot, camera);
+        return pass.read().thickness.reduce((a, b) => Math.max(a, b), 0);
+    });
+})"""
+
+#: Turns of the knot that show a face so nearly edge-on that its plane is up to 2 m off half a step of the grid.
+EDGE_ON = [2 * np.pi * pose / 300 + 0.001 for pose in (15, 59, 73, 91, 93, 224, 297)]
+
+
+def test_faces_that_are_seen_edge_on_have_no_depth_of_their_own(three_page: WebPage) -> None:
+    """No ray is longer in the knot than its size."""
+    longest = three_page.run(SLIVERS, {"size": (200, 160), "angles": EDGE_ON})
+    assert max(longest) < 0.058

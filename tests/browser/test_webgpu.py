@@ -11,6 +11,7 @@ import pytest
 
 import translucent as tl
 from tests.browser.pages import WebPage, decoded, encoded
+from tests.browser.test_thickness_pass import EDGE_ON
 from tests.browser.thickness import TOOLS, Errors, Measured, Truth, described, described_camera, framing, rounded
 from tests.solids import Box, Sphere
 from translucent.assets import mesh_path
@@ -229,6 +230,27 @@ def test_instances_and_poses_are_what_they_show(page: WebPage) -> None:
         assert (pictures[one].covered != pictures[other].covered).sum() <= 10
         both = pictures[one].covered & pictures[other].covered
         assert np.quantile(np.abs(pictures[one].thickness - pictures[other].thickness)[both], 0.98) < 1e-5
+
+
+SLIVERS = """async ({ size, angles }) => {
+  const { THREE, ThicknessNode } = translucentThree;
+  gpu.setSize(...size);
+  const camera = new THREE.PerspectiveCamera(30, size[0] / size[1], 0.01, 1);
+  camera.position.z = 0.15;
+  const knot = new THREE.Mesh(new THREE.TorusKnotGeometry(0.02, 0.006, 128, 24));
+  const node = new ThicknessNode({ bodies: [knot] });
+  const longest = [];
+  for (const angle of angles) {
+    knot.rotation.y = angle;
+    node.measure(gpu, knot, camera);
+    longest.push((await node.read(gpu)).thickness.reduce((a, b) => Math.max(a, b), 0));
+  }
+  return longest;
+}"""
+
+
+def test_faces_that_are_seen_edge_on_have_no_depth_of_their_own(page: WebPage) -> None:
+    assert max(page.run(SLIVERS, {"size": (200, 160), "angles": EDGE_ON})) < 0.058
 
 
 #: A ball before a gray sky, below white; and two media, one behind the other.

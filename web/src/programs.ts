@@ -82,12 +82,13 @@ in float axial_shown;
 in vec2 across;
 flat in vec2 anchor;
 float axial;
+uniform float longest_change;
 ${generated.recentered}
 `;
 
 const findAxial = (subpixel: number): string => `
   vec2 missing = (gl_FragCoord.xy - anchor) - across * gl_FragCoord.w;
-  vec2 on_ray = recentered(axial_shown, missing, ${constant(subpixel)});
+  vec2 on_ray = recentered(axial_shown, missing, ${constant(subpixel)}, longest_change);
   axial = on_ray.x;
 `;
 

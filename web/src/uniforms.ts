@@ -21,6 +21,8 @@ export interface BodyUniforms {
   count_weight: IUniform<number>;
   count_offset: IUniform<number>;
   snapping_share: IUniform<number>;
+  /** Metres by which places on rays are corrected at most. */
+  longest_change: IUniform<number>;
   extinction: IUniform<Vector4>;
   opaque_axial_depth: IUniform<Texture | null>;
   opaque_range: IUniform<Vector2>;
@@ -45,6 +47,7 @@ export function bodyUniforms(): BodyUniforms {
     count_weight: { value: 1 },
     count_offset: { value: 0 },
     snapping_share: { value: 0 },
+    longest_change: { value: 0 },
     extinction: { value: new Vector4() },
     opaque_axial_depth: { value: null },
     opaque_range: { value: new Vector2(0, 1) },
