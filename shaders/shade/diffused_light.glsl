@@ -42,6 +42,16 @@ vec3 subsurface_exitance(int object, vec3 point, vec3 normal, float cosine, vec3
     return max(emergent * scale, vec3(0.0)) * opacity((1.0 - row.ahead) * optical_depth) / (4.0 * PI * row.ior * row.ior);
 }
 
+// Basic radiance of an opaque surface inside an object, by the light that comes to it there.
+vec3 inclusion_exitance(int object, vec3 point, vec3 color) {
+    ObjectRow row = object_table_row(object);
+    vec3 place = point - row.grid_low;
+    vec3 at = vec3(dot(place, row.grid_x), dot(place, row.grid_y), dot(place, row.grid_z));
+    at = clamp(at, vec3(0.5), row.grid_size - 0.5) + vec3(0.0, 0.0, row.first_layer + 2.0 * row.grid_size.z);
+    vec3 irradiance = textureLod(diffused_light, at / vec3(textureSize(diffused_light, 0)), 0.0).rgb;
+    return color * irradiance / (PI * row.ior * row.ior);
+}
+
 // Radiance that comes along a ray, in a direction inside, by light that is scattered ahead in an object, and which diffusion
 // takes for unscattered: of the optical depth on the ray the part by such events does not count. From the environment
 // behind, blurred, and as much as is mirrored where it leaves on the other side.
@@ -55,4 +65,5 @@ vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) {
 #else
 vec3 subsurface_exitance(int object, vec3 point, vec3 normal, float cosine, vec3 optical_depth) { return vec3(0.0); }
 vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
+vec3 inclusion_exitance(int object, vec3 point, vec3 color) { return vec3(0.0); }
 #endif

@@ -359,6 +359,12 @@ int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, in
     if (type == TYPE_OPAQUE && (surface.outside || body.one_sided == 0.0)) {
         // It is in an open body, and whether rightly so, what is behind the opaque object would decide.
         if (all_closed == 0 && is_in_open_body(ray.interior)) { lose(ray); }
+#if DIFFUSED
+        if (before != AIR && object_table_row(before).diffuses > 0.5) {
+            traced_radiance += ray.throughput * inclusion_exitance(before, point, base_color(body, point));
+            return NONE;
+        }
+#endif
         EscapedRay end = escaped_ray(ray, surface.object, normal, point);
         end.triangle = surface.triangle;
         end.weights = surface.weights;

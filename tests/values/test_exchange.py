@@ -7,12 +7,14 @@ import pytest
 
 import translucent as tl
 from translucent.arrays import Array, Integers
-from translucent.diffusion.cache import ground_map
+from translucent.diffusion.cache import FieldCache, ground_map
 from translucent.diffusion.entering import environment_parts, even_directions, opaque_surfaces, suns_of
 from translucent.diffusion.exchange import GroundPoints
 from translucent.diffusion.field import DiffusingBody
 from translucent.diffusion.lit_body import lit_body
+from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.solids import Box, Sphere
+from translucent.planning.plan import plan
 from translucent.planning.scattering import Diffusion
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.grounds import ground_below
@@ -104,3 +106,39 @@ def test_suns_of_pictures_keep_their_light_and_direction(degrees: float, rotatio
     np.testing.assert_allclose(environment_parts(around, directions).sum(axis=0), total, rtol=1e-9)
     assert sent[0] > 0.5 * total[0]
     assert min(-np.asarray(sun.direction) @ world for sun in suns) > np.cos(np.radians(2.0))
+
+
+@pytest.mark.parametrize("color", [0.0, 0.5, 1.0])
+def test_an_opaque_ball_in_a_ball_takes_what_diffusion_brings_to_it(color: float) -> None:
+    """Uniform light on a lossless ball around it: phi = A + B / r between the two surfaces, which lose c phi each."""
+    radius, scattering = 0.5, 40.0
+    outer = tl.Object(Sphere().tessellate(32), tl.Medium(scattering=scattering, ior=1.3))
+    inner = tl.Object(Sphere(radius=radius).tessellate(32), None, color=(color,) * 3)
+    found = plan(tl.Scene([outer, inner], CAMERA, environment=WHITE), scattering=Diffusion(24))
+    field = FieldCache().of(found).surfaces[0]
+    interface, d = diffuse_interface(1.3), 1.0 / (3.0 * scattering)
+    entering, leaves = np.pi * interface.entering, interface.conductance
+    lost = max((1.0 - color) / (2.0 * (1.0 + color)), 1e-9)
+    # Below the first events, somewhat deep, the fluence is higher than at the surface.
+    deeper = 1.0 + 3.0 * interface.mean_cosine * leaves
+    taken = entering / (1.0 + leaves / deeper * (1.0 / (radius**2 * lost) + (1.0 / radius - 1.0) / d))
+    np.testing.assert_allclose(np.pi - field.leaving.mean(), taken, rtol=0.1, atol=0.003)
+    # The fluence at the inner ball, of which it gets phi / (2 (1 + a)).
+    on_it = taken / radius**2 / (1.0 - color) if color < 1.0 else np.pi * 1.3**2
+    assert field.inclusions is not None
+    place = np.argwhere(field.inclusions[..., 0] > 0.0) * field.step + 0.5 * field.step + field.low
+    near = np.abs(np.linalg.norm(place, axis=1) - radius) < field.step
+    values = field.inclusions[field.inclusions[..., 0] > 0.0][near]
+    np.testing.assert_allclose(values.mean(), on_it, rtol=0.1)
+
+
+def test_objects_beside_a_body_are_not_inside() -> None:
+    """A ball that touches it, a ground, and a room around it."""
+    ball = tl.Object(Sphere().tessellate(24), LOSSLESS)
+    beside = np.eye(4)
+    beside[0, 3] = 1.6
+    touching = tl.Object(Sphere(radius=0.6).tessellate(24), None, transform=beside)
+    room = tl.Object(Box((-9, -9, -9), (9, 9, 9)).tessellate(), None)
+    for item in (touching, ground(), room):
+        found = FieldCache().of(plan(tl.Scene([ball, item], CAMERA), scattering=Diffusion(12)))
+        assert found.surfaces[0].inclusions is None

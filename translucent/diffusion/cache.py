@@ -23,7 +23,15 @@ from translucent.diffusion.keys import (
     place_of,
     roughness_of,
 )
-from translucent.diffusion.lit_body import BodyShape, LitBody, body_shape, lit_body, own_frame
+from translucent.diffusion.lit_body import (
+    BodyShape,
+    LitBody,
+    body_shape,
+    inclusion_colors,
+    inclusions_of,
+    lit_body,
+    own_frame,
+)
 from translucent.diffusion.photons import EnteringPhotons, FineCells, photons_in_media
 from translucent.diffusion.solution import BodySystem
 from translucent.diffusion.volume import DiffusingVolume, PhotonFluence, VolumeField, VolumeGrid
@@ -141,9 +149,10 @@ class FieldCache:
         self, body: Object, medium: Medium, places: Hashable, opaque: OpaqueSurfaces | None, diffusion: Diffusion
     ) -> DiffusingBody:
         roughness, own = roughness_of(body), own_frame(body)
-        step = diffusion.cell_size(own)
-        shape_key = place_of(own), body.density, step
-        shape = kept(self._shapes, shape_key, lambda: body_shape(own, step), KEPT_BODIES)
+        step, inner = diffusion.cell_size(own), inclusions_of(body, () if opaque is None else opaque.objects)
+        shape_key = place_of(own), body.density, step, tuple(place_of(item) for item in inner)
+        shape = kept(self._shapes, shape_key, lambda: body_shape(own, step, inner), KEPT_BODIES)
+        colors = inclusion_colors(shape.grid, inner)
         lit = kept(
             self._bodies,
             (place_of(body), shape_key, places),
@@ -157,11 +166,12 @@ class FieldCache:
                 medium,
                 roughness,
                 shape.densities,
+                colors=colors,
                 corrected=diffusion.corrected,
                 warm_starts=self._warm_starts,
             )
 
-        system = kept(self._systems, (shape_key, medium, roughness), make, KEPT_BODIES)
+        system = kept(self._systems, (shape_key, medium, roughness, colors.tobytes()), make, KEPT_BODIES)
         return DiffusingBody(lit, medium, roughness, system)
 
     def _volume(self, body: Object, medium: Medium, diffusion: Diffusion) -> DiffusingVolume:

@@ -64,6 +64,8 @@ class DiffusionField:
         `SurfaceSides`.
     scattered : (6, x, y, z, 3) float32
         Fraction of the paths through the body, from its surface, on which light is scattered; 1 deep inside.
+    inclusions : (x, y, z, 3) float32, optional
+        Irradiance on opaque objects inside, spread beyond their surfaces.
     low : (3,) float64
         Corner of the grid in metres.
     turn : (3, 3) float64
@@ -93,6 +95,7 @@ class DiffusionField:
     fluence: Volume
     entering: Volume
     scattered: Volume
+    inclusions: Volume | None
     low: Array
     turn: Array
     step: float
@@ -109,13 +112,15 @@ class DiffusionField:
     in_scattered: tuple[Array, Array]
 
     @cached_property
-    def volumes(self) -> tuple[Volume, Volume]:
+    def volumes(self) -> tuple[Volume, ...]:
         """Arrays (2 x, 3 y, z, 3) that pictures look up: along paths on which all light is scattered.
 
-        Sides are beside each other: outwards and inwards along each axis in two columns, the axes in three rows.
+        Sides are beside each other: outwards and inwards along each axis in two columns, the axes in three rows. The
+        last one is `inclusions`, if there are any.
         """
         with np.errstate(under="ignore"):
-            return _beside(self.fluence / self.scattered), _beside(self.entering / self.scattered)
+            sides = _beside(self.fluence / self.scattered), _beside(self.entering / self.scattered)
+        return sides if self.inclusions is None else (*sides, self.inclusions)
 
     def radiance(self, points: Array, normals: Array, cosine: Array) -> Array:
         """(k, 3): basic radiance L / n^2 below points of the surface, towards it: the mean over paths through the body.
@@ -298,6 +303,7 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     values = np.concatenate([found.fluence, albedo * found.entering, scattered], axis=1)
     deep = np.concatenate([found.inside, np.zeros_like(found.inside), np.ones_like(found.inside)], axis=1)
     volume = lit.shape.sides.volume(values.astype(np.float32), deep.astype(np.float32))
+    inclusions = None if grid.inclusions is None else lit.shape.on_inclusions(found.at_inclusions)
     cosine = emergent_cosine(float(albedo.mean()), medium.ior)
     ahead = np.asarray(medium.scattering) * max(medium.anisotropy, 0.0)
     # Of diffuse light, four times the volume over the area.
@@ -305,6 +311,7 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     return DiffusionField(
         fluence=np.ascontiguousarray(volume[..., :3]),
         entering=np.ascontiguousarray(volume[..., 3:6]),
+        inclusions=inclusions,
         scattered=np.where(volume[..., 6:] > 0.0, volume[..., 6:], np.float32(1.0)),
         low=lit.pose.outwards(grid.cells.low) + lit.pose.shift,
         turn=lit.pose.turn,

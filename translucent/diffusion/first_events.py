@@ -93,7 +93,7 @@ class LayerSolution:
         Of reading.
     attenuation : float
         k in 1/m.
-    condition : float
+    condition : float, or (s,) float64
         Of the surface: u' / u there.
     spread : (s,) float64
         Integral of the density over the distance of `BodyGrid.spread`: what is read is the fluence at the depth of
@@ -104,7 +104,7 @@ class LayerSolution:
 
     depth: Array
     attenuation: float
-    condition: float
+    condition: Array | float
     spread: Array
     scale: Array
     even: Array
@@ -113,7 +113,7 @@ class LayerSolution:
     slope: Array
 
     @classmethod
-    def of(cls, depth: Array, attenuation: float, condition: float, spread: Array) -> LayerSolution:
+    def of(cls, depth: Array, attenuation: float, condition: Array | float, spread: Array) -> LayerSolution:
         """Solutions down to depths (s,)."""
         scale = optics.transmittance(attenuation * depth)
         even, rise = 0.5 * (1.0 + scale * scale), depth * optics.mean_transmittance(2.0 * attenuation * depth)
@@ -158,6 +158,10 @@ class EntryPaths:
         Whether the light is uniform outside; else each direction is the only one.
     length : callable
         From integrals of the density (k,), in m, along the paths, to metres (k,).
+    limit : (k,) float64
+        Metres to an opaque inclusion; inf where none is on the path.
+    inclusion : (k,) int64
+        Sample of the inclusions there.
     start, per_metre : (3, k) float32
         Where the events of each are counted from, and way along it, in cells: each counts in the cell where it is, and
         starts that differ by up to a cell interpolate by chance.
@@ -168,6 +172,8 @@ class EntryPaths:
     cosine: Array | float
     diffuse: bool
     length: Callable[[Array], Array]
+    limit: Array
+    inclusion: Integers
     start: Floats
     per_metre: Floats
 
@@ -198,9 +204,12 @@ class EntryPaths:
     ) -> EntryPaths:
         """Paths in a grid."""
         lengths, cells = dense.lengths(samples, directions), grid.cells
+        limit, inclusion = np.full(len(samples), np.inf), np.zeros(len(samples), np.int64)
+        if grid.inclusions is not None:
+            limit, inclusion = grid.inclusions.met(grid.points[samples], directions)
         start = ((grid.points - cells.low) / cells.step + _places(len(grid.points))[0])[samples]
         single = (np.ascontiguousarray(part.T, np.float32) for part in (start, directions / cells.step))
-        return cls(samples, directions, cosine, diffuse, lengths, *single)
+        return cls(samples, directions, cosine, diffuse, lengths, limit, inclusion, *single)
 
 
 def diffuse_paths(grid: BodyGrid, dense: Densities, ior: float) -> EntryPaths:
@@ -228,11 +237,14 @@ class Events:
         Fraction that is scattered above that depth, as the cells receive it.
     below : list of ((k,) int, (k,) float64)
         Cells in which light is scattered below that depth, and fractions.
+    reached : (k,) float64
+        Fraction that comes to an opaque inclusion, unscattered.
     """
 
     near: Array
     above: Array
     below: list[tuple[Integers, Array]]
+    reached: Array
 
     def power(self, grid: BodyGrid, samples: Integers, flux: Array) -> Array:
         """(cells,): scattered power in each cell for a flux (k,) that enters at samples (k,), in W."""
@@ -301,14 +313,17 @@ class FirstEvents:
         quantiles = _places(len(grid.points))[1][:, paths.samples] if below.max(initial=0.0) > _NOTHING else ()
         for quantile in quantiles:
             length = slant - quantile / extinction
-            metres = np.minimum(paths.length(length), farthest).astype(np.float32)
+            metres = np.minimum(paths.length(length), farthest)
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
-            cell, weight = grid.cell_at(paths.start + metres * paths.per_metre)
+            cell, weight = grid.cell_at(paths.start + metres.astype(np.float32) * paths.per_metre)
+            weight = np.where(metres < paths.limit, weight, 0.0)
             weight = self._albedo / DEEP_EVENTS * below * weight
             if np.any(straight):
                 weight *= 1.0 - straight * optics.transmittance(STRAIGHT * extinction * length)
             deep.append((cell, weight))
-        return Events(self._albedo * near / self._d - excess, self._albedo * above, deep)
+        # As if the density was even up to there.
+        reached = optics.transmittance(np.where(np.isfinite(paths.limit), extinction * paths.limit, np.inf))
+        return Events(self._albedo * near / self._d - excess, self._albedo * above, deep, reached)
 
 
 @lru_cache(maxsize=16)

@@ -7,7 +7,7 @@ one-dimensional solutions below the surface hold as they are, however the densit
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -20,8 +20,9 @@ from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask, expanded
 from translucent.formulas import optics
+from translucent.geometry.mesh import Mesh, joined
 from translucent.geometry.normals import corner_normals
-from translucent.geometry.ray_caster import ray_caster_of
+from translucent.geometry.ray_caster import RayCaster, ray_caster_of
 from translucent.geometry.winding import line_crossings
 from translucent.scene.scene import Object
 
@@ -81,7 +82,13 @@ def voxels(vertices: Array, faces: npt.NDArray[np.integer], step: float) -> Voxe
     """
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     size = np.ceil((high - low) / step - 1e-9).astype(int) + 2
-    origin = 0.5 * (low + high) - 0.5 * step * size
+    return _cut_cells(vertices, faces, step, 0.5 * (low + high) - 0.5 * step * size, size)
+
+
+def _cut_cells(
+    vertices: Array, faces: npt.NDArray[np.integer], step: float, origin: Array, size: npt.NDArray[np.integer]
+) -> Voxels:
+    """Cut cells of a closed mesh in a grid of this corner and size; what is beyond it does not count."""
     units = (vertices - origin) / step
     inside, center, areas = np.zeros(size), np.zeros((*size, 3)), []
     for axis in range(3):
@@ -95,6 +102,25 @@ def voxels(vertices: Array, faces: npt.NDArray[np.integer], step: float) -> Voxe
     corner = np.stack(np.meshgrid(*(np.arange(n) for n in size), indexing="ij"), axis=-1)
     center = np.clip(np.where(center > 0.0, center, corner + 0.5), corner, corner + 1.0)
     return Voxels(origin, step, np.minimum(inside, 1.0), center, (areas[0], areas[1], areas[2]))
+
+
+def _without(cells: Voxels, inner: Voxels) -> Voxels:
+    """Cut cells of a body without those of something inside it, on the same grid.
+
+    Where both surfaces cut a cell, as little of it is taken as the two fractions allow.
+    """
+    taken = np.maximum(cells.inside + inner.inside - 1.0, 0.0)
+    inside = cells.inside - taken
+    moved = (cells.inside[..., None] * cells.center - taken[..., None] * inner.center) / np.maximum(inside, 1e-9)[
+        ..., None
+    ]
+    corner = np.stack(np.meshgrid(*(np.arange(n) for n in inside.shape), indexing="ij"), axis=-1)
+    center = np.where((taken > 0.0)[..., None] & (inside > 1e-6)[..., None], moved, cells.center)
+    areas = [
+        area - np.maximum(area + other - 1.0, 0.0) for area, other in zip(cells.open_area, inner.open_area, strict=True)
+    ]
+    center = np.clip(center, corner, corner + 1.0)
+    return Voxels(cells.low, cells.step, inside, center, (areas[0], areas[1], areas[2]))
 
 
 def _along_last_axis(
@@ -201,6 +227,49 @@ class Probe:
 
 
 @dataclass(frozen=True, eq=False)
+class Inclusions:
+    """Sample points on the surfaces of opaque objects inside a body.
+
+    Attributes
+    ----------
+    points, normals : (i, 3) float64
+        Normals are towards the body.
+    owner : (i,) int64
+        Number of the object that each is on.
+    read : (i, cells) csr_array
+        Interpolation of the fluence somewhat beside each.
+    depth, spread : (i,) float64
+        Distance in m at which it is read, and by which its flux comes from nearer, see `BodyGrid.spread`.
+    area : float
+        Of the surface around each, in m^2.
+    caster : RayCaster
+        Of all of these objects.
+    """
+
+    points: Array
+    normals: Array
+    owner: Integers
+    read: sparse.csr_array
+    depth: Array
+    spread: Array
+    area: float
+    caster: RayCaster
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """For looking up the sample nearest to a place."""
+        return cKDTree(self.points)
+
+    def met(self, points: Array, directions: Array) -> tuple[Array, Integers]:
+        """Distance (k,) at which rays (k, 3), (k, 3) inside the body hit one, inf for none, and the sample there."""
+        number = np.arange(len(points))
+        distance = self.caster.distances(points, directions, number, number).astype(np.float64)
+        sample, hit = np.zeros(len(points), np.int64), np.isfinite(distance)
+        sample[hit] = self.tree.query(points[hit] + distance[hit, None] * directions[hit])[1]
+        return distance, sample
+
+
+@dataclass(frozen=True, eq=False)
 class BodyGrid:
     """Cells of a body and sample points on its surface, in the coordinates that its transform leads to.
 
@@ -217,6 +286,8 @@ class BodyGrid:
         Of the surface around each sample, in m^2: samples are only nearly even, and a cell that loses light through too
         many is too dark.
     body : Object
+    opaque : tuple of Object
+        Closed opaque objects that may be inside it, in the same coordinates.
     """
 
     cells: Voxels
@@ -227,6 +298,8 @@ class BodyGrid:
     area: float
     areas: Array
     body: Object
+    opaque: tuple[Object, ...] = ()
+    _body_cells: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     _crossings: dict[float, tuple[Array, Array]] = field(default_factory=dict)
 
     @cached_property
@@ -244,6 +317,8 @@ class BodyGrid:
             local = directions.reshape(-1, 3) @ into[:3, :3].T
             point = np.tile(np.arange(len(start)), INWARD_DIRECTIONS)
             found = caster.distances(start @ into[:3, :3].T + into[:3, 3], local, point, np.arange(len(local)))
+            if self.inclusions is not None:
+                found = np.minimum(found, self.inclusions.met(start[point], directions.reshape(-1, 3))[0])
             metres = np.where(np.isfinite(found), found, 0.0).astype(np.float64).reshape(directions.shape[:2])
             self._crossings.clear()
             self._crossings[ior] = directions, metres
@@ -371,6 +446,78 @@ class BodyGrid:
         return read, np.maximum(depth, LEAST_DEPTH) * self.cells.step, weights, heights
 
     @cached_property
+    def inclusions(self) -> Inclusions | None:
+        """Surfaces of opaque objects inside; None if there are none."""
+        parts, found = [], []
+        for number, item in enumerate(self.opaque):
+            points, normals, area = self.inside(item)
+            if len(points):
+                parts.append((points, normals, np.full(len(points), number)))
+                found.append((*_placed(item), None, area))
+        if not found:
+            return None
+        points, normals, owner = (np.concatenate(part) for part in zip(*parts, strict=True))
+        read, depth, spread = self._reads(points, -normals)
+        vertices, faces, _ = joined([part[:3] for part in found], "opaque objects in a body")
+        area = float(np.mean([part[3] for part in found]))
+        return Inclusions(points, normals, owner, read, depth, spread, area, RayCaster(Mesh(vertices, faces)))
+
+    def inside(self, item: Object) -> tuple[Array, Array, float]:
+        """Sample points (i, 3) of an object's surface that are in the body, normals (i, 3), and the area of each."""
+        corners, faces = _placed(item)
+        low, size = self.cells.low, self.cells.step * np.array(self.number.shape)
+        triangles = _near_box(corners[faces], low, low + size)
+        if not len(triangles):
+            return np.zeros((0, 3)), np.zeros((0, 3)), 0.0
+        points, normals, *_, area = _surface_samples(triangles, SAMPLES / self.cells.step**2)
+        within = self._is_inside(points)
+        return points[within], normals[within], area
+
+    def _is_inside(self, points: Array) -> Mask:
+        """(k,): whether places are in the body; in cells that its surface cuts, the nearest sample decides."""
+        place = np.floor((points - self.cells.low) / self.cells.step).astype(np.int64)
+        within = ((place >= 0) & (place < self.number.shape)).all(axis=1)
+        if within.any():
+            nearest = cKDTree(self.points).query(points[within])[1]
+            away = points[within] - self.points[nearest]
+            x, y, z = place[within].T
+            filled = self._body_cells[x, y, z] > 1.0 - 1e-6
+            within[within] = filled | (
+                (self._body_cells[x, y, z] > 0.0) & ((away * self.face_normals[nearest]).sum(axis=1) < 0.0)
+            )
+        return within
+
+    def _reads(self, points: Array, normals: Array) -> tuple[sparse.csr_array, Array, Array]:
+        """Interpolation of the fluence below points (k, 3) with normals (k, 3), its depth, and `spread`, of inclusions."""
+        cells, weights = np.zeros((len(points), 8), np.int64), np.zeros((len(points), 8))
+        heights, missing = np.zeros((len(points), 8)), np.arange(len(points))
+        places = (points - self.cells.low) / self.cells.step
+        for target in PROBE_DEPTHS:
+            probe = self.probe(points[missing] - target * self.cells.step * normals[missing])
+            centers = self.cells.center.reshape(-1, 3)[probe.places]
+            every = np.einsum("kci,ki->kc", places[missing][:, None] - centers, normals[missing])
+            taken = (probe.around > LEAST_AROUND) & ((probe.weights * every).sum(axis=1) > 0.3 * target)
+            at = missing[taken]
+            cells[at], weights[at], heights[at] = probe.cells[taken], probe.weights[taken], every[taken]
+            missing = missing[~taken]
+        used = weights > 0.0
+        starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
+        read = sparse.csr_array((weights[used], cells[used], starts), (len(points), self.count))
+        depth = np.maximum((weights * heights).sum(axis=1), LEAST_DEPTH) * self.cells.step
+        deeper = np.maximum(heights[:, None, :] - heights[:, :, None], 0.0)
+        spread = np.einsum("si,sj,sij->s", weights, weights, deeper) * self.cells.step
+        return read, depth, np.asarray(spread)
+
+    @cached_property
+    def reads(self) -> sparse.csr_array:
+        """Interpolation of the fluence below all samples of the surface, and then beside those of inclusions."""
+        return (
+            self.below[0]
+            if self.inclusions is None
+            else sparse.csr_array(sparse.vstack([self.below[0], self.inclusions.read]))
+        )
+
+    @cached_property
     def blocks(self) -> Integers:
         """(cells,): number of the block of cells that each is in, `BLOCKS` of them along the longest side."""
         side = -(-max(self.number.shape) // BLOCKS)
@@ -392,12 +539,15 @@ class BodyGrid:
     @cached_property
     def layers(self) -> Array:
         """(cells,): volume in m^3 of each cell that is less deep than the fluence is read, counted for each sample."""
-        depth = self.below[1]
+        surfaces = [(self.points, self.face_normals, self.below[1], self.areas)]
+        if (inner := self.inclusions) is not None:
+            surfaces.append((inner.points, -inner.normals, inner.depth, np.full(len(inner.points), inner.area)))
         volume = np.zeros(self.count)
-        for place in _LAYER_PLACES:
-            probe = self.probe(self.points - (place * depth)[:, None] * self.face_normals)
-            part = probe.weights * (self.areas * depth / len(_LAYER_PLACES))[:, None]
-            volume += np.bincount(probe.cells.ravel(), part.ravel(), self.count)
+        for points, normals, depth, areas in surfaces:
+            for place in _LAYER_PLACES:
+                probe = self.probe(points - (place * depth)[:, None] * normals)
+                part = probe.weights * (areas * depth / len(_LAYER_PLACES))[:, None]
+                volume += np.bincount(probe.cells.ravel(), part.ravel(), self.count)
         return volume
 
     @cached_property
@@ -406,7 +556,7 @@ class BodyGrid:
         first, second, _ = self.faces
         joined = sparse.coo_array((np.ones(len(first)), (first, second)), (self.count, self.count))
         parts, part = connected_components(joined, directed=False)
-        read = np.bincount(part, np.asarray(self.below[0].sum(axis=0)), parts) > 0.0
+        read = np.bincount(part, np.asarray(self.reads.sum(axis=0)), parts) > 0.0
         return np.asarray(~read[part])
 
     @cached_property
@@ -414,6 +564,8 @@ class BodyGrid:
         """(cells,): volume in m^3 of each cell without its layers; with these, all are the volume of the body."""
         rest = np.maximum(self.volumes - self.layers, 0.0)
         target = self.volumes.sum() - self.areas @ self.below[1]
+        if self.inclusions is not None:
+            target -= self.inclusions.area * self.inclusions.depth.sum()
         return np.asarray(rest * min(max(target, 0.0) / max(rest.sum(), np.finfo(np.float64).tiny), 1.0))
 
     def probe(self, points: Array) -> Probe:
@@ -488,7 +640,7 @@ class MatrixPattern:
     @classmethod
     def of(cls, grid: BodyGrid) -> MatrixPattern:
         """Pattern of a grid."""
-        (first, second, _), read, count = grid.faces, grid.below[0], grid.count
+        (first, second, _), read, count = grid.faces, grid.reads, grid.count
         # Numbers of a cell are at first in 27 places, by where the other cell is.
         flat = np.flatnonzero(grid.number.ravel() >= 0)
         width, deep = grid.number.shape[1:]
@@ -518,17 +670,20 @@ class MatrixPattern:
         return cls(starts.astype(np.int32), columns.astype(np.int32), rows, number[own], number[sides], losses)
 
 
-def body_grid(body: Object, step: float) -> BodyGrid:
-    """Grid of a closed body with cells of this side in metres."""
+def _placed(item: Object) -> tuple[Array, npt.NDArray[np.integer]]:
+    """Vertices (n, 3) of an object where its transform leads, and faces (m, 3), counter-clockwise from outside."""
+    corners, faces = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3], np.asarray(item.mesh.faces)
+    return corners, faces[:, ::-1] if item.faces_inwards else faces
+
+
+def body_grid(body: Object, step: float, opaque: Sequence[Object] = ()) -> BodyGrid:
+    """Grid of a closed body with cells of this side in metres, less closed opaque objects that are inside it."""
     matrix = body.matrix[:3, :3]
     corners = body.mesh.vertices @ matrix.T + body.matrix[:3, 3]
     faces = np.asarray(body.mesh.faces)
     if np.linalg.det(matrix) < 0.0:
         faces = faces[:, ::-1]
-    cells = voxels(corners, faces, step)
-    counts = cells.inside > LEAST_INSIDE
-    number = np.full(counts.shape, -1)
-    number[counts] = np.arange(counts.sum())
+    whole = voxels(corners, faces, step)
     points, face_normals, face, weights, area = _surface_samples(corners[faces], SAMPLES / step**2)
     at_corners = corner_normals(body.mesh).reshape(-1, 3, 3)
     if np.linalg.det(matrix) < 0.0:
@@ -537,7 +692,20 @@ def body_grid(body: Object, step: float) -> BodyGrid:
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), face_normals)
     areas = _areas(corners[faces], points, face_normals, area)
-    return BodyGrid(cells, number, points, face_normals, normals, area, areas, body)
+
+    def cut(cells: Voxels, inside: tuple[Object, ...]) -> BodyGrid:
+        counts = cells.inside > LEAST_INSIDE
+        number = np.full(counts.shape, -1)
+        number[counts] = np.arange(counts.sum())
+        return BodyGrid(cells, number, points, face_normals, normals, area, areas, body, inside, whole.inside)
+
+    grid, cells = cut(whole, ()), whole
+    # What is around the body has no surface inside.
+    if not (inside := [item for item in opaque if len(grid.inside(item)[0])]):
+        return grid
+    for item in inside:
+        cells = _without(cells, _cut_cells(*_placed(item), step, cells.low, np.array(cells.inside.shape)))
+    return cut(cells, tuple(opaque))
 
 
 def _areas(triangles: Array, points: Array, normals: Array, mean: float) -> Array:
@@ -556,6 +724,20 @@ def nearest_samples(points: Array, normals: Array, area: float, places: Array, t
     size = np.sqrt(area)
     tree = cKDTree(np.concatenate([points, size * normals], axis=1))
     return np.asarray(tree.query(np.concatenate([places, size * towards], axis=1))[1], np.int64)
+
+
+def _near_box(triangles: Array, low: Array, high: Array) -> Array:
+    """(m, 3, 3): parts of triangles (k, 3, 3) near a box, none longer than it is wide."""
+    while True:
+        near = (triangles.min(axis=1) <= high).all(axis=1) & (triangles.max(axis=1) >= low).all(axis=1)
+        triangles = triangles[near]
+        long = np.ptp(triangles, axis=1).max(axis=1, initial=0.0) > (high - low).max()
+        if not long.any():
+            return triangles
+        a, b, c = np.moveaxis(triangles[long], 1, 0)
+        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        triangles = np.concatenate([triangles[~long], *(np.stack(part, axis=1) for part in parts)])
 
 
 def _surface_samples(triangles: Array, density: float) -> tuple[Array, Array, Integers, Array, float]:

@@ -25,6 +25,9 @@ from translucent.scene.scene import Object
 #: Samples of a surface for each one at which paths through other bodies are found.
 SAMPLES_FOR_PATH = 4
 
+#: Samples of inclusions that a cell near them takes the mean of, and their largest distance in cells.
+AROUND_CELL, REACH = 8, 3.0
+
 
 @dataclass(frozen=True, eq=False)
 class Entrance:
@@ -67,6 +70,22 @@ class BodyShape:
         """From the samples of its surface to the cells around it."""
         return SurfaceSides.of(self.grid)
 
+    def on_inclusions(self, values: Array) -> Floats:
+        """(x, y, z, n) float32: values (i, n) at the samples of opaque objects inside, in the cells around these."""
+        grid, inner = self.grid, self.grid.inclusions
+        volume = np.zeros((grid.number.size, values.shape[1]), np.float32)
+        if inner is not None:
+            centers = np.stack(np.indices(grid.number.shape), axis=-1).reshape(-1, 3) + 0.5
+            found, sample = inner.tree.query(
+                grid.cells.low + grid.cells.step * centers, AROUND_CELL, distance_upper_bound=REACH * grid.cells.step
+            )
+            near = np.isfinite(found)
+            weight = np.where(near, 1.0 / (np.where(near, found / grid.cells.step, 1.0) ** 2 + 0.25), 0.0)
+            total, own = weight.sum(axis=1, keepdims=True), near.any(axis=1)
+            part = weight[own] / total[own]
+            volume[own] = np.einsum("ck,ckn->cn", part, values[np.where(near, sample, 0)[own]])
+        return volume.reshape(*grid.number.shape, -1)
+
     @cached_property
     def densities(self) -> Densities:
         """Densities of the body."""
@@ -86,9 +105,9 @@ class BodyShape:
         return self._entrances[ior, roughness]
 
 
-def body_shape(body: Object, step: float) -> BodyShape:
-    """Shape of a body, neither rotated nor moved, with cells of this side."""
-    grid = body_grid(body, step)
+def body_shape(body: Object, step: float, opaque: Sequence[Object] = ()) -> BodyShape:
+    """Shape of a body, neither rotated nor moved, with cells of this side, around `inclusions_of` it."""
+    grid = body_grid(body, step, opaque)
     return BodyShape(body, grid, sky_of(grid))
 
 
@@ -212,6 +231,28 @@ class LitBody:
 def own_frame(body: Object) -> Object:
     """The body as it is stretched, neither rotated nor moved."""
     return replace(body, transform=Pose.of(body.matrix)[1])
+
+
+def inclusions_of(body: Object, opaque: Sequence[Object]) -> tuple[Object, ...]:
+    """Closed opaque objects that may be inside a body, in its own frame."""
+    pose, (low, high) = Pose.of(body.matrix)[0], body.bounds
+    into = np.eye(4)
+    into[:3, :3], into[:3, 3] = pose.turn.T, -pose.shift @ pose.turn
+    return tuple(
+        replace(item, transform=into @ item.matrix, shadow_catcher=False)
+        for item in opaque
+        if (item.bounds[0] < high).all() and (item.bounds[1] > low).all() and item.mesh.diagnosis.solid
+    )
+
+
+def inclusion_colors(grid: BodyGrid, opaque: Sequence[Object]) -> Array:
+    """(i, 3): fraction of the light that opaque objects inside a body reflect, at the samples of their surfaces.
+
+    A surface reflects there as its base color, whatever its coat: the medium has nearly its index.
+    """
+    if grid.inclusions is None:
+        return np.zeros((0, 3))
+    return np.array([item.base_color for item in opaque])[grid.inclusions.owner]
 
 
 def lit_body(body: Object, opaque: OpaqueSurfaces | None, step: float, shape: BodyShape | None = None) -> LitBody:

@@ -110,8 +110,8 @@ class CellSystem:
         Diffusion coefficient in m; between two cells it is that of their halves in series.
     absorbed : (cells,) float64
         Power for each fluence that a cell absorbs, in m^2: sigma_a times its volume.
-    lost : (s,) float64
-        Power for each fluence that leaves at the samples of the surface, in m^2.
+    lost : (s + i,) float64
+        Power for each fluence that leaves at the samples of the surface, and at those of inclusions, in m^2.
     """
 
     def __init__(self, grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> None:
@@ -226,6 +226,8 @@ class DiffuseSolution:
         Flux that enters, that of the body itself included.
     inside : (cells, 3) float64
         Fluence in the cells.
+    at_inclusions : (i, 3) float64
+        Irradiance at the samples of opaque inclusions.
     leaving : (s, 3) float64
         Flux that leaves the samples: what has been in the body, and what its surface mirrors.
     scattered : (s, 3) float64
@@ -237,6 +239,7 @@ class DiffuseSolution:
     fluence: Array
     entering: Array
     inside: Array
+    at_inclusions: Array
     leaving: Array
     scattered: Array
     steps: int
@@ -262,6 +265,8 @@ class BodySystem:
         Of its surface.
     dense : Densities, optional
         Of the body; default: `even_densities`.
+    colors : (i, 3) float64, optional
+        Fraction of the light that inclusions reflect at their samples; default: half.
     corrected : bool
         What diffusion gets wrong of uniform light around such a body without losses is taken out: it takes as long as
         all else.
@@ -277,6 +282,7 @@ class BodySystem:
         roughness: float,
         dense: Densities | None = None,
         *,
+        colors: Array | None = None,
         corrected: bool = True,
         warm_starts: bool = False,
     ) -> None:
@@ -284,6 +290,8 @@ class BodySystem:
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         self._grid, self._dense = grid, dense or even_densities(grid)
+        count = 0 if grid.inclusions is None else len(grid.inclusions.points)
+        colors = np.full((count, 3), 0.5) if colors is None else colors
         paths = diffuse_paths(grid, self._dense, medium.ior)
         self._channels = {
             channel: _ChannelSystem(
@@ -296,6 +304,7 @@ class BodySystem:
                 paths,
                 scattered_fractions(grid, self._dense, medium.ior, float(absorption + scattering)),
                 medium.phase_function,
+                reflected=np.asarray(colors[:, channel]),
                 corrected=corrected,
             )
             for channel, (absorption, scattering) in enumerate(zip(np.asarray(medium.absorption), reduced, strict=True))
@@ -325,6 +334,8 @@ class BodySystem:
         """
         fluence, flux, cells = np.zeros_like(entering), entering.copy(), np.zeros_like(inside)
         scattered, leaving = np.ones_like(entering), np.zeros_like(entering)
+        count = 0 if self._grid.inclusions is None else len(self._grid.inclusions.points)
+        inclusions = np.zeros((count, 3))
         steps, ray = 0, joined_rays(rays)
         path = entry_paths(ray, self._grid, self._dense)
         for channel, system in self._channels.items():
@@ -339,19 +350,24 @@ class BodySystem:
                 self._warm_starts,
             )
             fluence[:, channel], flux[:, channel], leaving[:, channel], cells[:, channel], taken = found
+            inclusions[:, channel] = system.at_inclusions(cells[:, channel], flux[:, channel], straight)
             scattered[:, channel] = system.scattered
             steps += taken
-        return DiffuseSolution(fluence, flux, cells, leaving, scattered, steps)
+        return DiffuseSolution(fluence, flux, cells, inclusions, leaving, scattered, steps)
 
 
 @dataclass(frozen=True, eq=False)
 class _DirectionalEffects:
-    """Effects of entering rays in one channel: flux, reflected flux and fluence at samples (s,), power in the cells."""
+    """Effects of entering rays in one channel: flux, reflected flux and fluence at samples (s,), power in the cells.
+
+    And the power that comes to the samples of inclusions (i,) unscattered.
+    """
 
     flux: Array
     mirrored: Array
     near: Array
     power: Array
+    reaching: Array
 
 
 class _ChannelSystem:
@@ -369,6 +385,7 @@ class _ChannelSystem:
         scattered: Array,
         phase: PhaseFunction = ISOTROPIC,
         *,
+        reflected: Array,
         corrected: bool,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
@@ -385,8 +402,9 @@ class _ChannelSystem:
         # 4 V / S is the mean chord (Cauchy).
         chord = 4.0 * float(dense.cells @ grid.volumes) / (grid.area * len(depth))
         self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord)
-        self._diffuse = self._first.of(paths)
+        self._diffuse, self._paths = self._first.of(paths), paths
         self._all = paths.samples
+        self._inclusions = _InclusionLosses.of(grid, absorption, d, reflected)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
         # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
         self._emitted_near = (layer.bend() + spread * layer.rise) / d * self._relative
@@ -395,12 +413,14 @@ class _ChannelSystem:
         lost = grid.areas * d * layer.slope * self._relative
         absorbing = np.maximum(grid.cores, _LEAST_ABSORBING * grid.volumes)
         absorbed = absorption * dense.cells * absorbing
+        lost = np.concatenate([lost, self._inclusions.lost])
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
         self._correction = np.ones(len(depth))
         #: (s,): see `SurfaceLight`.
         self.scattered = scattered
         if corrected:
-            lossless = _ChannelSystem(grid, ior, roughness, 0.0, extinction, dense, paths, scattered, corrected=False)
+            white, same = np.ones_like(reflected), (dense, paths, scattered)
+            lossless = _ChannelSystem(grid, ior, roughness, 0.0, extinction, *same, reflected=white, corrected=False)
             # What half-spaces absorb has not been in the body long enough to get to other parts of it.
             reflectance = half_space_reflectance(round(self._albedo, 6), ior)
             found = lossless.by_uniform_light()
@@ -414,7 +434,7 @@ class _ChannelSystem:
         of folds.
         """
         even = np.ones(len(self._grid.points))
-        source = self._diffuse.power(self._grid, self._all, even)
+        source = self._power(even)
         cells, _ = self._cells.solved(source, self._cells.even(source), ROUGH)
         found = (self._read @ cells) * self._attenuated + self._diffuse.near
         found, target = found[self._grid.nearest].mean(axis=1), self.scattered
@@ -431,7 +451,23 @@ class _ChannelSystem:
             return np.asarray(np.bincount(paths.samples, values, count), np.float64)
 
         power, near = events.power(self._grid, paths.samples, entering), events.near * entering
-        return _DirectionalEffects(at_samples(entering), at_samples(mirrored), at_samples(near), power)
+        reaching = self._inclusions.reaching(self._grid, paths, events.reached * entering)
+        power = power + self._inclusions.sent(reaching)
+        return _DirectionalEffects(at_samples(entering), at_samples(mirrored), at_samples(near), power, reaching)
+
+    def at_inclusions(self, cells: Array, flux: Array, straight: _DirectionalEffects) -> Array:
+        """Irradiance at the samples of inclusions (i,), for what `solved` finds."""
+        uniform = self._diffuse.reached * (flux - straight.flux)
+        reaching = self._inclusions.reaching(self._grid, self._paths, uniform) + straight.reaching
+        return np.asarray(self._inclusions.diffuse(cells) + reaching / self._inclusions.area)
+
+    def _power(self, flux: Array) -> Array:
+        """(cells,): power of uniform light that enters with a flux (s,): what is scattered, or reflected inside."""
+        power = self._diffuse.power(self._grid, self._all, flux)
+        if self._grid.inclusions is None:
+            return power
+        reaching = self._inclusions.reaching(self._grid, self._paths, self._diffuse.reached * flux)
+        return np.asarray(power + self._inclusions.sent(reaching))
 
     def solved(
         self,
@@ -450,7 +486,7 @@ class _ChannelSystem:
         emitted = self._albedo * emission * self._emitted_near + straight.near
 
         def source(flux: Array) -> Array:
-            return np.asarray(self._diffuse.power(self._grid, self._all, flux) + inside)
+            return np.asarray(self._power(flux) + inside)
 
         def at_surface(cells: Array, flux: Array) -> Array:
             fluence = (self._read @ cells) * self._attenuated + self._diffuse.near * flux + emitted
@@ -484,3 +520,53 @@ class _ChannelSystem:
             tolerance = min(max(OF_CHANGE * largest / max(most, np.finfo(np.float64).tiny), TOLERANCE), FIRST)
             before = change if again == 0.0 else np.zeros_like(entering)
         return fluence, flux + straight.flux, leaving(fluence, flux), np.maximum(near, 0.0), steps
+
+
+@dataclass(frozen=True, eq=False)
+class _InclusionLosses:
+    """Light at opaque inclusions in one color channel: a part of it is reflected into the body, the rest is lost.
+
+    Of the light J = phi / (2 (1 + a)) that diffusion brings to a surface that reflects a part a of it diffusely, the
+    part 1 - a is the flux into it: -D dphi/dn = (1 - a) / (2 (1 + a)) phi.
+
+    Attributes
+    ----------
+    read : (i, cells) csr_array
+    attenuated : (i,) float64
+        Fluence at the surface over that where it is read.
+    lost : (i,) float64
+        See `CellSystem`.
+    reflected : (i,) float64
+    area : float
+        Around each sample, in m^2.
+    """
+
+    read: sparse.csr_array
+    attenuated: Array
+    lost: Array
+    reflected: Array
+    area: float
+
+    @classmethod
+    def of(cls, grid: BodyGrid, absorption: float, d: float, reflected: Array) -> _InclusionLosses:
+        """Those of a grid."""
+        if (inner := grid.inclusions) is None:
+            return cls(sparse.csr_array((0, grid.count)), np.zeros(0), np.zeros(0), np.zeros(0), 1.0)
+        condition = (1.0 - reflected) / (2.0 * (1.0 + reflected)) / d
+        layer = LayerSolution.of(inner.depth, float(np.sqrt(absorption / d)), condition, inner.spread)
+        lost = inner.area * d * layer.slope / layer.u
+        return cls(inner.read, layer.scale / layer.u, lost, reflected, inner.area)
+
+    def diffuse(self, cells: Array) -> Array:
+        """(i,): irradiance by light that has diffused, for a fluence (cells,)."""
+        return np.asarray((self.read @ cells) * self.attenuated / (2.0 * (1.0 + self.reflected)))
+
+    def reaching(self, grid: BodyGrid, paths: EntryPaths, flux: Array) -> Array:
+        """(i,): power in W that comes unscattered, for a flux (k,) of paths that reach inclusions."""
+        hit = np.isfinite(paths.limit)
+        power = grid.areas[paths.samples[hit]] * flux[hit]
+        return np.asarray(np.bincount(paths.inclusion[hit], power, len(self.lost)), np.float64)
+
+    def sent(self, reaching: Array) -> Array:
+        """(cells,): power that is reflected into the cells."""
+        return np.asarray(self.read.T @ (self.reflected * self.attenuated * reaching))

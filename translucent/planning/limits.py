@@ -248,6 +248,12 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
     return notes
 
 
+def _may_hold(body: Object, item: Object) -> bool:
+    """Whether an opaque object may be inside a body, so that it is lit by the light there."""
+    meet = (item.bounds[0] < body.bounds[1]).all() and (item.bounds[1] > body.bounds[0]).all()
+    return bool(meet) and item.mesh.diagnosis.solid
+
+
 def _subsurface_effects(scene: Scene) -> list[Note]:
     """Notes on bodies whose surfaces show light that they scatter many times."""
     notes = []
@@ -263,7 +269,8 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             "what is smaller than a cell has no light of its own"
         )
         ground = ground_below(scene, [i for i, body in enumerate(scene.objects) if body in bodies])
-        if others := [item for item in scene.opaque if ground is None or item is not ground.ground]:
+        beside = [item for item in scene.opaque if not any(_may_hold(body, item) for body in bodies)]
+        if others := [item for item in beside if ground is None or item is not ground.ground]:
             text += f"; of the light that they send out, none reaches {object_names(others)}"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes
