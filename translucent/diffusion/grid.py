@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask, expanded
 from translucent.formulas import optics
-from translucent.geometry.mesh import Mesh, joined
+from translucent.geometry.mesh import Mesh, Triangles, joined
 from translucent.geometry.normals import corner_normals
 from translucent.geometry.ray_caster import RayCaster, ray_caster_of
 from translucent.geometry.winding import line_crossings
@@ -448,18 +448,19 @@ class BodyGrid:
     @cached_property
     def inclusions(self) -> Inclusions | None:
         """Surfaces of opaque objects inside; None if there are none."""
-        parts, found = [], []
+        parts, found, areas = [], list[Triangles](), []
         for number, item in enumerate(self.opaque):
             points, normals, area = self.inside(item)
             if len(points):
                 parts.append((points, normals, np.full(len(points), number)))
-                found.append((*_placed(item), None, area))
+                found.append((*_placed(item), None))
+                areas.append(area)
         if not found:
             return None
         points, normals, owner = (np.concatenate(part) for part in zip(*parts, strict=True))
         read, depth, spread = self._reads(points, -normals)
-        vertices, faces, _ = joined([part[:3] for part in found], "opaque objects in a body")
-        area = float(np.mean([part[3] for part in found]))
+        vertices, faces, _ = joined(found, "opaque objects in a body")
+        area = float(np.mean(areas))
         return Inclusions(points, normals, owner, read, depth, spread, area, RayCaster(Mesh(vertices, faces)))
 
     def inside(self, item: Object) -> tuple[Array, Array, float]:
@@ -476,7 +477,7 @@ class BodyGrid:
     def _is_inside(self, points: Array) -> Mask:
         """(k,): whether places are in the body; in cells that its surface cuts, the nearest sample decides."""
         place = np.floor((points - self.cells.low) / self.cells.step).astype(np.int64)
-        within = ((place >= 0) & (place < self.number.shape)).all(axis=1)
+        within = np.asarray(((place >= 0) & (place < self.number.shape)).all(axis=1), bool)
         if within.any():
             nearest = cKDTree(self.points).query(points[within])[1]
             away = points[within] - self.points[nearest]
@@ -488,7 +489,7 @@ class BodyGrid:
         return within
 
     def _reads(self, points: Array, normals: Array) -> tuple[sparse.csr_array, Array, Array]:
-        """Interpolation of the fluence below points (k, 3) with normals (k, 3), its depth, and `spread`, of inclusions."""
+        """Interpolation of the fluence beside inclusions: at points (k, 3) with normals (k, 3); depth and `spread`."""
         cells, weights = np.zeros((len(points), 8), np.int64), np.zeros((len(points), 8))
         heights, missing = np.zeros((len(points), 8)), np.arange(len(points))
         places = (points - self.cells.low) / self.cells.step
@@ -670,9 +671,10 @@ class MatrixPattern:
         return cls(starts.astype(np.int32), columns.astype(np.int32), rows, number[own], number[sides], losses)
 
 
-def _placed(item: Object) -> tuple[Array, npt.NDArray[np.integer]]:
+def _placed(item: Object) -> tuple[Array, npt.NDArray[np.int32]]:
     """Vertices (n, 3) of an object where its transform leads, and faces (m, 3), counter-clockwise from outside."""
-    corners, faces = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3], np.asarray(item.mesh.faces)
+    corners = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+    faces = np.asarray(item.mesh.faces, np.int32)
     return corners, faces[:, ::-1] if item.faces_inwards else faces
 
 

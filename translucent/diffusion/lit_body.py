@@ -75,7 +75,7 @@ class BodyShape:
         grid, inner = self.grid, self.grid.inclusions
         volume = np.zeros((grid.number.size, values.shape[1]), np.float32)
         if inner is not None:
-            centers = np.stack(np.indices(grid.number.shape), axis=-1).reshape(-1, 3) + 0.5
+            centers = np.indices(grid.number.shape).reshape(3, -1).T + 0.5
             found, sample = inner.tree.query(
                 grid.cells.low + grid.cells.step * centers, AROUND_CELL, distance_upper_bound=REACH * grid.cells.step
             )

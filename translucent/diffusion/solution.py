@@ -385,7 +385,7 @@ class _ChannelSystem:
         scattered: Array,
         phase: PhaseFunction = ISOTROPIC,
         *,
-        reflected: Array,
+        reflected: Array | None = None,
         corrected: bool,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
@@ -404,6 +404,7 @@ class _ChannelSystem:
         self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord)
         self._diffuse, self._paths = self._first.of(paths), paths
         self._all = paths.samples
+        reflected = np.zeros(0) if reflected is None else reflected
         self._inclusions = _InclusionLosses.of(grid, absorption, d, reflected)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
         # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
