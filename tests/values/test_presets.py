@@ -44,6 +44,7 @@ COLORS = {
     "white_wine": ((0.92, 0.82, 0.42), 0.06),
     "frosted_glass": ((0.93, 0.96, 0.95), 0.01),
     "ice": ((0.94, 0.975, 0.99), 0.1),
+    "paraffin": ((0.965, 0.925, 0.84), 0.01),
     "resin": ((0.95, 0.90, 0.74), 0.03),
 }
 
@@ -52,6 +53,7 @@ SCATTERING = {
     "jade": ((0.20, 0.25, 0.22), 0.15),
     "wax": ((1.5, 1.5, 1.5), 0.35),
     "soap": ((1.0, 1.0, 1.0), 0.3),
+    "paraffin": ((1.2, 1.2, 1.2), 0.35),
 }
 
 #: Roughness of clear ones whose surfaces are not polished.
@@ -276,7 +278,7 @@ def test_the_list_is_the_callers_own() -> None:
 
 @pytest.mark.parametrize("name", ["unobtainium", "", "&"])
 def test_an_unknown_name_without_a_like_gives_some(name: str) -> None:
-    message = f"preset {name!r}; not a known preset; use one of marble, skim_milk, merlot, honey, jade and 61 more"
+    message = f"preset {name!r}; not a known preset; use one of marble, skim_milk, merlot, honey, jade and 62 more"
     with pytest.raises(tl.InputError, match=re.escape(message)):
         tl.preset(name)
 

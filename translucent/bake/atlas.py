@@ -81,6 +81,15 @@ def unwrap(mesh: Mesh, size: int, tile: int | None) -> Unwrapped:
     return Unwrapped(mesh, uv, vertex, made_by, tiles, _doubts(mesh, uv, tiles, crossing, tile))
 
 
+def tiles_of(mesh: Mesh) -> tuple[int, ...]:
+    """UDIM tiles in which a mesh has faces; 0 for faces outside of all."""
+    if mesh.uv is None:
+        return ()
+    near = np.round(mesh.uv)
+    uv = np.where(np.abs(mesh.uv - near) <= WHOLE, near, mesh.uv)[mesh.faces]
+    return tuple(np.unique(_tiles(uv)[0]).tolist())
+
+
 def in_tile(uv: Array, tile: int) -> npt.NDArray[np.bool_]:
     """(m,): mask of faces (m, 3, 2) in a UDIM tile."""
     return np.asarray(_tiles(uv)[0] == tile)
@@ -143,7 +152,8 @@ def _doubts(
             raise InputError(f"UDIM tile {tile}", f"mesh {mesh.name!r} has faces in {listed}", "ask for one of these")
         return ()
     if len(tiles) > 1 and 0 not in tiles and not crossing.any():
-        return (f"the texture coordinates use the UDIM tiles {listed}, which one map lays over one another: bake each",)
+        text = f"the texture coordinates use the UDIM tiles {listed}, which one map lays over one another"
+        return (f"{text}: bake each, as by -o 'name.<UDIM>.png'",)
     if outside := int(((uv < 0) | (uv > 1)).any(axis=(1, 2)).sum()):
         return (f"{outside} of {len(uv)} faces have texture coordinates outside 0..1, where the map repeats",)
     return ()

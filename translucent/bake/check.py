@@ -83,6 +83,14 @@ NO_BODY = (70, 70, 74)
 _CAPTION = 26  # pixels
 
 
+#: Errors of transmittance up to which a map looks so: what one sees in a picture alone, and beside the true one.
+VERDICTS = (
+    (0.05, "looks right"),
+    (0.12, "looks similar; beside the true one the difference shows"),
+    (float("inf"), "looks different; try --mode transmittance with a medium, more --rays, or trace rays at run time"),
+)
+
+
 class NotSeenError(InputError):
     """Error for a map whose surface no pixel shows."""
 
@@ -121,6 +129,14 @@ class MapCheck:
             "empty": self.empty,
         }
 
+    @property
+    def verdict(self) -> str:
+        """Whether the body looks right with the map, in a sentence."""
+        off, bias = self.transmittance.rms, self.transmittance.bias
+        sides = "" if abs(bias) < 0.5 * off else ", and too bright" if bias > 0 else ", and too dark"
+        words = next(text for most, text in VERDICTS if off <= most)
+        return f"verdict: {words}: the light that passes is {off:.0%} off{sides}"
+
     def __str__(self) -> str:
         scale = 100.0 / self.mean_thickness
         found, passed = self.thickness, self.transmittance
@@ -129,7 +145,7 @@ class MapCheck:
             f"thickness      rms {found.rms:.4g} m, {scale * found.rms:.3g} % of the mean {self.mean_thickness:.4g} m; "
             f"median {found.median:.4g} m, p99 {found.p99:.4g} m, bias {found.bias:+.4g} m\n"
             f"transmittance  rms {passed.rms:.4g}, median {passed.median:.4g}, p99 {passed.p99:.4g}, "
-            f"bias {passed.bias:+.4g}{bare}"
+            f"bias {passed.bias:+.4g}{bare}\n{self.verdict}"
         )
 
 

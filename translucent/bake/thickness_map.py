@@ -318,12 +318,23 @@ def save_map(
 
 
 def add_map(
-    files: OutputFiles, result: ThicknessMap, path: Path, *, normalize: bool, invert: bool, about: Record
+    files: OutputFiles,
+    result: ThicknessMap,
+    path: Path,
+    *,
+    normalize: bool,
+    invert: bool,
+    about: Record,
+    largest: float | None = None,
 ) -> Record:
-    """Write a map as an image, with its record beside it, as a part of `files`; returns the record."""
+    """Write a map as an image, with its record beside it, as a part of `files`; returns the record.
+
+    Fractions are those of `largest`, by default the largest value.
+    """
     suffix = check_map_output(path, normalize=normalize, invert=invert)
     levels = PNG_LEVELS if suffix == ".png" else 0
-    encoding = Encoding.of(result.values, levels, normalize=normalize, invert=invert, unit=result.settings.unit)
+    of = result.values if largest is None else np.array([largest])
+    encoding = Encoding.of(of, levels, normalize=normalize, invert=invert, unit=result.settings.unit)
     filled = files.write(path, partial(_fill, result=result, encoding=encoding, suffix=suffix))
     return add_record(files, path, {**fingerprint(path, filled), **about, **result.record(encoding)})
 

@@ -21,6 +21,7 @@ from translucent.commands.options import (
     AnyMediumOptions,
     FileOptions,
     MediumOptions,
+    NamesOf,
     VerbCommand,
     group,
     option,
@@ -46,6 +47,9 @@ SCATTER, SIZE = "scatter", 256
 
 MODES = ("normal", "cone", "transmittance", "inscribed", "local", SCATTER)
 FORMATS = ("exr", "png", "npy", "npz", "glb", "ply")
+
+#: Metres of thickness from which on a unit is likely wrong.
+RARELY_THICK = 0.5
 
 #: Steps of a progress bar.
 STEPS = 1000
@@ -75,7 +79,10 @@ def _length(help: str) -> Any:
 class BakeOptions:
     """Options of ``translucent bake``."""
 
-    output: Path | None = option(names=("-o", "--output"), help="A .exr, .png, .npy, .npz, .glb or .ply file.")
+    output: Path | None = option(
+        names=("-o", "--output"),
+        help="A .exr, .png, .npy, .npz, .glb or .ply file; with <UDIM> in its name, a file for each tile.",
+    )
     mode: str = option(
         "cone",
         type=click.Choice(MODES),
@@ -112,6 +119,11 @@ class BakeOptions:
     max_escaped: str | None = option(metavar="%", help="Of --out-dir: more rays without an exit are suspect. [5%]")
     resume: bool = option(False, help="Keep finished parts beside the output, and go on from there.")
     check: bool = option(False, help="Compare the look with the true one; write OUTPUT.check.png.")
+    program: str | None = option(
+        names=("--for",),
+        type=NamesOf("translucent.bake.programs", "PROGRAMS"),
+        help="Name, encode and scale the map as this program expects it; -o may be a folder.",
+    )
     out_dir: Path | None = option(help="Bake each MODEL into this folder.")
     format: str = option("exr", type=click.Choice(FORMATS), help="Of files in --out-dir.")
     jobs: int | None = option(metavar="N", help="Of --out-dir: processes. Default: one per processor.")
@@ -260,13 +272,20 @@ def _read_scatter_job(model: str, output: Path, given: BakeOptions) -> ScatterJo
 def _bake_one(job: Job, given: BakeOptions, as_json: bool) -> None:
     from translucent.bake.batch import reported_values
     from translucent.bake.jobs import bake_file
+    from translucent.bake.programs import job_for, recipe_for
+    from translucent.bake.udim import bake_tiles, is_tiled
 
     if given.check and given.vertices:
         raise InputError("--check", "it looks at maps", "leave --vertices out")
     if given.check and given.mode == "local":
         raise InputError("--check", "mode 'local' is no length", "choose another mode")
+    tiled = is_tiled(job["output"])
+    if given.check and tiled:
+        raise InputError("--check", f"{job['output']} has tiles", "check one of them: --tile 1001")
+    if given.program is not None:
+        job = job_for(given.program, job)
     with _progress(Path(job["model"]).name) as progress:
-        record, results = bake_file(job, progress)
+        record, results = (bake_tiles if tiled else bake_file)(job, progress)
     reported = {"output": job["output"], **reported_values(record, results, Path(job["output"]).parent)}
     checks = {}
     if given.check:
@@ -275,6 +294,14 @@ def _bake_one(job: Job, given: BakeOptions, as_json: bool) -> None:
         found = check_output(job, record, results)
         checks = _check_report(found, job["output"], write_picture, "with the map, true, difference")
     lines = [*_lines(record, reported), *checks.get("lines", [])]
+    largest = reported["range"]["max"]
+    if given.program is not None:
+        reported["import"] = recipe_for(given.program, largest)
+        lines.append(reported["import"])
+    if reported["unit"] == "m" and largest > RARELY_THICK:
+        text = f"{largest:.3g} m thick: is the unit right? Light passes little of that; for a figurine --height 12cm"
+        reported["advice"] = text
+        lines.append(f"advice: {text}")
     if assumes_metres(job["model"], given.file):
         reported["size"] = size_note(next(iter(results.values())).mesh, "m")
         lines.append(f"size: {reported['size']}")
