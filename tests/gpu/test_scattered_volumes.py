@@ -187,3 +187,13 @@ def test_only_what_changes_the_light_is_solved_for_again(
         solved.clear()
         renderer.render(changed, SIZE, scattering=tl.Diffusion(12))
         assert len(solved) == times
+
+
+@pytest.mark.parametrize("depth", [1.0, 6.0])
+def test_glowing_glass_scatters_its_own_light(renderer: tl.Renderer, depth: float) -> None:
+    """With an interface, too, as random paths have it; light that nothing scatters is a third to six sevenths less."""
+    medium = tl.Medium(absorption=0.5, scattering=depth, emission=1.0, ior=1.4)
+    scene = tl.Scene([tl.Object(Sphere((0, 0, 0), 0.5).tessellate(32), medium)], CAMERA, environment=DARK)
+    truth = renderer.render(scene, SIZE, method=tl.PathTraced(256)).radiance.mean()
+    assert renderer.render(scene, SIZE, samples=4).radiance.mean() == pytest.approx(truth, rel=0.06)
+    assert renderer.render(scene, SIZE, scattering=tl.SingleScattering()).radiance.mean() < 0.75 * truth

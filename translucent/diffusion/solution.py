@@ -36,6 +36,7 @@ from translucent.diffusion.first_events import (
 )
 from translucent.diffusion.grid import BodyGrid, Densities, even_densities
 from translucent.errors import RenderError
+from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient, half_space_reflectance
 from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 from translucent.media.medium import Medium
@@ -401,6 +402,9 @@ class _ChannelSystem:
         self._attenuated = layer.scale * self._relative
         # 4 V / S is the mean chord (Cauchy).
         chord = 4.0 * float(dense.cells @ grid.volumes) / (grid.area * len(depth))
+        # Of diffusion, and of all events.
+        self._extinctions = extinction, absorption + scattering / (1.0 - phase.mean_cosine)
+        self._ior, self._chord, self._interface = ior, chord, interface
         self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord)
         self._diffuse, self._paths = self._first.of(paths), paths
         self._all = paths.samples
@@ -444,6 +448,45 @@ class _ChannelSystem:
         correction = target / max(float(areas @ target), least) * float(areas @ found) / np.maximum(found, least)
         return np.asarray(np.clip(correction, LEAST_CORRECTION, MOST_CORRECTION))
 
+    def _emitted_again(self, emission: float) -> tuple[Array, Array, float]:
+        """Power in the cells (cells,), and fluence at the samples (s,), of emitted light at its first scattering event.
+
+        Rays see what leaves the body before, which is missing here; the flux of that is the third value. In uniform
+        light of 1, a medium that emits sigma_t per metre has a radiance of 1 everywhere: unscattered emitted radiance
+        is q / sigma_t less the part of uniform light that gets there. As radiance is that outside, L / n^2, the power
+        of `emission`, 4 pi q in W/m^3, is n^2 times as much.
+        """
+        inside, near = self._emitted_cells, self._emitted_near
+        if emission == 0.0:
+            return np.zeros_like(inside), np.zeros_like(near), 0.0
+        (extinction, every), entering = self._extinctions, self._interface.entering
+        uniform = self._diffuse.power(self._grid, self._all, np.ones_like(near))
+        # Fraction of uniform light that has an event on its way through; a part of the rest is mirrored, and goes on.
+        events = float(uniform.sum()) / (self._albedo * self._grid.area * len(near))
+        # Rays take what is scattered ahead for lost, and diffusion for unscattered: it stays here.
+        ahead = float(optics.opacity(every * self._chord) / optics.opacity(extinction * self._chord))
+        flux, all_flux = (
+            emission / (4.0 * sigma) * entering * part / (1.0 - (1.0 - entering) * (1.0 - part))
+            for sigma, part in ((extinction, events), (every, min(events * ahead, 1.0)))
+        )
+        power = self._albedo * emission * self._ior**2
+        lost = all_flux / max(events, np.finfo(np.float64).tiny)
+        thin = self._thin_escape(4.0 * flux / (emission * self._ior**2 * self._chord))
+        return thin * (power * inside - lost * uniform), thin * (power * near - lost * self._diffuse.near), all_flux
+
+    def _thin_escape(self, escape: float) -> float:
+        """Factor of emitted and scattered light that leaves a body as thin as a free path, where its fluence is even.
+
+        There a fraction `escape` of what an event sends out leaves without another one. Diffusion has a gradient of the
+        fluence below the surface, which is not there, and lets more out. In thick bodies there is one; between both,
+        the probability to leave a body without an interface decides.
+        """
+        depth, conductance = self._extinctions[0] * self._chord, self._interface.conductance
+        absorbed = 1.0 - self._albedo
+        exact = escape / (escape + (1.0 - escape) * absorbed)
+        diffused = conductance / (conductance + 0.25 * absorbed * depth)
+        return 1.0 + float(optics.mean_transmittance(depth)) * (exact / diffused - 1.0)
+
     def directional(self, entering: Array, mirrored: Array, paths: EntryPaths) -> _DirectionalEffects:
         """Effects of rays that enter with a flux (k,), and are reflected with another: first events on their paths."""
         events, count = self._first.of(paths), len(self._grid.points)
@@ -483,8 +526,9 @@ class _ChannelSystem:
 
         Light of the body falls on it again, as `returned` says of a flux that leaves, until little changes.
         """
-        inside = self._albedo * (power + emission * self._emitted_cells) + straight.power
-        emitted = self._albedo * emission * self._emitted_near + straight.near
+        emitted_inside, emitted, unscattered = self._emitted_again(emission)
+        inside = self._albedo * power + emitted_inside + straight.power
+        emitted = emitted + straight.near
 
         def source(flux: Array) -> Array:
             return np.asarray(self._power(flux) + inside)
@@ -495,7 +539,7 @@ class _ChannelSystem:
 
         def leaving(fluence: Array, flux: Array) -> Array:
             # What the surface mirrors goes on as if it was diffuse.
-            return np.asarray(self._exit_fraction * fluence + self._mirrored * flux + straight.mirrored)
+            return np.asarray(self._exit_fraction * fluence + self._mirrored * flux + straight.mirrored + unscattered)
 
         def received(fluence: Array, flux: Array) -> Array:
             return entering if returned is None else entering + returned(leaving(fluence, flux))
