@@ -22,7 +22,7 @@ INTERFACES = {
     "constant thickness, one interface": "constant thickness",
     "ScreenInterfaces": "screen space",
     "TracedInterfaces, depth 4, 1 fork": "traced, depth 4",
-    "TracedInterfaces, depth 12, 2 forks": "traced, depth 12 (planner)",
+    "TracedInterfaces, depth 12, 2 forks": "traced, depth 12",
     "TracedInterfaces, depth 16, 3 forks": "traced, depth 16",
 }
 SCATTERING = {

@@ -31,6 +31,7 @@ uniform int all_closed;            // 1: no solid has holes: what seems to leave
 uniform float faintest_throughput; // throughput, its three channels together, below which rays are not followed
 
 const int MOST_INTERACTIONS = 1024; // in the tree of a pixel
+const int MOST_FORKED = 16;         // interfaces behind a ray up to which it may fork: no more branches wait at once
 const uint MOST_PASSED = 511u;     // surfaces without an effect, one after the other
 
 struct Ray {
@@ -130,13 +131,16 @@ uniform int ground_object;   // number of the object that is the ground, or -1
 uniform vec4 ground_plane;   // unit normal upwards, and metres along it from the center of the media
 #endif
 
-// Ends a ray that is not followed on: it sees the environment, or the ground before it.
+// Ends a ray that is not followed on: it sees the environment, or the ground before it. One that is in a body leaves it who knows
+// where: it sees the environment as blurred as the roughest mirror shows it, and no image of a light that is not there.
 void terminate(Ray ray) {
     EscapedRay end = escaped_ray(ray, AIR, vec3(0.0), ray.origin);
+    if (ray.interior.x != 0u) { end.blur = 1.0; }
 #if OPAQUE
     float falling = -dot(ground_plane.xyz, ray.direction), height = dot(ground_plane.xyz, ray.origin) - ground_plane.w;
     if (ground_object >= 0 && falling > 1e-3 && height > 0.0) {
         end.object = ground_object;
+        end.blur = ray.blur;
         end.normal = ground_plane.xyz;
         end.point += height / falling * ray.direction;
     }
@@ -255,7 +259,7 @@ bool forks_on(inout Ray stronger, inout Ray weaker) {
     // One for each interface ahead of the mirror image, which may not fork.
     int part = is_free ? min(ahead, left / 2) : left / 4;
     if (is_free && !is_reflected(weaker)) { part = left - part; }
-    if (part == 0 || (forks == 0 && !is_free) || strength(weaker.throughput) <= faintest_throughput) { return false; }
+    if (part == 0 || depth > MOST_FORKED || (forks == 0 && !is_free) || strength(weaker.throughput) <= faintest_throughput) { return false; }
     stronger.state -= uint(part) << 11;
     weaker.state = packed_state(depth, is_free ? forks : forks - 1, is_reflected(weaker), part);
     return true;

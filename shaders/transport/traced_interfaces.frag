@@ -1,8 +1,8 @@
 // Rays traced through the meshes wherever interfaces reflect and refract them: a tree of exact branches. The stronger branch is
 // always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked up in the environment;
 // so are both at the last of `most_interfaces`. The rasterizer has found the first interface. adaptive: only samples of a pixel that
-// are worth it; with the square of their luminance in place of the transmittance. DEEP: more than 16 interfaces. GENERATIONS: the light
-// of the rays has been summed up, see step_rays.comp. Row 0 of the output is the top row.
+// are worth it; with the square of their luminance in place of the transmittance. GENERATIONS: the light of the rays has been summed
+// up, see step_rays.comp. Row 0 of the output is the top row.
 
 #if (MIRROR || ROUGH) && !MICROFACETS
 #error rough interfaces and mirrors of the ground take random microfacets: MICROFACETS is 1
@@ -36,17 +36,12 @@ void trace_channels(Pixel pixel, Ray ray, PrimaryHit primary, float reach) {
 }
 #else
 const int MOST_SEGMENTS = 4096;
-#if DEEP
-const int MOST_STACKED = 64;
-#else
-const int MOST_STACKED = 16;
-#endif
 
 // Light of a tree of rays, and how much of it is lost. No two weaker branches wait that have as many interfaces behind them.
 void trace(Ray ray, PrimaryHit primary, float reach, int channel) {
     traced_radiance = vec3(0.0);
     traced_lost = 0.0;
-    Ray stack[MOST_STACKED], weaker;
+    Ray stack[MOST_FORKED], weaker;
     int stacked = 0, goes_on = ONE;
     for (int segment = 0; segment < MOST_SEGMENTS; ++segment) {
         goes_on = follow(ray, weaker, first_hit(ray.origin, ray.direction, 0.0, reach), primary, channel, EITHER);

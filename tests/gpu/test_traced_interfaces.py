@@ -406,14 +406,31 @@ def test_triangles_without_an_area_change_nothing(thorough: tl.Renderer) -> None
     assert np.quantile(differences(thorough, seen(body(tl.Mesh(BALL.vertices, faces)))), 0.95) < 1e-3
 
 
+def test_paths_that_end_in_a_body_see_no_image_of_a_light(renderer: tl.Renderer) -> None:
+    """Straight on through a box stands a small bright light: rays see it behind two interfaces, and not behind one."""
+    pixels = np.zeros((64, 128, 3), np.float32)
+    pixels[30:34, 62:66] = 100.0
+    box = Box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)).tessellate()
+    environment = tl.Environment.image(pixels)
+    towards = next(axis for axis in (*np.eye(3), *-np.eye(3)) if environment.lighting(axis[None]).max() > 50.0)
+    camera = tl.Camera.look_at(-4.0 * towards, (0, 0, 0), fov_y=5.0)
+    scene = seen(body(box, tl.Medium(ior=1.5)), camera=camera, environment=environment)
+    with tl.Renderer(backend="cpu") as cpu:
+        for one in (renderer, cpu):
+            cut, whole = (one.render(scene, (8, 8), samples=1, interfaces=tl.TracedInterfaces(n, 0)) for n in (1, 2))
+            assert whole.radiance[3:5, 3:5].min() > 50.0
+            # The light fills 0.02 of its hemisphere.
+            assert 0.5 < cut.radiance[3:5, 3:5].mean() < 8.0
+
+
 # The plan
 
 
 def test_the_plan_says_which_interfaces_are_traced_and_how_far() -> None:
     plan = tl.plan(seen(body(BALL)))
-    assert plan.interfaces == tl.TracedInterfaces(depth=12, forks=2)
+    assert plan.interfaces == tl.TracedInterfaces(depth=24, forks=2)
     (step,) = (step for step in plan.passes if step.name == "traced_interfaces")
-    assert "at most 12 interfaces" in step.reason
+    assert "at most 24 interfaces" in step.reason
     assert "'sphere'" in str(plan)
 
 

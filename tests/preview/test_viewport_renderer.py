@@ -67,7 +67,7 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     finish(view, work)
     assert view.plans[0] is not None
     usual = view.plans[0].interfaces
-    assert usual == tl.TracedInterfaces(depth=12)
+    assert usual == tl.TracedInterfaces(depth=24)
     view.budget = 0.0 if slow else 1e9
     monkeypatch.setattr(StepTimes, "stride", lambda *_: 4 if slow else 1)  # not 256 steps for a picture
     drawn: list[RenderPlan] = []

@@ -30,7 +30,7 @@ from translucent.planning.render_plan import Capabilities
 TRACED, SCREEN, FRONT = tl.TracedInterfaces(), tl.ScreenInterfaces(), tl.FrontInterface()
 CHOICES: list[InterfaceMode] = [TRACED, SCREEN, FRONT]
 #: What the planner takes where light bends.
-USUAL = tl.TracedInterfaces(depth=12)
+USUAL = tl.TracedInterfaces(depth=24)
 ALWAYS: list[Any] = [None, tl.SignedDepth(), *ORDERED]
 
 

@@ -34,7 +34,7 @@ BENT = "refracted and reflected light"
 )
 @pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.ThinLayer(), *ORDERED])
 def test_an_effect_that_no_pass_renders_is_told(objects: list[tl.Object], effects: list[str], method: Any) -> None:
-    cut_off = "light that meets more than 12 interfaces, or is the weaker of reflected and refracted light more often"
+    cut_off = "light that meets more than 24 interfaces, or is the weaker of reflected and refracted light more often"
     first_interval = "refraction and reflection beyond the first interval"
     traced = first_interval if method == tl.ThinLayer() else cut_off  # sheets bend no ray
     for interfaces, bent in ((None, traced), (tl.ScreenInterfaces(), first_interval)):

@@ -71,9 +71,18 @@ _BESIDE_THICKNESS = (
     NoteKind.CUT_OFF_PATHS,
 )
 
-#: Trees of traced interfaces, as depth and forks, and whether brief cases have them: from the cheapest tree to one
-#: whose depth is beyond the planner's, which is among them, each with as many forks as pay there.
-_TREES = {(2, 0): True, (4, 0): False, (4, 1): True, (8, 1): False, (8, 2): False, (12, 2): True, (16, 3): False}
+#: Trees of traced interfaces, as depth and forks, and whether brief cases have them: from the cheapest to that of the
+#: planner, and one with more forks.
+_TREES = {
+    (2, 0): True,
+    (4, 0): False,
+    (4, 1): True,
+    (8, 1): False,
+    (8, 2): False,
+    (12, 2): True,
+    (16, 3): False,
+    (24, 2): True,
+}
 
 #: Treatments of light that is scattered many times, whether brief cases have them, and what they promise: no bound.
 _DIFFUSES = "no bound: light diffuses, which it does a few mean free paths below the surface"

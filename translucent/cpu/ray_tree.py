@@ -179,7 +179,7 @@ class RayTree:
 
     At an interface that reflects and refracts, the stronger branch is followed. The weaker one is followed, too, where
     the path has forks left, and uses up one; else it sees the environment in its direction, as if nothing were
-    ahead. So do both at the last interface.
+    ahead, blurred where it is in a body. So do both at the last interface.
 
     Parameters
     ----------
@@ -460,7 +460,10 @@ class _Growth:
         for branch, bright, first in zip((back, on), brightness, firsts, strict=True):
             exists = bright > 0.0
             follow = more & (first | forks) & (bright >= FAINTEST)
-            self._look_up(branch.where(exists & ~follow))
+            ended = branch.where(exists & ~follow)
+            # Where light leaves a body is not known: it is as blurred as the roughest mirror shows the environment.
+            inside = ended.interior[:, 0] != NOTHING
+            self._look_up(replace(ended, blur=np.where(inside, 1.0, ended.blur)))
             kept.append(branch.where(follow))
         return kept
 

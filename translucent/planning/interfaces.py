@@ -255,10 +255,12 @@ class TracedInterfaces(InterfaceMode):
     Parameters
     ----------
     depth : int
-        Interfaces that a ray may hit, from 1; behind the last one it sees the environment, as if nothing was ahead.
+        Interfaces that a ray may hit, from 1; behind the last one it sees the environment, as if nothing was ahead, and
+        blurred if it ends in a body.
     forks : int
         How often a ray may go on as the weaker of the two, reflected or refracted, from 0; the mirror image at the
-        first interface is free. The stronger one is always followed; a weaker one beyond that sees the environment.
+        first interface is free. The stronger one is always followed; a weaker one beyond that, or behind more than 16
+        interfaces, sees the environment.
     hits : {"embree", "gl"}, optional
         What finds the surfaces that rays hit: Embree on the processors, or shaders. None lets the planner pick: Embree
         where OpenGL draws on the processors, too, else shaders.
@@ -336,8 +338,9 @@ INTERFACES: dict[str, type[InterfaceMode]] = {
 }
 
 
-#: Interfaces that rays may hit if no number is requested: wine in a glass needs them, and few rays go as far.
-USUAL_DEPTH = 12
+#: Interfaces that rays may hit if no number is requested: light that the wall of a glass guides around a drink needs
+#: them, and few other rays go as far.
+USUAL_DEPTH = 24
 
 
 def chosen_interfaces(scene: Scene, requested: InterfaceMode | None, *, sheets: bool) -> tuple[InterfaceMode, str]:

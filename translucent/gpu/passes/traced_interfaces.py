@@ -201,7 +201,6 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
     rough = any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces)
     return {
         "FORKS": job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
-        "DEEP": job.plan.interfaces is not None and job.plan.interfaces.tree[0] > 16,
         "FROM_EYE": job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
         **ray_switches(scene),
         "TEXTURED": job.features.textured,
