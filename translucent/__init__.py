@@ -34,6 +34,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.bake.thickness_map import ThicknessMap as ThicknessMap
     from translucent.bake.thickness_map import VertexThickness as VertexThickness
     from translucent.bake.thickness_map import load_thickness_map as load_thickness_map
+    from translucent.bake.usd_stage import write_usd as write_usd
     from translucent.errors import InputError as InputError
     from translucent.errors import RenderError as RenderError
     from translucent.errors import TranslucentError as TranslucentError
@@ -129,6 +130,7 @@ _NAMES = {
     "bake.scatter": "ScatterMap VertexScatter bake_scatter bake_vertex_scatter",
     "bake.settings": "BakeSettings",
     "bake.thickness_map": "BakeReport ThicknessMap VertexThickness load_thickness_map",
+    "bake.usd_stage": "write_usd",
     "errors": "InputError RenderError TranslucentError TranslucentWarning",
     "formulas.phase": "Draine HenyeyGreenstein PhaseFunction WaterDroplets",
     "frames.appearance": "Appearance appearance_of average_color medium_for_average_color",

@@ -21,6 +21,7 @@ OPTIONAL = {
     "imgui-bundle": "the window of translucent preview (pip install 'translucent-shading[ui]')",
     "xatlas": "baking meshes without texture coordinates (pip install 'translucent-shading[bake]')",
     "pyoidn": "pictures without noise, render --denoise (pip install 'translucent-shading[denoise]')",
+    "usd-core": "USD stages, bake --usd (pip install 'translucent-shading[usd]')",
     "matplotlib": "the page of translucent report (pip install 'translucent-shading[report]')",
     "distributed": "baking on a Dask cluster (pip install 'translucent-shading[cluster]')",
     "imageio-ffmpeg": "turntables as .mp4 (pip install 'translucent-shading[video]')",

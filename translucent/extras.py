@@ -17,6 +17,7 @@ EXTRAS = {
     "jinja2": "report",
     "markupsafe": "report",
     "matplotlib": "report",
+    "pxr": "usd",
     "pyoidn": "denoise",
     "tomli_w": "ui",
     "traitlets": "notebook",

@@ -28,6 +28,7 @@ PROJECT = Path(__file__).parents[2] / "pyproject.toml"
         ("OpenEXR", "exr", "render bear -o {}/t.png --preset gummy --environment {here}"),
         ("OpenEXR", "exr", "bake bear -o {}/t.exr"),
         ("OpenEXR", "exr", "bake bear --out-dir {}/maps"),
+        ("pxr", "usd", "bake bear --usd {}/bear.usda"),
         ("xatlas", "bake", "bake bear -o {}/t.npy --size 16"),
         ("imageio_ffmpeg", "video", "render bear -o {}/t.mp4 --preset gummy --turntable 3"),
         ("distributed", "cluster", "bake bear --out-dir {}/maps --format npy --dask tcp://farm:8786"),

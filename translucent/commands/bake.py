@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import dataclasses
 import json
 import sys
 import time
@@ -16,7 +17,15 @@ import click
 from click.core import ParameterSource
 
 from translucent.commands.console import echo, is_terminal, time_text
-from translucent.commands.model import assumes_metres, file_unit, mesh_file
+from translucent.commands.model import (
+    SceneRequest,
+    assumes_metres,
+    file_unit,
+    is_scene_file,
+    mesh_file,
+    read_scene,
+    require_translucent,
+)
 from translucent.commands.options import (
     AnyMediumOptions,
     FileOptions,
@@ -65,6 +74,10 @@ _SETTINGS = (
 
 #: Options that have a meaning for thickness alone, but for those of many models, and for scattered light alone.
 _SCATTER_ALONE = ("resolution", "scattering_color", "mean_free_path")
+_REFUSED_BY_USD = (
+    "output", "out_dir", "size", "supersample", "padding", "tile", "high", "cage", "high_distance", "unwrap",
+    "normalize", "invert", "resume", "check", "format", "jobs", "dask", "max_escaped",
+)  # fmt: skip
 _TAKEN_BY_SCATTER = {
     "models", "output", "check", "as_json", "mode", "size", "padding", "unwrap", "vertices", "unit", "height",
     "longest", "allow_outside", "color", "distance", "preset", "clamp", *_SCATTER_ALONE,
@@ -125,6 +138,10 @@ class BakeOptions:
         help="Name, encode and scale the map as this program expects it; -o may be a folder.",
     )
     out_dir: Path | None = option(help="Bake each MODEL into this folder.")
+    usd: Path | None = option(
+        metavar="FILE",
+        help="Instead of -o: a .usda or .usdc stage with meshes, OpenPBR materials, and thickness per vertex.",
+    )
     format: str = option("exr", type=click.Choice(FORMATS), help="Of files in --out-dir.")
     jobs: int | None = option(metavar="N", help="Of --out-dir: processes. Default: one per processor.")
     dask: str | None = option(metavar="ADDRESS", help="Of --out-dir: a Dask scheduler, such as tcp://farm:8786.")
@@ -158,9 +175,15 @@ def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
         return _bake_scatter(_read_scatter_job(models[0], output, given), given, as_json)
     if other := [name for name in named if name in _SCATTER_ALONE]:
         raise InputError(_option(other[0]), "thickness has no use for it", f"add --mode {SCATTER}, or leave it out")
+    if given.usd is not None:
+        if other := [name for name in named if name in _REFUSED_BY_USD]:
+            raise InputError(f"--usd {given.usd}", f"{_option(other[0])} is given, too", "leave one of the two out")
+        if len(models) != 1:
+            raise InputError(f"--usd {given.usd}", f"{len(models)} models", "give one MODEL")
+        return _bake_usd(models[0], given.usd, given, as_json)
     if (output is None) == (out_dir is None):
         found = "neither is given" if output is None else "both are given"
-        raise InputError("-o FILE or --out-dir FOLDER", found, "give one of the two")
+        raise InputError("-o FILE or --out-dir FOLDER", found, "give one of the two, or --usd FILE")
     if out_dir is not None:
         if given.check:
             raise InputError("--check", "it looks at one model", "give one MODEL and -o")
@@ -306,6 +329,41 @@ def _bake_one(job: Job, given: BakeOptions, as_json: bool) -> None:
         reported["size"] = size_note(next(iter(results.values())).mesh, "m")
         lines.append(f"size: {reported['size']}")
     _print({**reported, "record": record, **checks}, lines, as_json)
+
+
+def _bake_usd(model: str, output: Path, given: BakeOptions, as_json: bool) -> None:
+    """Bake the vertices of all bodies of a model, and write them with their materials as a USD stage."""
+    from translucent.bake.jobs import bake_one
+    from translucent.bake.thickness_map import VertexThickness
+    from translucent.bake.usd_stage import check_usd_output, write_usd
+    from translucent.media.medium import Medium
+    from translucent.scene.showcase import SOLID_IOR
+
+    check_usd_output(output)
+    job: Job = _read_job(model, output, given, file_unit(model, given.file)) | {"vertices": True}
+    medium = given.medium.read()
+    if medium is None and not is_scene_file(model):
+        medium = Medium()  # a clear material, as in a .glb
+    if medium is not None and medium.ior == 1.0:
+        medium = dataclasses.replace(medium, ior=SOLID_IOR)
+    roughness = given.medium.surface_roughness()
+    keeps_ior = given.medium.color is not None
+    scene = read_scene(model, SceneRequest(medium, keeps_ior, file=given.file, roughness=roughness))
+    require_translucent(model, scene)
+    bodies = {id(body.mesh): body for body in scene.bodies if body.sheet_thickness is None}
+    results = []
+    for body in bodies.values():
+        with _progress(body.mesh.name) as progress:
+            baked = bake_one(job, body.mesh, body.medium, progress)
+        assert isinstance(baked, VertexThickness)
+        results.append(baked)
+    write_usd(scene, output, results)
+    meshes = [
+        {"mesh": one.mesh.name, "min": float(one.values.min()), "max": float(one.values.max()), "mode": given.mode}
+        for one in results
+    ]
+    lines = [f"{output}: {one['mesh']!r}, {one['mode']}, {one['min']:.4g} to {one['max']:.4g} m" for one in meshes]
+    _print({"output": str(output), "meshes": meshes}, lines, as_json)
 
 
 def _print(reported: dict[str, Any], lines: list[str], as_json: bool) -> None:

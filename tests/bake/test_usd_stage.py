@@ -1,0 +1,154 @@
+"""USD stages: what OpenUSD reads in them, and what its checker says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import translucent as tl
+from tests.command_line import Run, one_error_line
+from translucent.materials.usd import read_usda
+
+pxr = pytest.importorskip("pxr", reason="the usd-core package is absent")
+from pxr import Usd, UsdGeom, UsdShade, UsdUtils  # type: ignore[import-untyped, unused-ignore]  # noqa: E402
+
+NODE = "ND_open_pbr_surface_surfaceshader"
+JADE = tl.Medium(absorption=(30, 10, 20), scattering=(200, 250, 220), anisotropy=0.3, ior=1.6)
+
+
+def box(name: str = "box", uv: bool = False) -> tl.Mesh:
+    made = trimesh.creation.box((0.02, 0.03, 0.04))
+    vertices = np.array(made.vertices)
+    return tl.Mesh(vertices, made.faces, uv=vertices[:, :2] + 0.5 if uv else None, name=name)
+
+
+def scene_of(*objects: tl.Object) -> tl.Scene:
+    return tl.Scene(objects, tl.Camera.look_at((0, 0, 1), (0, 0, 0)))
+
+
+def complaints(path: Path) -> list[str]:
+    """What usdchecker says: by validators, or by the class that they have replaced."""
+    if hasattr(UsdUtils, "ComplianceChecker"):
+        checker = UsdUtils.ComplianceChecker(arkit=False, skipARKitRootLayerCheck=True)
+        checker.CheckCompliance(str(path))
+        return [*checker.GetErrors(), *checker.GetFailedChecks(), *checker.GetWarnings()]
+    from pxr import UsdValidation  # type: ignore[import-untyped, unused-ignore]
+
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    assert len(validators) > 10
+    stage = Usd.Stage.Open(str(path))
+    found = UsdValidation.ValidationContext(validators).Validate(stage)
+    texts = [f"{one.GetName()}: {one.GetMessage()}" for one in found]
+    # The package has no definitions of MaterialX, which another test holds against those of MaterialX.
+    return [text for text in texts if not (NODE in text and text.startswith("MissingShaderIdInRegistry"))]
+
+
+def surface(prim: Usd.Prim) -> UsdShade.Shader:
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+    return material.ComputeSurfaceSource("mtlx")[0]
+
+
+@pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usd"])
+def test_openusd_reads_meshes_materials_and_thickness(suffix: str, tmp_path: Path) -> None:
+    matrix = np.array([[0.0, -2, 0, 0.1], [1, 0, 0, 0.2], [0, 0, -1, 0.3], [0, 0, 0, 1]])
+    mesh, rock = box("a box.obj", uv=True), box("a box")
+    scene = scene_of(
+        tl.Object(mesh, JADE, matrix, surface=tl.Surface(roughness=0.2)),
+        tl.Object(rock, surface=tl.Surface(color=(0.5, 0.25, 0.125), metallic=1.0, ior=1.0)),
+    )
+    baked = tl.bake_vertex_thickness(mesh, rays=4)
+    path = tl.write_usd(scene, tmp_path / f"stage{suffix}", [baked])
+    assert complaints(path) == []
+    stage = Usd.Stage.Open(str(path))
+    assert (UsdGeom.GetStageMetersPerUnit(stage), UsdGeom.GetStageUpAxis(stage)) == (1.0, "Y")
+    assert stage.GetDefaultPrim().GetPath() == "/World"
+    first, second = (UsdGeom.Mesh(stage.GetPrimAtPath(f"/World/{name}")) for name in ("a_box", "a_box_"))
+    primvars = UsdGeom.PrimvarsAPI(first)
+    thickness = primvars.GetPrimvar("thickness")
+    assert thickness.GetInterpolation() == "vertex"
+    np.testing.assert_array_equal(thickness.Get(), baked.values)
+    np.testing.assert_allclose(primvars.GetPrimvar("st").Get(), mesh.uv, rtol=1e-6)  # type: ignore[arg-type]
+    assert not UsdGeom.PrimvarsAPI(second).HasPrimvar("thickness")
+    # Where the scene has it: rows of USD are columns here.
+    to_world = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(first.GetPrim()))
+    points = np.column_stack([np.array(first.GetPointsAttr().Get()), np.ones(len(mesh.vertices))]) @ to_world
+    np.testing.assert_allclose(points[:, :3], mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], atol=1e-7)
+    normals = np.array(first.GetNormalsAttr().Get()).reshape(-1, 3, 3)
+    np.testing.assert_allclose(normals, np.repeat(mesh.face_normals[:, None], 3, axis=1), atol=1e-6)
+    stated = {one.GetBaseName(): one.Get() for one in surface(second.GetPrim()).GetInputs()}
+    assert stated["base_color"] == pytest.approx((0.5, 0.25, 0.125))
+    assert stated["base_metalness"] == 1.0
+    if suffix == ".usda":  # by our own reader, too
+        found = read_usda(path.read_text())
+        np.testing.assert_allclose(found.extinction, JADE.extinction, rtol=1e-5)
+        np.testing.assert_allclose(found.scattering, JADE.scattering, rtol=1e-5)
+
+
+def test_inputs_are_those_of_the_definition_in_materialx(tmp_path: Path) -> None:
+    mx = pytest.importorskip("MaterialX", reason="the MaterialX package is absent")
+    library = mx.createDocument()
+    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), mx.getDefaultDataSearchPath(), library)
+    definition = library.getNodeDef(NODE)
+    sheet = tl.Object(box("pane"), tl.Medium(ior=1.5), sheet_thickness=1e-3)
+    scene = scene_of(tl.Object(box(), JADE), sheet, tl.Object(box("rock")))
+    stage = Usd.Stage.Open(str(tl.write_usd(scene, tmp_path / "stage.usda")))
+    types = {"float": "float", "color3f": "color3", "bool": "boolean"}
+    for name in ("box", "pane", "rock"):
+        shader = surface(stage.GetPrimAtPath(f"/World/{name}"))
+        assert shader.GetIdAttr().Get() == NODE
+        for one in shader.GetInputs():
+            expected = definition.getActiveInput(one.GetBaseName())
+            assert expected is not None, one.GetBaseName()
+            assert types[str(one.GetTypeName())] == expected.getType()
+    assert surface(stage.GetPrimAtPath("/World/pane")).GetInput("geometry_thin_walled").Get()
+
+
+def test_a_mesh_that_is_inside_out_is_left_handed(tmp_path: Path) -> None:
+    made = box()
+    mesh = tl.Mesh(made.vertices, made.faces[:, ::-1])
+    path = tl.write_usd(scene_of(tl.Object(mesh, JADE)), tmp_path / "stage.usda")
+    stage = Usd.Stage.Open(str(path))
+    found = UsdGeom.Mesh(stage.GetPrimAtPath("/World/mesh"))
+    assert found.GetOrientationAttr().Get() == "leftHanded"
+    # Normals look outwards.
+    normals = np.array(found.GetNormalsAttr().Get())
+    assert (np.einsum("ij,ij->i", normals, mesh.vertices[mesh.faces].reshape(-1, 3)) > 0).all()
+
+
+def test_the_command_bakes_into_a_stage(run: Run, tmp_path: Path) -> None:
+    done = run("bake", "sphere", "--usd", tmp_path / "ball.usda", "--preset", "jade", "--mode", "normal", "--json")
+    assert done.code == 0, done.err
+    (mesh,) = json.loads(done.out)["meshes"]
+    assert complaints(tmp_path / "ball.usda") == []
+    stage = Usd.Stage.Open(str(tmp_path / "ball.usda"))
+    values = np.array(UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/World/sphere")).GetPrimvar("thickness").Get())
+    assert (values.min(), values.max()) == (mesh["min"], mesh["max"])
+    np.testing.assert_allclose(values, 0.04, rtol=2e-3)  # the diameter, but for facets
+    assert surface(stage.GetPrimAtPath("/World/sphere")).GetInput("specular_ior").Get() == pytest.approx(1.6)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["--usd", "ball.obj"], "suffix '.obj'; use .usda, .usdc, .usd"),
+        (["--usd", "ball.usda", "-o", "ball.exr"], "--output is given, too"),
+        (["--usd", "ball.usda", "--size", "64"], "--size is given, too"),
+        (["--usd", "no/ball.usda"], "no"),
+    ],
+)
+def test_what_a_stage_cannot_be_is_refused(more: list[str], message: str, run: Run, tmp_path: Path) -> None:
+    done = run("bake", "sphere", *(tmp_path / word if "ball" in word else word for word in more))
+    assert message in one_error_line(done)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_not_written_is_named(tmp_path: Path) -> None:
+    item = tl.Object(box(), JADE, surface=tl.Surface(clearcoat=0.5))
+    with pytest.warns(tl.TranslucentWarning, match=r"'box': clearcoat of surfaces, which are not written"):
+        tl.write_usd(scene_of(item), tmp_path / "stage.usda")
+    with pytest.raises(tl.InputError, match=r"no object of the scene has this mesh"):
+        tl.write_usd(scene_of(item), tmp_path / "stage.usda", [tl.bake_vertex_thickness(box(), rays=2)])
