@@ -43,12 +43,7 @@ def main(arguments: list[str] | None = None) -> int:
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         command = context.command_path if context else "translucent"
-        message = (
-            _below_zero(error, given)
-            or _two_words(given)
-            or _dashed_file(error, given)
-            or error.format_message().rstrip(".")
-        )
+        message = _below_zero(error, given) or _dashed_file(error, given) or error.format_message().rstrip(".")
         return _failed(f"{message}{_quoting(error)}; see '{command} --help'", 2)
     except TranslucentError as error:
         if "--debug" in given:
@@ -68,6 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _require_values(given: list[str]) -> None:
     """Raise where an option that takes a value stands before another option: that would be taken for the value."""
+    _refuse_two_words(given)
     verb = cli.commands.get(given[0]) if given else None
     if verb is None or isinstance(verb, click.Group):
         return
@@ -83,14 +79,14 @@ def _require_values(given: list[str]) -> None:
             raise InputError(word, f"the next word is the option {after}", f"give {word} a value before it")
 
 
-def _two_words(given: list[str]) -> str | None:
-    """The message for a length in two words, as ``1 cm``."""
+def _refuse_two_words(given: list[str]) -> None:
+    """Raise where a length is in two words, as ``1 cm``: the second would be taken for a model."""
     from translucent.units import METRES_PER_UNIT
 
     for option, number, unit in zip(given, given[1:], given[2:], strict=False):
-        if option.startswith("--") and re.fullmatch(r"[\d.]+", number) and unit in METRES_PER_UNIT:
-            return f"{option} {number} {unit}; two words; write {number}{unit}"
-    return None
+        is_length = re.fullmatch(r"[\d.]+", number) and unit in METRES_PER_UNIT and not os.path.exists(unit)
+        if option.startswith("--") and is_length:
+            raise InputError(f"{option} {number} {unit}", "two words", f"write {number}{unit}")
 
 
 def _out_of_memory(error: Exception) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from translucent import reference
 from translucent.bench.contenders import Effect
 from translucent.bench.drawing import Size
+from translucent.bench.record import MODEL_CASE
 from translucent.bench.shapes import lens_row, lying_torus, menger_sponge, nested_shells, placed, subdivided, toolkit
 from translucent.errors import InputError, printable
 from translucent.geometry.mesh import Mesh
@@ -392,7 +393,7 @@ def model_cases(scenes: Mapping[str, Scene]) -> list[Case]:
         why, bare = "a model of yours", [_without_interface(item) for item in scene.objects]
         if any(item is not own for item, own in zip(bare, scene.objects, strict=True)):
             why, scene = f"{why}, without its interfaces", dataclasses.replace(scene, objects=bare)
-        found.append(Case(f"model {title}", title, why, partial(_solid, title, scene), effect_of(scene)))
+        found.append(Case(f"{MODEL_CASE}{title}", title, why, partial(_solid, title, scene), effect_of(scene)))
     return found
 
 

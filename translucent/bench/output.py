@@ -31,7 +31,7 @@ from translucent.bench.judgement import (
     visibility_words,
 )
 from translucent.bench.plots import AXES, UNITS, pareto_svg, plotted, scaling_groups, scaling_svg, shadow_plots
-from translucent.bench.record import CaseRecord, MethodRow, Report, ReportPicture, Shadows, Slab, TimedRow
+from translucent.bench.record import MODEL_CASE, CaseRecord, MethodRow, Report, ReportPicture, Shadows, Slab, TimedRow
 from translucent.errors import RenderError
 from translucent.files.paths import csv_text, made_folder, require_folder, write_text_atomically
 from translucent.files.reading import read_text
@@ -266,7 +266,8 @@ def build_page(report: Report) -> str:
     figures.require_packages()
     from markupsafe import Markup
 
-    cases = [_case(case, f"{n}-{_identifier(case.name)}") for n, case in enumerate(report.cases, start=1)]
+    ordered = sorted(report.cases, key=lambda case: not case.name.startswith(MODEL_CASE))  # the user's come first
+    cases = [_case(case, f"{n}-{_identifier(case.name)}") for n, case in enumerate(ordered, start=1)]
     text: str = (
         _environment()
         .get_template("page.html.j2")

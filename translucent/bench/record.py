@@ -27,6 +27,9 @@ RowKind = Literal["floor", "method", "counter-example", "cpu"]
 #: Parts of a report that can be measured by themselves.
 Part = Literal["scenes", "scaling", "slabs", "shadows", "hard-cases"]
 
+#: Prefix of the names of cases from users' models.
+MODEL_CASE = "model "
+
 #: Approximations of a slab; "planned" is the one that the planner picks.
 SlabModel = Literal["diffusion", "layer", "planned"]
 

@@ -94,7 +94,7 @@ class BakeOptions:
 
     output: Path | None = option(
         names=("-o", "--output"),
-        help="A .exr, .png, .npy, .npz, .glb or .ply file; with <UDIM> in its name, a file for each tile.",
+        help="A .exr, .png, .npy, .npz, .glb or .ply file; name.<UDIM>.png: all tiles.",
     )
     mode: str = option(
         "cone",

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from translucent.bench.record import CaseRecord, Part, Report, ShadowCase
     from translucent.media.medium import Medium
 
-#: Prefix of the names of cases from users' models.
-MODEL_CASE = "model "
-
 
 @dataclass(frozen=True, kw_only=True)
 class ReportOptions:
@@ -262,6 +259,8 @@ def _echo_visibility(answer: dict[str, Any]) -> None:
 
 
 def _echo(made: Report, files: list[Path], changes: Any, agreed: Agreement | None) -> None:
+    from translucent.bench.record import MODEL_CASE
+
     echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
     if made.cases:
         echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10} {'p99.9':>8}")
