@@ -5,15 +5,16 @@ import {
   FloatType,
   HalfFloatType,
   NearestFilter,
+  Node,
   NodeUpdateType,
   OrthographicCamera,
   QuadMesh,
+  REVISION,
   RGBAFormat,
   RGFormat,
   RenderTarget,
   RendererUtils,
   Scene,
-  TempNode,
   Vector2,
   Vector3,
   Vector4,
@@ -40,6 +41,9 @@ export interface ThicknessNodeOptions extends ThicknessOptions {
   precision?: NodePrecision;
 }
 
+/** Revision of three from which on it was tried. */
+const OLDEST = 185;
+
 const PRECISIONS: NodePrecision[] = ["float32", "fixed28"];
 
 /**
@@ -47,7 +51,7 @@ const PRECISIONS: NodePrecision[] = ["float32", "fixed28"];
  * trusted (b), 1 if a body is there (a), at the pixel that is drawn. Its passes run before each picture that a material
  * with this node is part of; `measure(renderer, scene, camera)` runs them without one.
  */
-export class ThicknessNode extends TempNode {
+export class ThicknessNode extends Node {
   static get type(): string {
     return "ThicknessNode";
   }
@@ -92,6 +96,9 @@ export class ThicknessNode extends TempNode {
   constructor(options: ThicknessNodeOptions = {}) {
     super("vec4");
     checkOptions(options, "ThicknessNode", PRECISIONS);
+    if (parseInt(REVISION) < OLDEST) {
+      throw new TranslucentError("ThicknessNode", `this is three r${REVISION}, whose nodes make other WGSL of it`, `use three 0.${OLDEST} or newer`);
+    }
     this.options = options;
     this.updateBeforeType = NodeUpdateType.RENDER;
     this.stage.matrixWorldAutoUpdate = false;
