@@ -13,9 +13,9 @@ from translucent.geometry.solids import Box, Sphere, SphericalShell
 from translucent.reference import slabs
 
 
-@pytest.mark.parametrize("resolution", [12, 13, 14])
+@pytest.mark.parametrize("resolution", [13, 14, 15])
 def test_walls_of_few_cells_are_slabs(resolution: int) -> None:
-    """1.9, 2 and 2.2 cells thick, against layers that are added and doubled: R and T of three optical depths."""
+    """2, 2.2 and 2.4 cells thick, against layers that are added and doubled: R and T of three optical depths."""
     depths = np.array([2.0, 4.0, 8.0])
     slab = grid_of(Box((-4, -0.5, -4), (4, 0.5, 4)).tessellate(), resolution)
     top, middle = slab.face_normals[:, 1] > 0.9, np.abs(slab.points[:, [0, 2]]).max(axis=1) < 1
