@@ -21,6 +21,7 @@ from translucent.formulas.diffuse_interface import (
 )
 from translucent.formulas.diffusion import emergent_radiance
 from translucent.formulas.phase import HenyeyGreenstein
+from translucent.reference.microfacets import scattered_at_interface
 
 Array = npt.NDArray[np.float64]
 
@@ -79,54 +80,28 @@ def test_without_losses_all_that_the_body_loses_leaves(ior: float) -> None:
     assert diffuse_interface(ior).exit_share == pytest.approx(diffuse_interface(ior).conductance, rel=1e-14)
 
 
-def rough_shares(ior: float, alpha: float, power: int) -> Array:
-    """Reflected and transmitted share by integration over angles of view and microfacets (Walter et al. 2007).
+@pytest.mark.parametrize("ior", [1.33, 1.5])
+@pytest.mark.parametrize("roughness", [0.3, 0.5, 0.7])
+def test_rough_interfaces_lose_no_light(ior: float, roughness: float, rng: np.random.Generator) -> None:
+    """Against random walks among their microfacets, which lose none: measured 0.4 % off, at a roughness of .7 1.5 %.
 
-    Facets in equal parts of D(m) cos(m), which integrates to 1; what each reflects or lets through of the light on it
-    is F (i.m) / (cos i cos m), times the shadowing of Smith that both directions share.
+    Where light that microfacets block was lost, it was 3 % of what comes from outside at .5, and 13 % of the rest.
     """
-    count = 48
-    # u = v (2 - v), by which facets along the surface, of which few cover much, are finely divided.
-    v = (np.arange(count) + 0.5) / count
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    cosine, weight = 0.5 * (nodes + 1), 0.5 * weights * power * (0.5 * (nodes + 1)) ** (power - 1)
-    mu, u, turn = np.meshgrid(cosine, v * (2 - v), 2 * math.pi * v, indexing="ij")
-    tangent = alpha * np.sqrt(u / (1 - u))
-    facet = 1 / np.sqrt(1 + tangent**2)
-    on_facet = np.sqrt(1 - mu**2) * tangent * facet * np.cos(turn) + mu * facet
-    lit = on_facet > 0
-    c = np.where(lit, on_facet, 1.0)
-    fresnel = optics.fresnel_dielectric(c, ior)
-    back = 2 * c * facet - mu
-    bent = np.sqrt(np.maximum(1 - (1 - c * c) / ior**2, 0.0))
-    on = (mu - c * facet) / ior + bent * facet
-
-    def shadowing(out: Array) -> Array:
-        def smith(x: Array) -> Array:
-            return 0.5 * (np.sqrt(1 + alpha**2 * (1 - x * x) / (x * x)) - 1)
-
-        return np.where(out > 1e-9, 1 / (1 + smith(mu) + smith(np.maximum(out, 1e-9))), 0.0)
-
-    met = np.where(lit, c / (mu * facet), 0.0)
-    shares = [fresnel * met * shadowing(back), (1 - fresnel) * met * shadowing(on)]
-    each = weight[:, None, None] * (2 * (1 - v))[:, None] / count**2
-    return np.array([(each * share).sum() for share in shares])
-
-
-@pytest.mark.parametrize("ior", [1.33, 1.5, 2.4])
-@pytest.mark.parametrize("roughness", [0.3, 0.6, 1.0])
-def test_rough_interfaces_share_light_as_their_microfacets_do(ior: float, roughness: float) -> None:
-    found, alpha = diffuse_interface(ior, roughness), roughness**2
-    outside, inside, flux = (
-        rough_shares(relative, alpha, power) for relative, power in ((ior, 2), (1 / ior, 2), (1 / ior, 3))
-    )
-    # A lattice of facets is no worse than the standard error of as many draws, of shares from 0 to 1.
-    noise = 0.5 / math.sqrt(FACETS)
-    assert found.entering == pytest.approx(outside[1], abs=noise)
-    assert (found.reflected, found.leaving) == pytest.approx(tuple(inside), abs=noise)
-    assert (found.reflected_flux, found.leaving_flux) == pytest.approx(tuple(flux), abs=noise)
-    assert found.reflected + found.leaving <= 1.0
-    assert found.exit_share <= found.conductance
+    found = diffuse_interface(ior, roughness)
+    for relative, power, share in (
+        (ior, 2, found.entering),
+        (1 / ior, 2, found.leaving),
+        (1 / ior, 3, found.leaving_flux),
+    ):
+        cosine = rng.random(30000) ** (1 / power)
+        rays = np.stack([np.sqrt(1 - cosine**2), np.zeros_like(cosine), -cosine], axis=1)
+        count = len(rays)
+        up, iors, alpha = np.tile([0.0, 0.0, 1.0], (count, 1)), np.full(count, relative), np.full(count, roughness**2)
+        passed = scattered_at_interface(rays, up, iors, alpha, rng)[1].mean()
+        assert share == pytest.approx(passed, abs=0.02)
+    assert found.reflected + found.leaving == pytest.approx(1.0)
+    assert found.leaving * ior**2 == pytest.approx(found.entering)
+    assert found.exit_share == pytest.approx(found.conductance)
 
 
 @pytest.mark.parametrize("ior", [1.33, 1.5, 2.4])

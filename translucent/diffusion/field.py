@@ -305,6 +305,8 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     volume = lit.shape.sides.volume(values.astype(np.float32), deep.astype(np.float32))
     inclusions = None if grid.inclusions is None else lit.shape.on_inclusions(found.at_inclusions)
     cosine = emergent_cosine(float(albedo.mean()), medium.ior)
+    # Light leaves as through a polished interface, and more of it through a rough one.
+    fluxes = [interface.entering / polished.entering * flux for flux in emergent_fluxes(medium.ior, cosine)]
     ahead = np.asarray(medium.scattering) * max(medium.anisotropy, 0.0)
     # Of diffuse light, four times the volume over the area.
     chord = 2.0 * lit.casters.body.mean_thickness * float(np.average(lit.shape.densities.cells, weights=grid.volumes))
@@ -320,7 +322,7 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
         conductance=interface.conductance,
         exit_share=interface.exit_share,
         mean_cosine=cosine,
-        fluxes=emergent_fluxes(medium.ior, cosine),
+        fluxes=(fluxes[0], fluxes[1], fluxes[2], fluxes[3]),
         leaving=found.leaving,
         steps=found.steps,
         cells=grid.count,
