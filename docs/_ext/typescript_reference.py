@@ -36,6 +36,7 @@ ABSENT = "This site was built without npm. `make web`, then `make docs`, writes 
 def as_section(text: str, entry: str) -> str:
     """Text of TypeDoc for the middle of a page: without its title, and with code in place of links to deep headings."""
     body = re.sub(r"\A# .*\n", "", text)
+    body = re.sub(r"^## References\n.*?(?=^## |\Z)", "", body, flags=re.M | re.S)  # to what other entries have
     body = re.sub(r"^## (.+)$", lambda found: f"## {found[1]} of `{entry}`", body, flags=re.M)
     return re.sub(r"\[(`[^`]+`)\]\([^)]*#[^)]*\)", r"\1", body)
 

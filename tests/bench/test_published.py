@@ -130,8 +130,9 @@ def test_the_reference_of_the_web_module_has_no_links_to_headings_that_are_too_d
     written = (
         "# name\n\n## Classes\n\n[`Pass`](#pass) takes [three](https://threejs.org) and [`Pass[]`](index.md#pass-2).\n"
     )
+    written += "\n## References\n\nRe-exports [Pass](index.md#pass)\n"
     page = extension("typescript_reference").as_section(written, "translucent-three")
-    assert page == "\n## Classes of `translucent-three`\n\n`Pass` takes [three](https://threejs.org) and `Pass[]`.\n"
+    assert page == "\n## Classes of `translucent-three`\n\n`Pass` takes [three](https://threejs.org) and `Pass[]`.\n\n"
 
 
 def test_pages_include_what_is_written() -> None:
