@@ -15,11 +15,13 @@ def register() -> None:
     """Make the operators, the panel and the preferences known."""
     for one in _CLASSES:
         bpy.utils.register_class(one)
+    bpy.types.Scene.translucent = bpy.props.PointerProperty(type=baking.TRANSLUCENT_PG_bake)
 
 
 def unregister() -> None:
     """Stop what runs, and take all of it back."""
     toolkit.stop_all()
     material.forget_pictures()
+    del bpy.types.Scene.translucent
     for one in reversed(_CLASSES):
         bpy.utils.unregister_class(one)

@@ -189,7 +189,21 @@ def _show_in_material(name: str, image: bpy.types.Image) -> None:
     node.location.x = min((other.location.x for other in nodes if other != node), default=0.0) - 300.0
 
 
-class TRANSLUCENT_OT_bake_thickness(RunsWork, bpy.types.Operator):
+class BakeSettings:
+    """Settings of a bake, which the scene keeps for the panel, and the operator takes."""
+
+    mode: bpy.props.EnumProperty(name="Thickness", items=_MODES, default="cone")
+    size: bpy.props.IntProperty(name="Size", description="Texels along each side", default=1024, min=1, max=16384)
+    padding: bpy.props.IntProperty(name="Margin", description="Texels around each UV island", default=16, min=0)
+    rays: bpy.props.IntProperty(name="Rays", description="From each texel or vertex", default=64, min=2, max=65536)
+    attribute: bpy.props.StringProperty(name="Attribute", description="Of vertices", default="thickness")
+
+
+class TRANSLUCENT_PG_bake(BakeSettings, bpy.types.PropertyGroup):
+    """Settings of the next bake."""
+
+
+class TRANSLUCENT_OT_bake_thickness(RunsWork, BakeSettings, bpy.types.Operator):
     """Bake the thickness of the selected objects in metres, with modifiers, scale and units of the scene applied."""
 
     bl_idname = "translucent.bake_thickness"
@@ -198,11 +212,6 @@ class TRANSLUCENT_OT_bake_thickness(RunsWork, bpy.types.Operator):
     doing = "Baking thickness"
 
     target: bpy.props.EnumProperty(name="Into", items=_TARGETS, default="IMAGE")
-    mode: bpy.props.EnumProperty(name="Thickness", items=_MODES, default="cone")
-    size: bpy.props.IntProperty(name="Size", description="Texels along each side", default=1024, min=1, max=16384)
-    rays: bpy.props.IntProperty(name="Rays", description="From each texel or vertex", default=64, min=2, max=65536)
-    padding: bpy.props.IntProperty(name="Margin", description="Texels around each UV island", default=16, min=0)
-    attribute: bpy.props.StringProperty(name="Attribute", default="thickness")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -218,4 +227,4 @@ class TRANSLUCENT_OT_bake_thickness(RunsWork, bpy.types.Operator):
         return Baking(context, self.target, self.attribute, settings)
 
 
-CLASSES = (TRANSLUCENT_OT_bake_thickness,)
+CLASSES = (TRANSLUCENT_PG_bake, TRANSLUCENT_OT_bake_thickness)

@@ -146,6 +146,12 @@ def test_a_mirrored_part_of_a_scene_has_a_positive_volume() -> None:
     assert tl.load_mesh(scene).volume == pytest.approx(3.0)
 
 
+def test_trimesh_shows_meshes_and_scenes_by_it(ball: trimesh.Trimesh) -> None:
+    for thing in (ball, trimesh.Scene([ball])):
+        with pytest.raises(tl.InputError, match=r"preset 'jaded'"):
+            thing.show(viewer=tl.show, material="jaded")
+
+
 # Refused
 
 

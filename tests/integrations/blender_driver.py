@@ -370,7 +370,38 @@ def checked() -> list[Any]:
     return [sorted(empty), nothing, sorted(done), bpy.data.texts["Material check"].as_string()]
 
 
+class Layout:
+    """What a panel draws into: its settings, and its buttons with what they pass on."""
+
+    def __init__(self) -> None:
+        self.drawn: list[Any] = []
+
+    def column(self) -> Layout:
+        return self
+
+    def separator(self) -> None:
+        pass
+
+    def prop(self, settings: Any, name: str) -> None:
+        self.drawn.append([name, getattr(settings, name)])
+
+    def operator(self, name: str, **_: Any) -> SimpleNamespace:
+        self.drawn.append(SimpleNamespace(name=name))
+        return self.drawn[-1]  # type: ignore[no-any-return]
+
+
+@step
+def panel() -> list[Any]:
+    bpy.context.scene.translucent.size = 32
+    layout = Layout()
+    importlib.import_module(f"{MODULE}.panel").TRANSLUCENT_PT_panel.draw(SimpleNamespace(layout=layout), bpy.context)
+    bpy.context.scene.translucent.size = 1024
+    return [one if isinstance(one, list) else vars(one) for one in layout.drawn]
+
+
 addon_utils.disable(MODULE, default_set=True)
-results["left"] = [name for name in dir(bpy.types) if name.startswith("TRANSLUCENT")] + [str(len(toolkit._running))]
+results["left"] = [name for name in dir(bpy.types) if name.startswith("TRANSLUCENT")]
+results["left"] += ["scene"] * hasattr(bpy.types.Scene, "translucent")
+results["left"] += [str(len(toolkit._running))]
 np.savez(FOLDER / "arrays.npz", **arrays)
 (FOLDER / "result.json").write_text(json.dumps(results, default=sorted))

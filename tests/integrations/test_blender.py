@@ -301,6 +301,15 @@ def test_a_window_shows_progress_and_a_cancel_changes_nothing(done: Done) -> Non
     assert last == "Baking thickness was cancelled; nothing has changed"
 
 
+def test_the_panel_hands_its_settings_to_both_bakes(done: Done) -> None:
+    material, *settings, images, vertices, check = done.result["panel"]
+    assert [material["name"], check["name"]] == ["translucent.material", "translucent.check_materials"]
+    expected = {"mode": "cone", "size": 32, "padding": 16, "rays": 64, "attribute": "thickness"}
+    assert dict(settings) == expected
+    for button, target in ((images, "IMAGE"), (vertices, "ATTRIBUTE")):
+        assert button == {"name": "translucent.bake_thickness", "target": target, **expected}
+
+
 # Materials
 
 
