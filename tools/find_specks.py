@@ -1,0 +1,112 @@
+"""Specks in pictures of media: isolated pixels far off their neighbors, over presets, meshes and stages.
+
+    python tools/find_specks.py --presets jade,soap --meshes cube,spike --out out/specks
+
+A pixel is a speck if it is farther from the median of its eight neighbors than four times their spread, and no
+neighbor is off to the same side: lines and edges are none. Prints a row for each picture with specks, and writes the
+pictures in which they are, marked.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import binary_erosion
+
+import translucent as tl
+from translucent.assets import mesh_path
+from translucent.geometry.solids import Box, Sphere, revolve
+from translucent.scene.showcase import showcase
+
+Array = npt.NDArray[np.float64]
+
+#: Spreads by which a pixel is off, the least spread as a fraction of the median, and pixels left out at silhouettes.
+MOST, LEAST_SPREAD, RIM = 4.0, 0.02, 3
+
+#: Normalisation of the median absolute deviation to a standard deviation.
+_NORMAL = 1.4826
+
+
+def specks(radiance: Array, inside: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """(h, w): isolated pixels of a picture (h, w, 3), of those `inside` (h, w) a silhouette."""
+    light = radiance.mean(axis=-1)
+    shifts = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
+    around = np.stack([np.roll(light, shift, (0, 1)) for shift in shifts])
+    median = np.median(around, axis=0)
+    spread = _NORMAL * np.median(np.abs(around - median), axis=0)
+    off = (light - median) / np.maximum(spread, LEAST_SPREAD * np.abs(median) + np.finfo(np.float64).tiny)
+    found = (np.abs(off) > MOST) & binary_erosion(inside, iterations=RIM)
+    sign = np.where(np.abs(off) > 0.5 * MOST, np.sign(off), 0.0)
+    alike = np.stack([np.roll(sign, shift, (0, 1)) for shift in shifts]) == np.sign(off)
+    return np.asarray(found & ~alike.any(axis=0))
+
+
+def _spike() -> tl.Mesh:
+    """A ball with a tail that ends in a point."""
+    angle = np.linspace(0.0, 0.85 * np.pi, 40)
+    ball = np.stack([np.sin(angle), -np.cos(angle)], axis=1)
+    along = np.linspace(0.05, 1.0, 40)[:, None]
+    tail = ball[-1] + along * (np.array([0.0, 4.0]) - ball[-1])
+    tail[:, 0] = ball[-1, 0] * (1.0 - along[:, 0]) ** 1.5
+    profile = np.concatenate([ball, tail])
+    profile[0, 0] = profile[-1, 0] = 0.0
+    return tl.Mesh(*revolve(profile, 64))
+
+
+def _fine() -> tl.Mesh:
+    """The bear with four times as many triangles: 90,000."""
+    import trimesh
+
+    bear = tl.load_mesh(mesh_path("bear"))
+    return tl.Mesh(*trimesh.remesh.subdivide(bear.vertices, bear.faces))
+
+
+MESHES: dict[str, Callable[[], tl.Mesh]] = {
+    "smooth": lambda: Sphere().tessellate(48),
+    "cube": lambda: Box().tessellate(),
+    "thin": lambda: Box((-1, -0.03, -0.7), (1, 0.03, 0.7)).tessellate(),
+    "spike": _spike,
+    "hollow": lambda: tl.load_mesh(mesh_path("shell")),
+    "coarse": lambda: Sphere().tessellate(30),
+    "fine": _fine,
+}
+
+
+def main() -> None:
+    """Render, and count."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--presets", default=",".join(tl.presets()))
+    parser.add_argument("--meshes", default=",".join(MESHES))
+    parser.add_argument("--stages", default="none")
+    parser.add_argument("--width", type=int, default=160)
+    parser.add_argument("--samples", type=int, default=16)
+    parser.add_argument("--size", type=float, default=0.06, help="longest side of the bodies in metres")
+    parser.add_argument("--out", type=Path, default=None, help="folder for pictures with specks")
+    options = parser.parse_args()
+    size, total = (options.width, options.width * 3 // 4), 0
+    with tl.Renderer() as renderer:
+        for shape in options.meshes.split(","):
+            mesh = MESHES[shape]()
+            extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
+            mesh = tl.Mesh(mesh.vertices * (options.size / extent), mesh.faces)
+            for stage in options.stages.split(","):
+                for name in options.presets.split(","):
+                    scene = showcase(mesh, tl.preset(name), size, stage=None if stage == "none" else stage)
+                    frame = renderer.render(scene, size, samples=options.samples)
+                    found = specks(np.asarray(frame.radiance, np.float64), np.asarray(frame.coverage))
+                    total += int(found.sum())
+                    if found.any():
+                        row, column = np.argwhere(found)[0]
+                        print(f"{shape} {stage} {name}: {found.sum()} specks, the first at {column}, {row}", flush=True)
+                        if options.out is not None:
+                            options.out.mkdir(parents=True, exist_ok=True)
+                            frame.save(options.out / f"{shape}-{stage}-{name}.png")
+    print(f"{total} specks in all")
+
+
+if __name__ == "__main__":
+    main()
