@@ -106,8 +106,7 @@ def test_a_bent_ray_does_not_fill_the_gap_of_a_hollow_body(three_page: WebPage) 
     medium = tl.Medium.from_color(COLOR, distance=distance, ior=1.5)
     rows = np.where(np.arange(64) < 32, 1.0, 0.5)[:, None, None] * np.ones((1, 128, 3))
     scene = tl.Scene([tl.Object(goblet, medium=medium)], camera, environment=tl.Environment.image(rows))
-    with tl.Renderer() as renderer:
-        truth = renderer.render(scene, SIZE, samples=1, interfaces=tl.TracedInterfaces(depth=8)).radiance
+    truth = tl.reference.render(scene, SIZE, bounces=8).radiance
     crossed = Truth.of(goblet, camera, SIZE).crossed
     inside = tl.interior(crossed) & (crossed > 0)
     error = np.sqrt(np.mean((drawn - truth)[inside] ** 2)) / truth[inside].mean()
