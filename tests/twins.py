@@ -423,11 +423,6 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
         back, through, mirrored = arguments
         left = np.stack([1.0 - mirrored * (back + through), 1.0 - mirrored * (back - through)])
         allowed = allowed + 4 * eps * (np.abs(exact) / left).sum(axis=0)
-    if name == "emergent_radiance":
-        # Terms of both signs: a few roundings of the largest.
-        fluence, entering, albedo, conductance, mean_cosine, cosine = arguments
-        once = entering / (cosine + mean_cosine)
-        allowed = allowed + 8 * eps * (albedo * (fluence * (1.0 + 3.0 * conductance * cosine) + 3.0 * once) + once)
     if name == "scattered_radiance":
         # Of both signs, too.
         allowed = allowed + 8 * eps * np.abs(arguments[0] * arguments[1]).sum(axis=1)

@@ -4,8 +4,8 @@
 #include "lib/diffusion.glsl"
 #include "shade/diffused_texture.glsl"
 
-// Fluence, and flux that enters, at a point of a surface: of each side as much as the normal looks there.
-void light_at_surface(ObjectRow row, vec3 point, vec3 normal, out vec3 fluence, out vec3 entering) {
+// Fluence, and flux that enters with its mean cosine inside, at a point of a surface: of each side as much as the normal looks there.
+void light_at_surface(ObjectRow row, vec3 point, vec3 normal, out vec3 fluence, out vec4 entering) {
     vec3 texels = vec3(textureSize(diffused_light, 0));
     vec3 place = point - row.grid_low;
     vec3 at = vec3(dot(place, row.grid_x), dot(place, row.grid_y), dot(place, row.grid_z));
@@ -14,12 +14,12 @@ void light_at_surface(ObjectRow row, vec3 point, vec3 normal, out vec3 fluence, 
     float total = dot(towards, towards);
     vec3 part = total > 0.0 ? towards * towards / total : vec3(1.0 / 3.0);
     fluence = vec3(0.0);
-    entering = vec3(0.0);
+    entering = vec4(0.0);
     for (int axis = 0; axis < 3; ++axis) {
         if (part[axis] == 0.0) { continue; }
         vec3 side = vec3(towards[axis] < 0.0 ? row.grid_size.x : 0.0, float(axis) * row.grid_size.y, 0.0);
         fluence += part[axis] * textureLod(diffused_light, (at + side) / texels, 0.0).rgb;
-        entering += part[axis] * textureLod(diffused_light, (at + side + vec3(0.0, 0.0, row.grid_size.z)) / texels, 0.0).rgb;
+        entering += part[axis] * textureLod(diffused_light, (at + side + vec3(0.0, 0.0, row.grid_size.z)) / texels, 0.0);
     }
 }
 
@@ -28,18 +28,18 @@ void light_at_surface(ObjectRow row, vec3 point, vec3 normal, out vec3 fluence, 
 vec3 subsurface_exitance(int object, vec3 point, vec3 normal, float cosine, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
     if (row.diffuses < 0.5) { return vec3(0.0); }
-    vec3 fluence, entering;
+    vec3 fluence;
+    vec4 entering;
     light_at_surface(row, point, normal, fluence, entering);
-    // Light that has entered just now can darken the rest no more than to a fifth: where the two do not fit together, as
-    // beside the edge of a shadow.
-    vec4 fluxes = row.emergent_fluxes;
-    float steady = fluxes.x + row.conductance * fluxes.y;
-    entering = min(entering, 0.8 * steady / fluxes.w * fluence);
-    vec3 emergent = emergent_radiance(fluence, entering, row.albedo, row.conductance, row.mean_cosine, cosine);
+    float m = clamp(entering.a, LEAST_ENTERING_COSINE, 1.0);
+    vec3 emergent = emergent_radiance(fluence, entering.rgb, row.albedo, row.conductance, m, cosine);
     // Scaled so that the flux that leaves is that of the diffusion.
-    vec3 flux = row.albedo * (fluence * steady - entering * fluxes.w) + entering * fluxes.z;
+    vec3 flux = vec3(0.0);
+    for (int i = 0; i < 3; ++i) {
+        flux += row.exit_weights[i] * emergent_radiance(fluence, entering.rgb, row.albedo, row.conductance, m, row.exit_cosines[i]);
+    }
     vec3 scale = row.exit_share * fluence / max(flux, vec3(1e-30));
-    return max(emergent * scale, vec3(0.0)) * opacity((1.0 - row.ahead) * optical_depth) / (4.0 * PI * row.ior * row.ior);
+    return emergent * scale * opacity((1.0 - row.ahead) * optical_depth) / (4.0 * PI * row.ior * row.ior);
 }
 
 // Basic radiance of an opaque surface inside an object, by the light that comes to it there.

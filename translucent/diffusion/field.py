@@ -32,8 +32,8 @@ from translucent.diffusion.photons import EnteringPhotons
 from translucent.diffusion.sides import read_sides
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
-from translucent.formulas.diffuse_interface import diffuse_interface, emergent_cosine, emergent_fluxes
-from translucent.formulas.diffusion import emergent_radiance, in_scattered_shares
+from translucent.formulas.diffuse_interface import diffuse_interface, exit_quadrature
+from translucent.formulas.diffusion import LEAST_COSINE, UNIFORM_COSINE, emergent_radiance, in_scattered_shares
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
 from translucent.scene.lights import DirectionalLight, PositionalLight
@@ -41,10 +41,6 @@ from translucent.scene.scene import Light, Object, Scene
 
 #: Values in cells: (6, x, y, z, 3) for each side of a surface, or (2 x, 3 y, z, 3) beside each other.
 Volume = npt.NDArray[np.float32]
-
-#: Share by which light that has entered just now can darken the rest, at most: where the two do not fit together, as
-#: beside the edge of a shadow.
-FRESH = 0.8
 
 #: Least fraction of the paths through a body on which light counts as scattered: thinner parts hardly scatter.
 LEAST_SCATTERED = 0.02
@@ -62,6 +58,8 @@ class DiffusionField:
     fluence, entering : (6, x, y, z, 3) float32
         Of scattered light below the surface; and flux that enters there times the albedo; for each side, see
         `SurfaceSides`.
+    cosine : (6, x, y, z, 1) float32
+        Mean cosine of that light, inside.
     scattered : (6, x, y, z, 3) float32
         Fraction of the paths through the body, from its surface, on which light is scattered; 1 deep inside.
     inclusions : (x, y, z, 3) float32, optional
@@ -74,10 +72,10 @@ class DiffusionField:
         Side of a cell in metres.
     albedo : (3,) float64
         Of single scattering after similarity: sigma_s' / (sigma_a + sigma_s').
-    conductance, exit_share, mean_cosine : float
+    conductance, exit_share : float
         Of the interface; see `DiffuseInterface`.
-    fluxes : tuple of 4 floats
-        See `emergent_fluxes`.
+    exits : (3,), (3,) float64
+        See `exit_quadrature`; weights are larger where a rough interface lets more through.
     leaving : (s, 3) float64
         Flux that leaves the samples of the surface; see `DiffuseSolution`.
     steps : int
@@ -94,6 +92,7 @@ class DiffusionField:
 
     fluence: Volume
     entering: Volume
+    cosine: Volume
     scattered: Volume
     inclusions: Volume | None
     low: Array
@@ -102,8 +101,7 @@ class DiffusionField:
     albedo: Array
     conductance: float
     exit_share: float
-    mean_cosine: float
-    fluxes: tuple[float, float, float, float]
+    exits: tuple[Array, Array]
     leaving: Array
     steps: int
     cells: int
@@ -119,7 +117,7 @@ class DiffusionField:
         last one is `inclusions`, if there are any.
         """
         with np.errstate(under="ignore"):
-            sides = _beside(self.fluence / self.scattered), _beside(self.entering / self.scattered)
+            sides = _beside(self.fluence / self.scattered), _beside(self._scattered_entering)
         return sides if self.inclusions is None else (*sides, self.inclusions)
 
     def radiance(self, points: Array, normals: Array, cosine: Array) -> Array:
@@ -132,7 +130,8 @@ class DiffusionField:
         cosine : (k,) float64
             Of the directions there, inside.
         """
-        fluence, entering = (self.at_surface(volume, points, normals) for volume in (self.fluence, self.entering))
+        volumes = self.fluence, np.concatenate([self.entering, self.cosine], axis=-1)
+        fluence, entering = (self.at_surface(volume, points, normals) for volume in volumes)
         return self._emergent(fluence, entering, cosine)
 
     def scattered_radiance(self, points: Array, normals: Array, cosine: Array) -> Array:
@@ -141,25 +140,29 @@ class DiffusionField:
         Its file is in ``shaders/shade``. Along a real path the fraction counts that is scattered there.
         """
         with np.errstate(under="ignore"):
-            volumes = self.fluence / self.scattered, self.entering / self.scattered
+            volumes = self.fluence / self.scattered, self._scattered_entering
         fluence, entering = (self.at_surface(volume, points, normals) for volume in volumes)
         return self._emergent(fluence, entering, cosine)
+
+    @property
+    def _scattered_entering(self) -> Volume:
+        """(6, x, y, z, 4): `entering` along paths on which all light is scattered, and `cosine`."""
+        return np.concatenate([self.entering / self.scattered, self.cosine], axis=-1)
 
     def at_surface(self, volume: Volume, points: Array, normals: Array) -> Array:
         """(k, n): values (6, x, y, z, n) of cells at points (k, 3) of the surface with normals (k, 3)."""
         return read_sides(volume, (points - self.low) @ self.turn / self.step, normals @ self.turn)
 
     def _emergent(self, fluence: Array, entering: Array, cosine: Array) -> Array:
-        uniform, rising, fresh, shadowed = self.fluxes
-        steady = uniform + self.conductance * rising
+        mean = np.clip(entering[:, 3:], LEAST_COSINE, 1.0)
+
+        def light(mu: npt.ArrayLike) -> Array:
+            return emergent_radiance(fluence, entering[:, :3], self.albedo, self.conductance, mean, mu)
+
         with np.errstate(under="ignore"):
-            entering = np.minimum(entering, FRESH * steady / shadowed * fluence)
-            light = emergent_radiance(
-                fluence, entering, self.albedo, self.conductance, self.mean_cosine, cosine[:, None]
-            )
-            flux = self.albedo * (fluence * steady - entering * shadowed) + entering * fresh
-            scaled = light * self.exit_share * fluence / np.maximum(flux, 1e-30)
-            return np.asarray(np.maximum(scaled, 0.0) / (4.0 * np.pi * self.ior**2))
+            flux = np.sum([weight * light(mu) for mu, weight in zip(*self.exits, strict=True)], axis=0)
+            scaled = light(cosine[:, None]) * self.exit_share * fluence / np.maximum(flux, 1e-30)
+            return np.asarray(scaled / (4.0 * np.pi * self.ior**2))
 
 
 def _beside(sides: Volume) -> Volume:
@@ -300,29 +303,29 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     albedo = np.where(total > 0.0, reduced / np.where(total > 0.0, total, 1.0), 0.0)
     interface, polished = diffuse_interface(medium.ior, roughness), diffuse_interface(medium.ior)
     scattered = np.maximum(found.scattered, LEAST_SCATTERED)
-    values = np.concatenate([found.fluence, albedo * found.entering, scattered], axis=1)
-    deep = np.concatenate([found.inside, np.zeros_like(found.inside), np.ones_like(found.inside)], axis=1)
+    values = np.concatenate([found.fluence, albedo * found.entering, found.cosine[:, None], scattered], axis=1)
+    uniform = np.full((grid.count, 1), UNIFORM_COSINE)
+    deep = np.concatenate([found.inside, np.zeros_like(found.inside), uniform, np.ones_like(found.inside)], axis=1)
     volume = lit.shape.sides.volume(values.astype(np.float32), deep.astype(np.float32))
     inclusions = None if grid.inclusions is None else lit.shape.on_inclusions(found.at_inclusions)
-    cosine = emergent_cosine(float(albedo.mean()), medium.ior)
     # Light leaves as through a polished interface, and more of it through a rough one.
-    fluxes = [interface.entering / polished.entering * flux for flux in emergent_fluxes(medium.ior, cosine)]
+    cosines, weights = exit_quadrature(medium.ior)
     ahead = np.asarray(medium.scattering) * max(medium.anisotropy, 0.0)
     # Of diffuse light, four times the volume over the area.
     chord = 2.0 * lit.casters.body.mean_thickness * float(np.average(lit.shape.densities.cells, weights=grid.volumes))
     return DiffusionField(
         fluence=np.ascontiguousarray(volume[..., :3]),
         entering=np.ascontiguousarray(volume[..., 3:6]),
+        cosine=np.ascontiguousarray(volume[..., 6:7]),
         inclusions=inclusions,
-        scattered=np.where(volume[..., 6:] > 0.0, volume[..., 6:], np.float32(1.0)),
+        scattered=np.where(volume[..., 7:] > 0.0, volume[..., 7:], np.float32(1.0)),
         low=lit.pose.outwards(grid.cells.low) + lit.pose.shift,
         turn=lit.pose.turn,
         step=grid.cells.step,
         albedo=albedo,
         conductance=interface.conductance,
         exit_share=interface.exit_share,
-        mean_cosine=cosine,
-        fluxes=(fluxes[0], fluxes[1], fluxes[2], fluxes[3]),
+        exits=(cosines, interface.entering / polished.entering * weights),
         leaving=found.leaving,
         steps=found.steps,
         cells=grid.count,

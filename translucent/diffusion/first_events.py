@@ -23,6 +23,7 @@ from translucent.formulas.diffuse_interface import (
     half_space_reflectance,
     half_space_reflectances,
 )
+from translucent.formulas.diffusion import LEAST_COSINE
 from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 
 #: First events below the depth at which the fluence is read, for each sample.
@@ -43,10 +44,6 @@ FLAT = 4.0
 
 #: Reduced albedo below which the reflectance of half-spaces is in proportion to it.
 _LEAST_ALBEDO = 1e-6
-
-#: Least cosine of an entering direction with the surface normal; smaller ones, by smooth normals, are raised to it.
-_LEAST_COSINE = 0.05
-
 
 #: Cosines of light inside with the normal between which what half-spaces reflect of it is interpolated.
 _COSINES = np.linspace(0.0, 1.0, 513)
@@ -220,7 +217,7 @@ def diffuse_paths(grid: BodyGrid, dense: Densities, ior: float) -> EntryPaths:
 
 def entry_paths(ray: EnteringRays, grid: BodyGrid, dense: Densities) -> EntryPaths:
     """Paths of entering rays below the surface."""
-    cosine = np.clip(-(ray.directions * grid.face_normals[ray.samples]).sum(axis=1), _LEAST_COSINE, 1.0)
+    cosine = np.clip(-(ray.directions * grid.face_normals[ray.samples]).sum(axis=1), LEAST_COSINE, 1.0)
     return EntryPaths.of(grid, dense, ray.samples, ray.directions, cosine, diffuse=False)
 
 

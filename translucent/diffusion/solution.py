@@ -38,6 +38,7 @@ from translucent.diffusion.grid import BodyGrid, Densities, even_densities
 from translucent.errors import RenderError
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient, half_space_reflectance
+from translucent.formulas.diffusion import UNIFORM_COSINE
 from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 from translucent.media.medium import Medium
 
@@ -229,6 +230,8 @@ class DiffuseSolution:
         Fluence in the cells.
     at_inclusions : (i, 3) float64
         Irradiance at the samples of opaque inclusions.
+    cosine : (s,) float64
+        Mean cosine of the light that enters, inside; see `emergent_radiance`.
     leaving : (s, 3) float64
         Flux that leaves the samples: what has been in the body, and what its surface mirrors.
     scattered : (s, 3) float64
@@ -241,6 +244,7 @@ class DiffuseSolution:
     entering: Array
     inside: Array
     at_inclusions: Array
+    cosine: Array
     leaving: Array
     scattered: Array
     steps: int
@@ -354,7 +358,21 @@ class BodySystem:
             inclusions[:, channel] = system.at_inclusions(cells[:, channel], flux[:, channel], straight)
             scattered[:, channel] = system.scattered
             steps += taken
-        return DiffuseSolution(fluence, flux, cells, inclusions, leaving, scattered, steps)
+        cosine = _mean_cosine(flux.sum(axis=1), ray.entering.sum(axis=1), path)
+        return DiffuseSolution(fluence, flux, cells, inclusions, cosine, leaving, scattered, steps)
+
+
+def _mean_cosine(flux: Array, directed: Array, path: EntryPaths) -> Array:
+    """(s,): mean cosine of the light that enters, with which 1 / (mu + m) is the mean of all light, at mu = 1/2.
+
+    Of a flux (s,) that enters at the samples, that of paths (k,) has their directions, and the rest is uniform.
+    """
+    rays = np.bincount(path.samples, directed, len(flux))
+    inverse = np.bincount(path.samples, directed / (0.5 + path.cosine), len(flux))
+    rest = np.maximum(flux - rays, 0.0)
+    total = np.maximum(rest + rays, np.finfo(np.float64).tiny)
+    mean = (inverse + rest / (0.5 + UNIFORM_COSINE)) / total
+    return np.where(mean > 0.0, 1.0 / np.where(mean > 0.0, mean, 1.0) - 0.5, UNIFORM_COSINE)
 
 
 @dataclass(frozen=True, eq=False)

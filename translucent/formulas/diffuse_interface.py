@@ -142,28 +142,24 @@ def diffuse_interface(ior: float, roughness: float = 0.0) -> DiffuseInterface:
 
 
 @lru_cache(maxsize=256)
-def emergent_fluxes(ior: float, mean_cosine: float) -> tuple[float, float, float, float]:
-    """Flux outside of each term of `translucent.formulas.diffusion.emergent_radiance`, through a polished interface.
+def exit_quadrature(ior: float) -> tuple[Array, Array]:
+    """Cosines (3,) inside, and weights (3,), that make flux outside of radiance below a polished interface times 4 pi.
 
-    Of w phi, 3 w c phi mu, E / (mu + m) and 3 w E mu^2 / (mu + m), in this order.
+    The Gaussian quadrature for what the interface lets through: exact for polynomials of up to the fifth degree.
     """
     cosine, weight = _nodes(ior)
     passed = 0.5 * cosine * weight * (1.0 - _inside_reflectance(cosine, ior))
-    once = passed / (cosine + mean_cosine)
-    terms = passed, 3.0 * passed * cosine, once, 3.0 * once * cosine**2
-    uniform, rising, fresh, shadowed = (float(term.sum()) for term in terms)
-    return uniform, rising, fresh, shadowed
-
-
-def emergent_cosine(albedo: float, ior: float) -> float:
-    """Cosine m for `translucent.formulas.diffusion.emergent_radiance`: how deep entering light is scattered first.
-
-    The cosine of uniform light, where a half-space absorbs a third of the light that enters, or more. Where it absorbs
-    nothing, 1 / sqrt(3), with which the radiance is the same at all angles, as it must be (Eddington 1926).
-    """
-    absorbed = 1.0 - half_space_reflectance(round(albedo, 6), ior)
-    lossless = 1.0 / np.sqrt(3.0)
-    return float(lossless + (diffuse_interface(ior).mean_cosine - lossless) * min(1.0, 3.0 * absorbed))
+    # Three steps of Lanczos for the polynomials that are orthogonal under this weight (Golub & Welsch 1969).
+    before, now = np.zeros_like(cosine), np.sqrt(passed / passed.sum())
+    diagonal, beside, between = np.zeros(3), np.zeros(3), 0.0
+    for i in range(3):
+        following = cosine * now - between * before
+        diagonal[i] = following @ now
+        following = following - diagonal[i] * now
+        between = beside[i] = float(np.linalg.norm(following))
+        before, now = now, following / between
+    nodes, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside[:2], 1) + np.diag(beside[:2], -1))
+    return np.asarray(nodes), np.asarray(passed.sum() * vectors[0] ** 2)
 
 
 @lru_cache(maxsize=1024)

@@ -18,6 +18,13 @@ from translucent.arrays import Array
 #: within 40 degrees, as after one to three events with g = .8.
 IN_SCATTERED_ROUGHNESS = 0.8
 
+#: Least cosine of entering light with the normal, inside.
+LEAST_COSINE = 0.05
+
+#: Cosine that uniform light counts with in `emergent_radiance`: so lossless bodies in it are as bright at all angles
+#: (Eddington 1926).
+UNIFORM_COSINE = 3.0**-0.5
+
 #: Fraction of the diffuse reflectance at which interfaces reflect in-scattered light, as that is between rays and
 #: diffuse light: for an index of 1.5 and g = 0.9 it is 0.28 where media are thin and 0.6 where hardly any light gets
 #: through.
@@ -35,9 +42,12 @@ def emergent_radiance(
 ) -> Array:
     """Radiance times 4 pi, inside a body below its surface and towards it, of light that has been scattered.
 
-    The source of scattered light along a ray that leaves, where the fluence rises inwards from the surface and
-    light has entered just now: w (phi (1 + 3 c mu) - 3 E mu^2 / (mu + m)) + E / (mu + m). Constant over all angles in
-    a lossless body in uniform light; 1 + 3 c mu where all light comes from deep below.
+    With D = (2 - w) / 3 and k = sqrt((1 - w) / D), in mean free paths, light that enters with a cosine m has the
+    fluence A exp(-k t) + B exp(-t / m) at a depth t by diffusion, phi_1 at the surface; a ray that leaves gathers it.
+    The rest of the fluence comes from elsewhere, with phi' = c phi / D at the surface and phi'' = k^2 phi below. In all
+    E / (mu + m) + w ((phi_1 + E m mu / (D (1 + k m) (m + mu))) / (1 + k mu)
+    + (phi - phi_1) (1 + c mu / D + k^2 mu^2)), where phi_1 = E / ((1 + k m) (c + k D)), or phi if that is less.
+    Half-spaces in uniform light are as bright at each angle as in the exact solution within 1.5 %, at any albedo.
 
     Parameters
     ----------
@@ -50,15 +60,20 @@ def emergent_radiance(
     conductance : array_like
         c: `DiffuseInterface.conductance`.
     mean_cosine : array_like
-        m: of the light that enters.
+        m: of the light that enters, inside; `UNIFORM_COSINE` for uniform light.
     cosine : array_like
         mu: of the direction towards the surface, inside.
     """
     phi, e, w, c, m, mu = (
         np.asarray(x, np.float64) for x in (fluence, entering, albedo, conductance, mean_cosine, cosine)
     )
+    d = (2.0 - w) / 3.0
+    k = np.sqrt((1.0 - w) / d)
+    own = np.minimum(e / ((1.0 + k * m) * (c + k * d)), phi)
     once = e / (mu + m)
-    return np.asarray(w * (phi * (1.0 + 3.0 * c * mu) - 3.0 * once * mu * mu) + once)
+    gathered = (own + once * m * mu / (d * (1.0 + k * m))) / (1.0 + k * mu)
+    rising = 1.0 + c * mu / d + (k * mu) ** 2
+    return np.asarray(once + w * (gathered + (phi - own) * rising))
 
 
 def in_scattered_shares(reflected: npt.ArrayLike, passed: npt.ArrayLike) -> tuple[Array, Array]:

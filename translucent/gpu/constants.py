@@ -6,7 +6,7 @@ from typing import get_args
 
 from translucent.formulas.brdf_table import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
-from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS
+from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS, LEAST_COSINE
 from translucent.formulas.footprint import ALPHA_OF_DEVIATION, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
 from translucent.formulas.interface import CLEARCOAT_IOR
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
@@ -137,6 +137,7 @@ CONSTANTS: dict[str, str] = {
     "HARMONIC_1": repr(BAND_1),
     "HARMONIC_2": repr(BAND_2),
     "HARMONIC_2_ZONAL": repr(BAND_2_ZONAL),
+    "LEAST_ENTERING_COSINE": repr(LEAST_COSINE),
     "CLEARCOAT_IOR": repr(CLEARCOAT_IOR),
     "GROUND_TOLERANCE": "1e-3",  # distance from its plane up to which a point is on a ground, in sizes of its map
     "FILM_CENTERS": f"vec3{FILM_CENTERS}",

@@ -60,7 +60,7 @@ class DiffusedTexture:
             self.first_layers[number] = first
             for values in arrays:
                 across, up, deep = values.shape[:3]
-                texels[first : first + deep, :up, :across, :3] = values.transpose(2, 1, 0, 3)
+                texels[first : first + deep, :up, :across, : values.shape[3]] = values.transpose(2, 1, 0, 3)
                 first += deep
         self.ground_layer = first
         if ground is not None:
@@ -83,9 +83,9 @@ class DiffusedTexture:
                 "first_layer": self.first_layers[number],
                 "albedo": field.albedo,
                 "conductance": field.conductance,
-                "emergent_fluxes": field.fluxes,
+                "exit_cosines": field.exits[0],
+                "exit_weights": field.exits[1],
                 "exit_share": field.exit_share,
-                "mean_cosine": field.mean_cosine,
                 "ahead": field.ahead,
                 "in_scattered_far": field.in_scattered[0].astype(np.float32),
                 "in_scattered_near": field.in_scattered[1].astype(np.float32),

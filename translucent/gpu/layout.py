@@ -411,11 +411,11 @@ OBJECT_ROW = PackedTable(
         ("grid_x", "f4", (3,)),  # its axes, in cells per metre
         ("exit_share", "f4", ()),
         ("grid_y", "f4", (3,)),
-        ("mean_cosine", "f4", ()),
-        ("grid_z", "f4", (3,)),
         ("conductance", "f4", ()),
+        ("grid_z", "f4", (3,)),
         ("albedo", "f4", (3,)),
-        ("emergent_fluxes", "f4", (4,)),
+        ("exit_cosines", "f4", (3,)),  # see exit_quadrature
+        ("exit_weights", "f4", (3,)),
         ("ahead", "f4", (3,)),  # fraction of its extinction by light that is scattered ahead
         ("in_scattered_far", "f4", (3,)),  # fraction of that light which leaves where a ray does,
         ("in_scattered_near", "f4", (3,)),  # and on the other side
