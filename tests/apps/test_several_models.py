@@ -13,8 +13,9 @@ from tests.command_line import Run, one_error_line
 from translucent.assets import scene_names
 from translucent.commands.model import SceneRequest, read_scene
 from translucent.commands.options import FileOptions
-from translucent.preview.document import Model
-from translucent.preview.scenes import load
+from translucent.preview.document import AUTO, Document, Look, Model
+from translucent.preview.exports import Recipe, command_line, python_code
+from translucent.preview.scenes import first_orbit, load, scene_of, stage_name
 from translucent.scene.touching import with_priorities
 
 TEXT = "goblet:crystal wine:#7b1e3a@1cm"
@@ -177,3 +178,18 @@ def test_several_models_are_drawn(run: Run, tmp_path: Path) -> None:
     assert len(result.out.splitlines()) <= 6
     explained = run("explain", "sphere:crystal", "soap:whisky")
     assert "2 objects, 2 of them translucent" in explained.out
+
+
+def test_the_window_keeps_stage_and_recipe() -> None:
+    loaded = load(Model(TEXT))
+    document = Document(Model(TEXT), look=Look(stage=AUTO), orbit=first_orbit(loaded, (64, 48), "studio"))
+    assert stage_name(document.look, loaded) == "studio"
+    assert stage_name(document.look, load(Model("lamp-in-wax"))) == "night"
+    recipe = Recipe(document, loaded, scene_of(document, loaded), (64, 48))
+    words, _ = command_line(recipe)
+    assert words.startswith(f"translucent render '{TEXT}' -o ")
+    code = python_code(recipe)
+    assert f"load_composed({TEXT!r})" in code
+    space: dict[str, Any] = {}
+    exec(code.partition("with tl.Renderer()")[0], space)
+    assert [item.mesh.name for item in space["scene"].objects] == ["goblet.ply", "wine.ply", "ground"]

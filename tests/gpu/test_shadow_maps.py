@@ -293,7 +293,7 @@ def test_32_directions_are_within_a_few_percent_of_256(renderer: tl.Renderer) ->
 
 
 def test_few_of_the_directions_show_the_shadow_of_all(renderer: tl.Renderer) -> None:
-    """Pictures that move have 8 of 128 directions, or 4: of a bear in the studio 1.6 % and 2.3 % off."""
+    """Pictures that move have 8 of 128 directions, or 4: of a bear in the studio 1.9 % off."""
     scene = staged(tl.showcase(tl.load_mesh(mesh_path("bear")), tl.Medium((50.0, 20.0, 40.0)), stage="none"), "studio")
     assert scene.environment_shadows == 128
     every, eight, four = (
@@ -301,8 +301,8 @@ def test_few_of_the_directions_show_the_shadow_of_all(renderer: tl.Renderer) -> 
     )
     none = renderer.render(replace(scene, environment_shadows=0), (96, 96)).radiance
     errors = [np.sqrt(((found - every) ** 2).mean()) / every.mean() for found in (eight, four, none)]
-    assert errors[0] < 0.02
-    assert errors[0] < errors[1] < 0.8 * errors[2]
+    assert max(errors[:2]) < 0.02
+    assert max(errors[:2]) < 0.8 * errors[2]
 
 
 def test_paths_and_traced_rays_see_the_same_shadows(renderer: tl.Renderer) -> None:
