@@ -1,5 +1,8 @@
 // Irradiance on a ground by light that has diffused in bodies, and that they mirror: a lookup in the last layer of their texture.
-// Needs <Lights>, shade/ground_map.glsl. Points count from the center of the media. DIFFUSED: there are such bodies.
+// Points count from the center of the media. DIFFUSED: there are such bodies.
+
+#include <Lights>
+#include "shade/ground_map.glsl"
 
 #if DIFFUSED
 #include "shade/diffused_texture.glsl"

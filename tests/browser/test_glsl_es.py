@@ -127,7 +127,7 @@ def test_library_functions_equal_their_twins(web_page: WebPage) -> None:
                 }
             )
             cases.append((path.stem, signature, arguments))
-    assert len(jobs) == 71
+    assert len(jobs) == 72
     for (library, signature, arguments), job, text in zip(cases, jobs, web_page.run(FEEDBACK, jobs), strict=True):
         found = decoded(text)
         found = found if job["width"] == 1 else found.reshape(-1, job["width"])
