@@ -79,7 +79,10 @@ def test_the_light_of_a_ball_on_a_ground() -> None:
     irradiance = points.irradiance((np.zeros(3), 0.5), diffusing.lit.nearest, even)[:, 0]
     distance = np.linalg.norm(points.points, axis=1)
     near = distance < 6.0
-    np.testing.assert_allclose(irradiance[near], (0.5**2 * 1.02 / distance**3)[near], rtol=0.03)
+    off = irradiance[near] / (0.5**2 * 1.02 / distance**3)[near] - 1.0
+    assert np.abs(off).max() < 0.06
+    assert np.sqrt((off**2).mean()) < 0.015
+    assert abs(off.mean()) < 2e-3
     # Where the environment reaches the ground through the ball, that counts for the same light.
     reached, field = tl.Scene(scene.objects, CAMERA, environment=WHITE), diffusing.field(scene, 0)
     shadowed, through = (ground_map(one, {0: diffusing.lit}, {0: field}) for one in (scene, reached))

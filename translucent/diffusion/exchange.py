@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
+from scipy.ndimage import convolve1d
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Integers
@@ -31,7 +32,7 @@ from translucent.scene.scene import Light, Object
 PATCH = 0.15
 
 #: Rays by which each patch finds the environment, the body, and other patches.
-PATCH_RAYS = 64
+PATCH_RAYS = 32
 
 #: Rounds of light among the patches themselves.
 ROUNDS = 8
@@ -372,8 +373,9 @@ class GroundPoints:
         least = np.where(sine < 1.0, np.sqrt(1.0 - sine * sine), 0.0)
         axis = np.where(sine[:, None] < 1.0, towards / distance[:, None], self.normal)
         across, along = tangents(axis)
-        u, v = plane_points(GROUND_RAYS).T
-        cosine = 1.0 - u[None] * (1.0 - least[:, None])
+        shifts = box_points(len(start))[:, None, :2]
+        u, v = np.moveaxis((plane_points(GROUND_RAYS)[None] + shifts) % 1.0, -1, 0)
+        cosine = 1.0 - u * (1.0 - least[:, None])
         level, angle = np.sqrt(1.0 - cosine**2), 2.0 * np.pi * v
         directions = (
             cosine[..., None] * axis[:, None]
@@ -391,6 +393,8 @@ class GroundPoints:
         return np.stack([np.bincount(texel, values[:, channel], count) for channel in range(3)], axis=1)
 
     def map(self, irradiance: Array) -> GroundMap:
-        """Map of an irradiance (texels, 3)."""
+        """Map of an irradiance (texels, 3): each texel has other rays, and a mean over its neighbors is smooth."""
         values = irradiance.reshape(GROUND_TEXELS, GROUND_TEXELS, 3)
+        for axis in range(2):
+            values = convolve1d(values, (0.25, 0.5, 0.25), axis, mode="nearest")
         return GroundMap(self.number, self.normal, self.height, self.middle, self.axes, values)
