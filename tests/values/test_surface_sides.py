@@ -7,6 +7,7 @@ import pytest
 
 import translucent as tl
 from tests.values.diffusing import BLACK, grid_of, lit, seen_field
+from translucent.diffusion.first_events import LayerSolution
 from translucent.diffusion.sides import SurfaceSides, read_sides
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.solids import Box, Sphere, SphericalShell
@@ -62,3 +63,12 @@ def test_sides_of_a_sheet_and_faces_of_a_box_keep_apart() -> None:
 def test_black_light_stays_black() -> None:
     found = seen_field(tl.Object(Sphere().tessellate(16), tl.Medium(scattering=5.0, ior=1.5)), environment=BLACK)
     assert not found.fluence.any()
+
+
+def test_a_spread_beyond_its_first_order_takes_no_more_than_half_of_the_fluence() -> None:
+    """Else what tips of dense bodies show is divided by nearly nothing, in each channel by another."""
+    depth, spread = np.full(5, 0.01), np.array([-0.012, -0.0101, -0.005, 0.0, 0.005])
+    layer = LayerSolution.of(depth, 30.0, 400.0, spread)
+    plain = LayerSolution.of(depth, 30.0, 400.0, np.zeros(5))
+    assert (layer.u >= 0.5 * plain.u).all()
+    np.testing.assert_allclose(layer.u[3:], (plain.u + spread * plain.slope)[3:])
