@@ -43,7 +43,12 @@ def main(arguments: list[str]) -> None:
         if not wanted and "--all" not in arguments:
             continue
         size = one.compared, one.compared
-        truth = StoredTruth.traced(one.scene(size), size, one.paths)
+        scene = one.scene(size)
+        if one.by_opengl:
+            with tl.Renderer() as renderer:
+                truth = StoredTruth.by_opengl(renderer, scene, size, one.paths)
+        else:
+            truth = StoredTruth.traced(scene, size, one.paths)
         content = truth.to_bytes()
         store(one, content)
         print(

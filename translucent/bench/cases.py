@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from translucent import reference
+from translucent.bench import lit_together as lit
 from translucent.bench.contenders import Effect
 from translucent.bench.drawing import Size
 from translucent.bench.record import MODEL_CASE
@@ -72,6 +73,8 @@ class Case:
         Relative error of scattered light in the reference.
     paths : int
         Of each pixel, in each of the two halves of a truth that is path traced; 0: along rays of pixels.
+    by_opengl : bool
+        These paths are those of `PathTraced`: the reference takes too long.
     stored : bool
         The package brings this truth.
     """
@@ -87,7 +90,13 @@ class Case:
     compared: int = 240
     tolerance: float = 1e-4
     paths: int = 0
+    by_opengl: bool = False
     stored: bool = True
+
+
+def _sizeless(make: Callable[[], Scene]) -> Callable[[Size], Scene]:
+    """Scene that is the same for pictures of all sizes."""
+    return lambda _: make()
 
 
 def _body(make: Callable[[], Mesh], size: Size) -> Scene:
@@ -251,6 +260,7 @@ _full = partial(Case, quick=False)
 _scattered = partial(Case, effect="scattering", shrink=4)
 _interfaces = partial(Case, effect="interfaces", quick=False, shrink=2)
 _stored = partial(Case, effect="multiple scattering", quick=False, shrink=4, compared=40)
+_lit = partial(Case, effect="all light", quick=False, brief=True, shrink=4, compared=32, by_opengl=True)
 
 CASES: tuple[Case, ...] = (
     Case("sphere", "Sphere", "convex: two surfaces on every ray", partial(_body, lambda: Sphere().tessellate(316))),
@@ -374,6 +384,47 @@ CASES: tuple[Case, ...] = (
         _lantern,
         compared=32,
         paths=550,
+    ),
+    _lit(
+        "wax on white", "Wax on a white ground", "light that goes between both", _sizeless(lit.wax_on_white), paths=250
+    ),
+    _lit(
+        "matched wax in the sun",
+        "Wax without an interface in the sun",
+        "its own shadow, and light of the ground",
+        _sizeless(lit.matched_wax_in_the_sun),
+        paths=300,
+    ),
+    _lit("fog ahead", "Fog before the sun", "nearly all light goes on ahead", _sizeless(lit.fog_ahead), paths=1500),
+    _lit("thin leaf", "Leaf before the sky", "thinner than a cell of a grid", _sizeless(lit.leaf), paths=400),
+    _lit(
+        "ball in soap",
+        "Red ball in soap",
+        "it takes light out of the soap around it",
+        _sizeless(lit.ball_in_soap),
+        paths=500,
+    ),
+    _lit("neon", "Ring that glows", "its light is scattered and mirrored inside", _sizeless(lit.neon), paths=400),
+    _lit(
+        "cubes in and behind glass",
+        "Checkered cubes in and behind glass",
+        "textures behind interfaces",
+        _sizeless(lit.cubes_in_and_behind_glass),
+        paths=500,
+    ),
+    _lit(
+        "ice in a drink",
+        "Ice in a drink in a glass",
+        "three media and five interfaces",
+        _sizeless(lit.ice_in_a_drink),
+        paths=500,
+    ),
+    _lit(
+        "milk in a glass",
+        "Milk in a glass",
+        "light that diffuses behind a wall",
+        _sizeless(lit.milk_in_a_glass),
+        paths=300,
     ),
 )
 

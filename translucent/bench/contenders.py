@@ -41,7 +41,12 @@ from translucent.renderer import Renderer
 from translucent.scene.scene import Object, Scene
 
 #: Effects of a scene, which decide on the contenders that are measured.
-Effect = Literal["absorption", "emission", "scattering", "density", "sheet", "interfaces", "multiple scattering"]
+Effect = Literal[
+    "absorption", "emission", "scattering", "density", "sheet", "interfaces", "multiple scattering", "all light"
+]
+
+#: Contender whose choices are the planner's.
+PLANNED = "as planned"
 
 #: Contender whose target has half of the bits.
 IN_FLOAT16 = "SignedDepth in float16"
@@ -49,7 +54,7 @@ IN_FLOAT16 = "SignedDepth in float16"
 #: Refraction index of the thin layers that bend rays.
 REFRACTED_IOR = 1.5
 
-_WHOLE_FRAMES: tuple[Effect, ...] = ("interfaces", "multiple scattering")
+_WHOLE_FRAMES: tuple[Effect, ...] = ("interfaces", "multiple scattering", "all light")
 _ALL: tuple[Effect, ...] = tuple(effect for effect in get_args(Effect) if effect not in _WHOLE_FRAMES)
 _SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
 _INTERFACES: tuple[Effect, ...] = ("interfaces",)
@@ -453,6 +458,13 @@ def _with_scattering() -> Iterable[Contender]:
         yield Contender(name=name, family=family, brief=brief, said=said, choices=choices, **often)
 
 
+def _planned() -> Iterable[Contender]:
+    """What the planner chooses."""
+    said = "no bound: its notes say what is left out"
+    lit: tuple[Effect, ...] = ("all light",)
+    yield Contender(name=PLANNED, family=PLANNED, effects=lit, pictured=lit, choices={"method": None}, said=said)
+
+
 def _path_traced() -> Iterable[Contender]:
     for paths in _PATHS:
         yield Contender(
@@ -470,6 +482,7 @@ CONTENDERS: tuple[Contender, ...] = (
     *_in_order(),
     *_with_interfaces(),
     *_with_scattering(),
+    *_planned(),
     *_path_traced(),
     Contender(
         name="cpu backend",

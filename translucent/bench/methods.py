@@ -45,7 +45,7 @@ SAMPLES = 16
 
 #: Effects of scenes whose methods are ranked by thickness, and effects without passes that find thickness alone.
 _BY_THICKNESS = ("absorption", "sheet")
-_WHOLE_FRAMES = ("interfaces", "multiple scattering")
+_WHOLE_FRAMES = ("interfaces", "multiple scattering", "all light")
 
 
 @dataclass

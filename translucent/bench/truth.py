@@ -23,6 +23,8 @@ from translucent.bench.record import ColorDifference, ErrorStatistics, LightErro
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
 from translucent.frames.metrics import compare, interior
+from translucent.planning.methods import PathTraced
+from translucent.renderer import Renderer
 from translucent.scene.lights import DirectionalLight, SpotLight
 from translucent.scene.scene import Scene
 
@@ -286,6 +288,18 @@ class StoredTruth:
         mask = found[0][0].coverage
         halves = np.stack([frame.radiance[mask] for frame, _ in found])
         error = 0.5 * np.sqrt(sum(spread[mask] ** 2 for _, spread in found))
+        return cls(halves, error, mask, scene_parameters(scene), 2 * paths, seconds)
+
+    @classmethod
+    def by_opengl(cls, renderer: Renderer, scene: Scene, size: Size, paths: int) -> StoredTruth:
+        """The same by `PathTraced`."""
+        began = time.perf_counter()
+        found = [renderer.render(scene, size, PathTraced(paths, seed)) for seed in (1, 2)]
+        seconds = time.perf_counter() - began
+        mask = reference.path_trace(scene, size, paths=2, max_events=0)[0].coverage
+        halves = np.stack([frame.radiance[mask].astype(np.float64) for frame in found])
+        spreads = [frame.standard_error for frame in found]
+        error = 0.5 * np.sqrt(sum(spread[mask].astype(np.float64) ** 2 for spread in spreads if spread is not None))
         return cls(halves, error, mask, scene_parameters(scene), 2 * paths, seconds)
 
     @property

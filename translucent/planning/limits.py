@@ -180,6 +180,7 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: InterfaceM
         effects.append(Note(NoteKind.OPAQUE_SURFACES, text))
     effects += layer_effects(scene, interfaces=surfaces)
     effects += shadow_effects(scene) if scene.opaque else []
+    effects += reflected_effects(scene) if surfaces else []
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
         text = f'priorities: overlap="{scene.overlap}" does not use them'
         effects.append(Note(NoteKind.UNUSED_PRIORITIES, text))
@@ -216,6 +217,18 @@ def shadow_effects(scene: Scene) -> list[Note]:
     return notes
 
 
+def reflected_effects(scene: Scene) -> list[Note]:
+    """Notes on light that opaque objects in clear bodies do not get."""
+    clear = [body for body in scene.bodies if body.has_interface and treatment_of(body) is not Treatment.DIFFUSION]
+    if not (held := [item for item in scene.opaque if any(_may_hold(body, item) for body in clear)]):
+        return []
+    text = (
+        f"light that interfaces bend on its way to {object_names(held)}, and that opaque objects reflect onto each "
+        "other: these are up to 20 % dark; random paths have it (--method path-traced)"
+    )
+    return [Note(NoteKind.REFLECTED_LIGHT, text)]
+
+
 def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> list[Note]:
     """Notes on scattered light that is not rendered."""
     notes = _subsurface_effects(scene) if interfaces else []
@@ -225,6 +238,8 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
             "what is scattered more than once: what opaque objects and other bodies keep from it, and where light of "
             "the environment goes on ahead, as around bright parts of it behind media that scatter ahead"
         )
+        if scene.opaque:
+            text += "; grounds send none into it, which is up to 25 % of the light of what stands on a bright one"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     rendered = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
     if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in rendered]:
@@ -266,8 +281,12 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
     if bodies := [body for body in scene.bodies if treatment_of(body) is Treatment.DIFFUSION]:
         text = (
             f"{object_names(bodies)}: what other bodies scatter of the environment's light reaches them, and "
-            "what is smaller than a cell has no light of its own"
+            "what is smaller than a cell has no light of its own: thin walls, leaves and edges are up to 15 % dark"
         )
+        if any(body.medium is not None and body.medium.emits for body in bodies):
+            text += "; what they emit and scatter is up to 10 % dark"
+        if held := [item for item in scene.opaque if any(_may_hold(body, item) for body in bodies)]:
+            text += f"; the light around {object_names(held)} in them is up to 25 % off"
         ground = ground_below(scene, [i for i, body in enumerate(scene.objects) if body in bodies])
         beside = [item for item in scene.opaque if not any(_may_hold(body, item) for body in bodies)]
         if others := [item for item in beside if ground is None or item is not ground.ground]:

@@ -43,6 +43,7 @@ class NoteKind(StrEnum):
     CUT_OFF_PATHS = "cut-off paths"
     ONE_INTERFACE = "one interface"
     OPAQUE_SURFACES = "opaque surfaces"
+    REFLECTED_LIGHT = "reflected light"
     LAYERS = "layers"
     GLOW = "glow"
     TEXTURES = "textures"
