@@ -93,7 +93,8 @@ def test_each_primitive_has_a_map_in_its_own_uvs(run: Run, vase: Vase, tmp_path:
     names = ["t-Clay_Vase_0.npy", "t-Glaze_.._é.npy", "t-material_2.npy", "t-Clay_Vase_3.npy"]
     files = {*names, *(f"{name}.json" for name in names), "t.npy.json"}
     assert {path.name for path in out.parent.iterdir()} == files
-    assert [line.split(":")[0] for line in result.out.splitlines()[::2]] == [str(out.with_name(name)) for name in names]
+    lines = [line for line in result.out.splitlines() if not line.startswith("advice")]
+    assert [line.split(":")[0] for line in lines[::2]] == [str(out.with_name(name)) for name in names]
     for primitive, name in enumerate(names):
         found = values_on(model, primitive, tl.load_thickness_map(out.with_name(name)))
         assert np.abs(found / MEAN - 1).max() < 0.03
@@ -133,7 +134,7 @@ def test_opaque_parts_are_left_out_and_told(run: Run, vase: Vase, tmp_path: Path
     model = vase(*lit("Glass"), {"name": "Lid"})
     result = run(model, "-o", tmp_path / "t.npy", *QUICK)
     assert result.code == 0, result.err
-    assert result.out.splitlines()[-1] == "left out, opaque: Vase[1]"
+    assert "left out, opaque: Vase[1]" in result.out.splitlines()
     assert read_record(tmp_path / "t.npy")["left_out"] == ["opaque: Vase[1]"]
     assert np.abs(values_on(model, 0, np.load(tmp_path / "t.npy")) / MEAN - 1).max() < 0.03
 

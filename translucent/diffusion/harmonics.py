@@ -106,10 +106,10 @@ class LitAlone:
         """
         uniform = self.field(Environment.constant((1, 1, 1)))
         values = np.empty((*uniform.fluence.shape[:4], COUNT, 3), np.float32)
-        values[..., 0, :] = BAND_0 * uniform.fluence
-        for i in range(1, COUNT):
-            values[..., i, :] = self.field(_harmonic(i)).fluence - UNIFORM * uniform.fluence
         with np.errstate(under="ignore"):
+            values[..., 0, :] = BAND_0 * uniform.fluence
+            for i in range(1, COUNT):
+                values[..., i, :] = self.field(_harmonic(i)).fluence - UNIFORM * uniform.fluence
             values *= uniform.exit_share / np.pi
         return Transfer(values, uniform.low, uniform.turn, uniform.step, uniform.cells)
 
