@@ -49,7 +49,7 @@ def test_a_deeper_tree_is_nearer_to_all_light_and_what_is_drawn_is_not(bench: Be
     # In viewers of glTF absorption is wrong beside the missing interface.
     assert constant.radiance.median > front.radiance.median  # type: ignore[union-attr]
     assert constant.parameters.endswith(" m, of least squared error, FrontInterface()")
-    assert traced[-1].parameters == "SignedDepth(anchored=True), TracedInterfaces(depth=16, forks=3)"
+    assert traced[-1].parameters == "SignedDepth(anchored=True), TracedInterfaces(depth=24, forks=2)"
     assert straight.parameters == "SignedDepth(anchored=True)"
     assert straight.promise == "none: interfaces are left out"
     assert [row.passes for row in (traced[0], screen, front, straight)] == [2, 3, 2, 1]
