@@ -153,7 +153,7 @@ def test_a_folder_that_cannot_be_is_an_error_before_any_work(run: Run, new: Path
         (["knot", "--only", "shadows"], "a MODEL is measured among the scenes; add scenes"),
         (["--preset", "jade"], "--preset jade; no MODEL to fill; the toolkit's scenes keep their media; add a MODEL"),
         (["knot", "--color", "teal"], "--distance is missing"),
-        (["knot", "--preset", "milk"], "did you mean skim_milk"),
+        (["knot", "--preset", "skim_mlik"], "did you mean skim_milk"),
         (["--from", "absent.json", "-o", "out"], "no such file"),
         (["--limit", "0"], "--limit 0; not above 0; give seconds, such as 600"),
         (["--from", "x.json", "--limit", "5"], "nothing is measured"),
