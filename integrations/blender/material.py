@@ -72,7 +72,7 @@ class TRANSLUCENT_OT_material(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether there is an object to give it to."""
+        """Return True if an object can take the material."""
         if context.mode != "OBJECT" or not any(item.type in TYPES for item in context.selected_objects):
             cls.poll_message_set("Select meshes, curves, metaballs or texts in Object Mode")
             return False

@@ -4,7 +4,7 @@ import bpy
 
 
 class TranslucentPreferences(bpy.types.AddonPreferences):
-    """Where the toolkit is."""
+    """Preferences of the extension: the Python that has the toolkit."""
 
     bl_idname = __package__
 

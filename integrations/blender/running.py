@@ -16,7 +16,7 @@ STEP = 0.1
 
 
 class Work(Protocol):
-    """What an operator does: a task, and what becomes of its results."""
+    """Modal operator around one task of the toolkit, and the use of its results."""
 
     task: Task
 

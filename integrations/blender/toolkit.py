@@ -34,7 +34,7 @@ _running: set["Task"] = set()
 
 
 class ToolkitError(Exception):
-    """What went wrong, as a sentence for `Operator.report`."""
+    """Failure of the toolkit, as a sentence for `Operator.report`."""
 
 
 def interpreter() -> tuple[str, dict[str, str]]:

@@ -31,7 +31,7 @@ def scene_of(*objects: tl.Object) -> tl.Scene:
 
 
 def complaints(path: Path) -> list[str]:
-    """What usdchecker says: by validators, or by the class that they have replaced."""
+    """Findings of usdchecker: by validators, or by the class that they have replaced."""
     if hasattr(UsdUtils, "ComplianceChecker"):
         checker = UsdUtils.ComplianceChecker(arkit=False, skipARKitRootLayerCheck=True)
         checker.CheckCompliance(str(path))

@@ -95,7 +95,7 @@ def test_lossless_bodies_vanish_in_white_light(
 
 @pytest.mark.parametrize("surface", [None, tl.Surface(color=(1, 1, 1), ior=1.0, roughness=1.0)])
 def test_lossless_bodies_vanish_on_a_white_ground(renderer: tl.Renderer, surface: tl.Surface | None) -> None:
-    """What the ground takes of the sky it sends into the body, and the other way round; rays see that, too."""
+    """Ground and body of a lossless scene light each other, and rays see both: all of it is as bright as the sky."""
     corners = 60.0 * np.array([(-1, 0, -1), (-1, 0, 1), (1, 0, 1), (1, 0, -1)]) - (0.0, 1.01, 0.0)
     ground = tl.Object(tl.Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]])), None, color=(1, 1, 1), surface=surface)
     body = tl.Object(BALL, tl.Medium(scattering=20.0, ior=1.0 if surface is None else 1.4))

@@ -371,7 +371,7 @@ def checked() -> list[Any]:
 
 
 class Layout:
-    """What a panel draws into: its settings, and its buttons with what they pass on."""
+    """Recorder of a panel: its settings, and its buttons with their properties."""
 
     def __init__(self) -> None:
         self.drawn: list[Any] = []

@@ -94,7 +94,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Done:
-    """What the driver wrote."""
+    """Results that the driver wrote."""
 
     result: dict[str, Any]
     arrays: dict[str, np.ndarray]

@@ -140,7 +140,7 @@ def samples(found: DiffusionField, body: tl.Object) -> Array:
 
 @pytest.mark.parametrize("scattering", [0.5, 3.0, 20.0])
 def test_a_glowing_ball(scattering: float) -> None:
-    """What emits and absorbs nothing loses all of its power, n^2 4 pi q for each volume.
+    """A medium that emits and does not absorb loses all of its power, n^2 4 pi q for each volume.
 
     A part of it leaves unscattered, which rays see. That is known in a ball: all chords of a mirrored ray are alike.
     """

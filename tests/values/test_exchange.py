@@ -126,7 +126,7 @@ def test_an_opaque_ball_in_a_ball_takes_what_diffusion_brings_to_it(color: float
     deeper = 1.0 + 3.0 * interface.mean_cosine * leaves
     taken = entering / (1.0 + leaves / deeper * (1.0 / (radius**2 * lost) + (1.0 / radius - 1.0) / d))
     np.testing.assert_allclose(np.pi - field.leaving.mean(), taken, rtol=0.1, atol=0.003)
-    # The fluence at the inner ball, of which it gets phi / (2 (1 + a)).
+    # Fluence phi at the inner ball, which receives phi / (2 (1 + a)).
     on_it = taken / radius**2 / (1.0 - color) if color < 1.0 else np.pi * 1.3**2
     assert field.inclusions is not None
     place = np.argwhere(field.inclusions[..., 0] > 0.0) * field.step + 0.5 * field.step + field.low

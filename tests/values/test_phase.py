@@ -165,7 +165,7 @@ def test_droplets_scatter_as_mie_has_it() -> None:
 @pytest.mark.parametrize("g", [0.3, 0.85])
 @pytest.mark.parametrize("depth", [0.2, 3.0])
 def test_light_that_was_scattered_ahead_has_the_moments_of_its_path(g: float, depth: float) -> None:
-    """Of order l: g^l (e^(-(1 - g^l) depth) - e^-depth), but 0 of order 0; that of order 1 decays as it is told to."""
+    """Legendre moment l of light scattered ahead: g^l (e^(-(1 - g^l) depth) - e^-depth); order 0 is 0."""
     cosine, weight = np.polynomial.legendre.leggauss(400)
     found = phase_after_scattering(cosine, g, g * g, depth)
     moments = 2.0 * np.pi * (weight * found) @ np.polynomial.legendre.legvander(cosine, 7)

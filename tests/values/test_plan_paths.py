@@ -69,7 +69,7 @@ def test_what_no_path_shows_is_told(objects: list[tl.Object], kind: NoteKind, wo
 
 
 def test_paths_find_shadows_by_themselves() -> None:
-    """Maps are for diffuse bases, and for opaque objects of which rays do not read all."""
+    """Shadow maps serve diffuse bases, and opaque objects with textures that rays do not read."""
     ground, lamp = body(None, 2.0), tl.SphereLight((0, 5, 0), 1.0, 0.1)
     found = plan(scene(body(), ground, lights=[lamp]), METHOD)
     assert not found.has(PassName.SHADOW_MAPS)

@@ -128,7 +128,7 @@ def diffuse_interface(ior: float, roughness: float = 0.0) -> DiffuseInterface:
     mean_cosine = float((flux * optics.refracted_cosine(outside, ior)).sum() / flux.sum())
     if roughness > 0.0 and ior > 1.0:
         entering = 1.0 - _rough_fractions(ior, roughness, 2)[0]
-        # In equilibrium as much leaves as enters; of directions, leaving light has those that single microfacets give.
+        # In equilibrium as much leaves as enters. Light that leaves has the directions of a single microfacet.
         leaving = entering / ior**2
         single, single_flux = (_rough_fractions(1.0 / ior, roughness, power)[1] for power in (2, 3))
         leaving_flux = single_flux * leaving / single
