@@ -215,7 +215,7 @@ class TRANSLUCENT_OT_bake_thickness(RunsWork, BakeSettings, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return True if a mesh is selected, and no bake runs."""
+        """Return True in Object Mode with objects selected."""
         if context.mode != "OBJECT" or not context.selected_objects:
             cls.poll_message_set("Select objects in Object Mode")
             return False
