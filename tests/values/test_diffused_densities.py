@@ -9,8 +9,9 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
+from translucent.diffusion.densities import densities
 from translucent.diffusion.field import DiffusingBody, DiffusionField
-from translucent.diffusion.grid import BodyGrid, body_grid, densities
+from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import BodySystem
 from translucent.formulas.diffuse_interface import diffuse_interface

@@ -20,6 +20,7 @@ from tests.values.diffusing import (
     seen_field,
 )
 from translucent.bench.shapes import joined
+from translucent.diffusion.densities import even_densities
 from translucent.diffusion.entering import from_light
 from translucent.diffusion.field import DiffusionField
 from translucent.diffusion.first_events import (
@@ -29,7 +30,7 @@ from translucent.diffusion.first_events import (
     half_space_excess,
     tails,
 )
-from translucent.diffusion.grid import BodyGrid, box_points, even_densities
+from translucent.diffusion.grid import BodyGrid, box_points
 from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import TOLERANCE, _ChannelSystem
 from translucent.formulas import optics

@@ -15,7 +15,8 @@ import pytest
 import translucent as tl
 from tests.solids import Box, Sphere, Torus
 from translucent.bench.shapes import joined
-from translucent.diffusion.grid import LINES, Voxels, body_grid, voxels
+from translucent.diffusion.grid import body_grid
+from translucent.diffusion.voxels import LINES, Voxels, voxels
 
 Array = npt.NDArray[np.float64]
 

@@ -15,7 +15,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from translucent.arrays import Array, Floats, Integers
-from translucent.diffusion.grid import BodyGrid, Densities, box_points
+from translucent.diffusion.densities import Densities
+from translucent.diffusion.grid import BodyGrid, box_points
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
     diffuse_interface,

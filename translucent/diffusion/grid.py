@@ -1,170 +1,27 @@
-"""Grid of a body in which light diffuses: cells that its surface cuts, sample points on the surface, and densities.
+"""Grid of a body in which light diffuses: cells that its surface cuts, and sample points on the surface.
 
-Cells and samples are in the coordinates that the body's transform leads to. Where the density varies, lengths count for
-as much as the density on them: in metres that are stretched so, D and sigma_a are those of the medium, and the
-one-dimensional solutions below the surface hold as they are, however the density varies with depth.
+Cells and samples are in the coordinates that the body's transform leads to.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.ndimage import map_coordinates
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask, expanded
+from translucent.diffusion.voxels import Voxels, cut_cells, voxels, without
 from translucent.formulas import optics
 from translucent.geometry.mesh import Mesh, Triangles, joined
 from translucent.geometry.normals import corner_normals
 from translucent.geometry.ray_caster import RayCaster, ray_caster_of
-from translucent.geometry.winding import line_crossings
 from translucent.scene.scene import Object
-
-#: Lines through each cell along each axis, on a square of this side.
-LINES = 4
-
-#: Shift of the lines, as a fraction of the distance between them, so that they miss what is modelled on a grid.
-_SHIFT = (0.0312, 0.0187)
-
-#: Of lines that hit nothing.
-_NO_CROSSINGS: tuple[Integers, Array, Integers] = np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64)
-
-
-@dataclass(frozen=True)
-class Voxels:
-    """Grid cells that a closed surface cuts: volume inside each, and open area between them.
-
-    Attributes
-    ----------
-    low : (3,) float64
-        Corner of the grid; a cell on each side is empty.
-    step : float
-        Side of a cell.
-    inside : (x, y, z) float64
-        Fraction of each cell that is inside, 0 to 1.
-    center : (x, y, z, 3) float64
-        Centroid of that fraction, in cells from `low`; of empty cells, their middle.
-    open_area : tuple of 3 arrays
-        Fraction of the face towards the previous cell that is inside, along each axis: (x + 1, y, z) and so on.
-    """
-
-    low: Array
-    step: float
-    inside: Array
-    center: Array
-    open_area: tuple[Array, Array, Array]
-
-    @property
-    def volume(self) -> float:
-        """Volume of all fractions."""
-        return float(self.inside.sum()) * self.step**3
-
-
-def voxels(vertices: Array, faces: npt.NDArray[np.integer], step: float) -> Voxels:
-    """Cut cells of a closed mesh, from the intervals of lines through each cell along each axis.
-
-    Intervals come from winding numbers, as thickness does: what overlaps counts once. Volumes are exact to the spacing
-    of the lines, a quarter of a cell; lengths along a line are exact.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64
-    faces : (m, 3) int
-        Counter-clockwise seen from outside.
-    step : float
-        Side of a cell, above 0.
-    """
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    size = np.ceil((high - low) / step - 1e-9).astype(int) + 2
-    return _cut_cells(vertices, faces, step, 0.5 * (low + high) - 0.5 * step * size, size)
-
-
-def _cut_cells(
-    vertices: Array, faces: npt.NDArray[np.integer], step: float, origin: Array, size: npt.NDArray[np.integer]
-) -> Voxels:
-    """Cut cells of a closed mesh in a grid of this corner and size; what is beyond it does not count."""
-    units = (vertices - origin) / step
-    inside, center, areas = np.zeros(size), np.zeros((*size, 3)), []
-    for axis in range(3):
-        order = [(axis + 1) % 3, (axis + 2) % 3, axis]
-        lengths, moments, crossed = _along_last_axis(units[:, order], faces, size[order])
-        back = np.argsort(order)
-        lengths, moments, crossed = (part.transpose(back) for part in (lengths, moments, crossed))
-        inside += lengths / 3.0
-        center[..., axis] = moments / np.where(lengths > 0.0, lengths, 1.0)
-        areas.append(crossed)
-    corner = np.stack(np.meshgrid(*(np.arange(n) for n in size), indexing="ij"), axis=-1)
-    center = np.clip(np.where(center > 0.0, center, corner + 0.5), corner, corner + 1.0)
-    return Voxels(origin, step, np.minimum(inside, 1.0), center, (areas[0], areas[1], areas[2]))
-
-
-def _without(cells: Voxels, inner: Voxels) -> Voxels:
-    """Cut cells of a body without those of something inside it, on the same grid.
-
-    Where both surfaces cut a cell, as little of it is taken as the two fractions allow.
-    """
-    taken = np.maximum(cells.inside + inner.inside - 1.0, 0.0)
-    inside = cells.inside - taken
-    moved = (cells.inside[..., None] * cells.center - taken[..., None] * inner.center) / np.maximum(inside, 1e-9)[
-        ..., None
-    ]
-    corner = np.stack(np.meshgrid(*(np.arange(n) for n in inside.shape), indexing="ij"), axis=-1)
-    center = np.where((taken > 0.0)[..., None] & (inside > 1e-6)[..., None], moved, cells.center)
-    areas = [
-        area - np.maximum(area + other - 1.0, 0.0) for area, other in zip(cells.open_area, inner.open_area, strict=True)
-    ]
-    center = np.clip(center, corner, corner + 1.0)
-    return Voxels(cells.low, cells.step, inside, center, (areas[0], areas[1], areas[2]))
-
-
-def _along_last_axis(
-    points: Array, faces: npt.NDArray[np.integer], size: npt.NDArray[np.integer]
-) -> tuple[Array, Array, Array]:
-    """Length inside each cell, its first moment, and fraction of each cell's lower and upper face that is inside."""
-    lines = size[:2] * LINES
-    scaled = points[:, :2] * LINES - 0.5 - np.array(_SHIFT)
-    found = [_NO_CROSSINGS, *line_crossings(scaled, points[:, 2], faces, (int(lines[0]), int(lines[1])))]
-    line, height, sign = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    order = np.lexsort((height, line))
-    line, height, sign = line[order], height[order], sign[order]
-    begin, end = _intervals(line, height, sign)
-    deep = int(size[2])
-    low, high = np.clip(height[begin], 0.0, deep - 1e-9), np.clip(height[end], 0.0, deep - 1e-9)
-    first, last = low.astype(int), high.astype(int)
-    of, cell = expanded(first, last - first + 1)
-    at = line[begin][of]
-    column = at // lines[1] // LINES * size[1] + at % lines[1] // LINES
-    place, shape = column * deep + cell, tuple(size.tolist())
-    lower, upper = np.maximum(low[of], cell), np.minimum(high[of], cell + 1)
-
-    def summed(values: Array) -> Array:
-        """Mean over the lines of each cell."""
-        return np.asarray(np.bincount(place, values, int(size.prod())).reshape(shape) / LINES**2)
-
-    lengths, moments = summed(upper - lower), summed(0.5 * (upper - lower) * (upper + lower))
-    crossed = np.minimum(summed((cell > first[of]).astype(np.float64)), 1.0)
-    return lengths, moments, np.concatenate([crossed, np.zeros((*shape[:2], 1))], axis=2)
-
-
-def _intervals(line: Integers, height: Array, sign: Integers) -> tuple[Integers, Integers]:
-    """Indices of the crossings at which lines enter and leave the mesh; unbalanced lines have none."""
-    winding = np.cumsum(sign)
-    first = np.flatnonzero(np.diff(line, prepend=-1) != 0)
-    of = np.cumsum(np.diff(line, prepend=-1) != 0) - 1
-    before = (winding[first] - sign[first])[of] if len(line) else winding
-    last = np.append(first[1:], len(line)) - 1
-    balanced = (winding[last] == winding[first] - sign[first])[of] if len(line) else np.zeros(0, bool)
-    depth = winding - before
-    begins = balanced & (depth > 0) & (depth - sign <= 0)
-    ends = balanced & (depth <= 0) & (depth - sign > 0)
-    return np.flatnonzero(begins), np.flatnonzero(ends)
-
 
 #: Sample points on the surface for each area of a cell's face.
 SAMPLES = 3.0
@@ -199,11 +56,11 @@ INWARD_DIRECTIONS, START = 8, 1e-4
 #: Blocks of cells along the longest side of a grid. The solver corrects the mean error of each.
 BLOCKS = 8
 
+#: Places in each layer between the surface and the depth of reading at which its volume is counted.
+LAYER_PLACES = (np.arange(4) + 0.5) / 4
+
 #: Samples next to each other for which something is found together.
 TOGETHER = 6
-
-#: Places in each layer between the surface and the depth of reading at which its volume is counted.
-_LAYER_PLACES = (np.arange(4) + 0.5) / 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -545,9 +402,9 @@ class BodyGrid:
             surfaces.append((inner.points, -inner.normals, inner.depth, np.full(len(inner.points), inner.area)))
         volume = np.zeros(self.count)
         for points, normals, depth, areas in surfaces:
-            for place in _LAYER_PLACES:
+            for place in LAYER_PLACES:
                 probe = self.probe(points - (place * depth)[:, None] * normals)
-                part = probe.weights * (areas * depth / len(_LAYER_PLACES))[:, None]
+                part = probe.weights * (areas * depth / len(LAYER_PLACES))[:, None]
                 volume += np.bincount(probe.cells.ravel(), part.ravel(), self.count)
         return volume
 
@@ -706,7 +563,7 @@ def body_grid(body: Object, step: float, opaque: Sequence[Object] = ()) -> BodyG
     if not (inside := [item for item in opaque if len(grid.inside(item)[0])]):
         return grid
     for item in inside:
-        cells = _without(cells, _cut_cells(*_placed(item), step, cells.low, np.array(cells.inside.shape)))
+        cells = without(cells, cut_cells(*_placed(item), step, cells.low, np.array(cells.inside.shape)))
     return cut(cells, tuple(opaque))
 
 
@@ -772,106 +629,3 @@ def box_points(count: int) -> Array:
     """(count, 3): the same recurrence in the unit cube."""
     shifts = [0.8191725133961645, 0.6710436067037893, 0.5497004779019703]
     return np.asarray((0.5 + np.arange(count)[:, None] * shifts) % 1.0)
-
-
-#: Points in each cell, along each axis, at which its density is looked at.
-_PLACES = (0.25, 0.75)
-
-#: Points on a path through the body at which the density is read.
-_PATH_POINTS = (np.arange(12) + 0.5) / 12
-
-#: Pieces of each path of entering light, from the surface to the end of the grid.
-_PIECES = 48
-
-
-@dataclass(frozen=True, eq=False)
-class Densities:
-    """Density of a body in grid cells, below its surface, and along paths.
-
-    Attributes
-    ----------
-    cells : (cells,) float64
-        Mean density of each cell in the system.
-    depth : (s,) float64
-        Integral of the density from the samples of the surface down to the depth at which the fluence is read, in m.
-    longest : float
-        Longest diffusion coefficient in m that a cell gets: where hardly anything is, no free path is longer than the
-        body is thick.
-    """
-
-    cells: Array
-    depth: Array
-    longest: float
-    _grid: BodyGrid
-    _means: Array | None = None
-
-    def diffusion_coefficients(self, d: float) -> Array:
-        """(cells,): diffusion coefficients in m of a medium that has `d` where the density is 1."""
-        densest = float(self.cells.max(initial=0.0))
-        return np.asarray(d / np.maximum(self.cells, min(d / self.longest, densest or np.inf)))
-
-    def along(self, directions: Array, metres: Array) -> Array:
-        """(s,): integral of the density in m from all samples in directions (s, 3), up to metres (s,)."""
-        if self._means is None:
-            return metres
-        cells = self._grid.cells
-        start = (self._grid.points - cells.low) / cells.step - 0.5
-        places = (start + (fraction * metres / cells.step)[:, None] * directions for fraction in _PATH_POINTS)
-        return np.asarray(
-            metres * np.mean([map_coordinates(self._means, at.T, order=1, mode="nearest") for at in places], axis=0)
-        )
-
-    def lengths(self, samples: Integers, directions: Array) -> Callable[[Array], Array]:
-        """Function from integrals of the density (k,), in m, along directions (k, 3) from samples (k,), to metres."""
-        if self._means is None:
-            return lambda integral: integral
-        cells = self._grid.cells
-        start = (self._grid.points[samples] - cells.low) / cells.step - 0.5
-        slow = np.where(np.abs(directions) > np.finfo(np.float64).eps, directions, np.finfo(np.float64).eps)
-        end = np.where(slow > 0.0, np.array(self._means.shape) - start, -1.0 - start) / slow
-        piece = end.min(axis=1) * cells.step / _PIECES
-        inside = (start + ((i + 0.5) * piece / cells.step)[:, None] * directions for i in range(_PIECES))
-        dense = np.stack([map_coordinates(self._means, at.T, order=1, mode="nearest") for at in inside])
-        sums = np.cumsum(dense * piece, axis=0)
-        return lambda integral: _lengths(sums, dense, piece, integral)
-
-
-def even_densities(grid: BodyGrid) -> Densities:
-    """Densities of a body of one density, 1."""
-    return Densities(np.ones(grid.count), grid.below[1], np.inf, grid)
-
-
-def densities(body: Object, grid: BodyGrid) -> Densities:
-    """Densities of a body in its grid."""
-    if body.density is None:
-        return even_densities(grid)
-    depth = grid.below[1]
-    means = cell_means(body, grid)
-    rows = body.to_unit_box(grid.cells.low)
-    layer = np.zeros(len(depth))
-    for place in _LAYER_PLACES:
-        points = grid.points - (place * depth)[:, None] * grid.face_normals - grid.cells.low
-        layer += body.density.at(points @ rows[:, :3].T + rows[:, 3]) / len(_LAYER_PLACES)
-    return Densities(means[grid.number >= 0], layer * depth, body.mean_thickness, grid, means)
-
-
-def cell_means(body: Object, grid: BodyGrid) -> Array:
-    """(x, y, z): mean density of the body in each cell."""
-    if body.density is None:
-        return np.ones(grid.number.shape)
-    corner = np.stack(np.meshgrid(*(np.arange(n) for n in grid.number.shape), indexing="ij"), axis=-1)
-    rows = body.to_unit_box(grid.cells.low)
-    total = np.zeros(grid.number.shape)
-    for place in np.stack(np.meshgrid(_PLACES, _PLACES, _PLACES), axis=-1).reshape(-1, 3):
-        total += body.density.at((corner + place) * grid.cells.step @ rows[:, :3].T + rows[:, 3])
-    return total / len(_PLACES) ** 3
-
-
-def _lengths(sums: Array, dense: Array, piece: Array, integral: Array) -> Array:
-    """Distances (s,) at which the integral of piecewise constant densities (n, s) reaches given values (s,)."""
-    number = (sums <= integral).sum(axis=0)
-    at = np.minimum(number, len(sums) - 1)
-    row = np.arange(len(piece))
-    before = np.where(at > 0, sums[at - 1, row], 0.0)
-    rest = (integral - before) / np.where(dense[at, row] > 0.0, dense[at, row], 1.0)
-    return np.where(number < len(sums), at * piece + rest, 2.0 * len(sums) * piece)

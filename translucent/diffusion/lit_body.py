@@ -12,10 +12,11 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
+from translucent.diffusion.densities import Densities, densities
 from translucent.diffusion.entering import BEFORE, Occluders, Pose, Sky, sky_of, sky_paths, transfer
 from translucent.diffusion.exchange import Exchange, OpaqueSurfaces, Patches
 from translucent.diffusion.first_events import EnteringRays
-from translucent.diffusion.grid import BodyGrid, Densities, body_grid, densities
+from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.sides import SurfaceSides
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.mesh import Mesh

@@ -24,6 +24,7 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg
 
 from translucent.arrays import Array
+from translucent.diffusion.densities import Densities, even_densities
 from translucent.diffusion.first_events import (
     EnteringRays,
     EntryPaths,
@@ -34,7 +35,7 @@ from translucent.diffusion.first_events import (
     joined_rays,
     scattered_fractions,
 )
-from translucent.diffusion.grid import BodyGrid, Densities, even_densities
+from translucent.diffusion.grid import BodyGrid
 from translucent.errors import RenderError
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient, half_space_reflectance

@@ -21,8 +21,9 @@ import numpy.typing as npt
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from translucent.arrays import Array, Integers
+from translucent.diffusion.densities import cell_means
 from translucent.diffusion.entering import DIRECTIONS, environment_parts, even_directions, nearest_parts, path_inside
-from translucent.diffusion.grid import BodyGrid, body_grid, cell_means
+from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.photons import FineCells
 from translucent.diffusion.solution import CellSystem
 from translucent.formulas import optics
