@@ -125,7 +125,8 @@ def test_turning_probing_and_loss(web_page: WebPage, web_dist: Path, tmp_path: P
     """Keys and the panel; the probe against the ball's thickness; a context that is lost and comes back."""
     opened(web_page, scene_of(ball(RED)), tmp_path, tools)
     page = web_page.page
-    page.wait_for_function("async () => (window.viewer = await translucent).still")
+    page.evaluate("async () => { window.viewer = await translucent; }")
+    page.wait_for_function("() => viewer.still")
     where = "viewer.state().camera.eye"
     start = page.evaluate(where)
     page.keyboard.press("ArrowRight")
@@ -170,8 +171,9 @@ def test_an_absorber_that_scatters_a_little_has_its_thickness(
     scene = scene_of(ball(merlot.medium), lights=[tl.DirectionalLight((-0.4, -1, -0.3), 2.0)])
     opened(web_page, scene, tmp_path, tools)
     page = web_page.page
-    page.wait_for_function("async () => (window.viewer = await translucent).still")
-    found = page.evaluate("viewer.probe(0.5, 0.5)")
+    page.evaluate("async () => { window.viewer = await translucent; }")
+    # The picture may move once more as the page finds its size: until it is still there is nothing to read.
+    found = page.wait_for_function("() => viewer.probe(0.5, 0.5)").json_value()
     assert found["valid"]
     assert found["thickness"] == pytest.approx(0.04, rel=2e-3)
     assert found["transmittance"] == pytest.approx(merlot.medium.transmittance(found["thickness"]), rel=1e-4)
@@ -220,7 +222,8 @@ def test_touch_on_a_phone(chromium: Any, web_dist: Path, tmp_path: Path) -> None
     page = WebPage(chromium, (390, 844), has_touch=True, is_mobile=True)
     try:
         page.open(file)
-        page.page.wait_for_function("async () => (window.viewer = await translucent).still")
+        page.page.evaluate("async () => { window.viewer = await translucent; }")
+        page.page.wait_for_function("() => viewer.still")
         canvas, panel = (page.page.locator(name).bounding_box() for name in (".stage canvas", ".panel"))
         assert canvas
         assert panel
@@ -290,6 +293,7 @@ def test_half_floats_are_told(web_page: WebPage, web_dist: Path, tmp_path: Path,
     """Thickness is added up in 16 bits without blending of 32-bit floats, and the page says so."""
     answer_null(web_page, "WebGL2RenderingContext", "getExtension", "name === 'EXT_float_blend'")
     opened(web_page, scene_of(ball(RED)), tmp_path, tools)
-    web_page.page.wait_for_function("async () => (window.viewer = await translucent).still")
+    web_page.page.evaluate("async () => { window.viewer = await translucent; }")
+    web_page.page.wait_for_function("() => viewer.still")
     assert "16 bits" in web_page.page.locator(".notes").inner_text()
     assert web_page.page.evaluate("viewer.probe(0.5, 0.5).thickness") == pytest.approx(0.04, rel=5e-3)
