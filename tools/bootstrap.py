@@ -58,12 +58,25 @@ def pip_install(python: Path, *arguments: str) -> None:
 
 
 def make_venv(python: Path) -> None:
-    """Make the environment of `python` with this interpreter."""
-    command = [sys.executable, "-m", "venv", "--clear", str(python.parents[1])]
+    """Make the environment of `python` with this interpreter, in place of what is there.
+
+    Raises
+    ------
+    SetupError
+        If a link leads there: what is in another checkout's environment would be removed.
+    """
+    folder = python.parents[1]
+    if folder.is_symlink():
+        raise SetupError(
+            f"a virtual environment in {folder}",
+            f"it is a link to {folder.resolve()}, and making one there would remove what that holds",
+            "remove the link, or call the tool itself, for example .venv/bin/python tools/build_web.py",
+        )
+    command = [sys.executable, "-m", "venv", "--clear", str(folder)]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     if done.returncode:
         raise SetupError(
-            f"a virtual environment in {python.parents[1]}",
+            f"a virtual environment in {folder}",
             f"`python -m venv` said: {' '.join((done.stdout + done.stderr).split())}",
             "repair that, or name another Python: make PYTHON=...",
         )

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 import runpy
+import shutil
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -34,3 +37,18 @@ def test_demo_renders_two_pictures_and_says_how_wrong_they_are(
         assert (tmp_path / "out" / f"{name}.png").stat().st_size > 2_000
     for word in ("backend ", "plan: SignedDepth", "signed_depth", " ms", "p99.9", "of the scene's diagonal"):
         assert word in printed.out, word
+
+
+def test_no_environment_is_made_where_a_link_leads(tmp_path: Path) -> None:
+    """It would remove the environment of another checkout."""
+    (tmp_path / "tools").mkdir()
+    shutil.copy(ROOT / "tools" / "bootstrap.py", tmp_path / "tools")
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "kept").touch()
+    (tmp_path / ".venv").symlink_to(tmp_path / "other")
+    command = [sys.executable, str(tmp_path / "tools" / "bootstrap.py")]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert f"it is a link to {tmp_path / 'other'}" in done.stderr
+    assert (tmp_path / "other" / "kept").is_file()
