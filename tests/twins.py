@@ -217,8 +217,9 @@ def _phase_arguments(values: np.ndarray) -> list[np.ndarray]:
 
 def _after_scattering_arguments() -> list[np.ndarray]:
     cosines, g = np.clip(COSINES[::3], -1, 1), np.array([0.0, 0.3, 0.85, 0.97])
-    *others, depth = _mixed(cosines, g, np.array([0.0, 0.7]), np.geomspace(1e-6, 200.0, 25))
-    return [*others, _triples(depth)]
+    depths, levers = np.geomspace(1e-6, 200.0, 13), np.array([0.6, 1.0])
+    *others, depth, lever = _mixed(cosines, g, np.array([0.0, 0.7]), depths, levers)
+    return [*others, _triples(depth), lever]
 
 
 #: Within the box, on its boundary, and what rounding puts outside.

@@ -76,5 +76,11 @@ void end_walk(Walk walk, float metres_per_step, float counted, float kept) {
         return;
     }
 #endif
+#if MARCH && SCATTERS_AGAIN
+    if (walk.ahead_slot >= 0) {
+        vec3 ahead = environment_ahead(walk.ahead_slot, ray_from(0.0).direction, walk.ahead);
+        walk.emitted = max(walk.emitted + transmittance(walk.optical_depth - walk.ahead) * ahead, vec3(0.0));
+    }
+#endif
     write_walk(walk, sound && is_outside(walk), counted, kept);
 }

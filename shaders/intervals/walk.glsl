@@ -23,6 +23,10 @@ struct Walk {
     vec3 emitted;            // radiance: towards the start for a walk that goes on, from the end for one that comes back
     float thickness;
     float inside_out;        // metres with a negative winding number, beyond what silhouettes explain
+#if MARCH && SCATTERS_AGAIN
+    vec3 ahead;              // depth of scattering in media whose scattering ahead is followed
+    int ahead_slot;          // of the last of these, or -1
+#endif
 };
 
 struct Contents {
@@ -61,6 +65,10 @@ void add_segment(inout Walk walk, float metres, bool backwards) {
         Marched march = marched(weights, ray, metres, mix.extinction, mix.emission, transmittance(walk.optical_depth));
         added = march.color;
         depth = march.depth;
+#if SCATTERS_AGAIN
+        walk.ahead += march.ahead;
+        walk.ahead_slot = max(walk.ahead_slot, march.slot);
+#endif
 #else
         added += in_scattered(weights, ray, metres, mix.extinction);
 #endif
@@ -102,6 +110,10 @@ Walk walk_from_start(int excess[SLOTS], float misplaced) {
     walk.emitted = vec3(0.0);
     walk.thickness = 0.0;
     walk.inside_out = -misplaced;
+#if MARCH && SCATTERS_AGAIN
+    walk.ahead = vec3(0.0);
+    walk.ahead_slot = -1;
+#endif
     for (int slot = 0; slot < SLOTS; ++slot) {
         walk.winding[slot] = clamp(excess[slot], int(slot_extinction[slot].w), int(slot_emission[slot].w));
     }

@@ -7,7 +7,7 @@
 #include <constants>
 
 const int AHEAD_EVENTS = 16;  // in sums: later ones leave Legendre moments of order 3 and more small, unless g > 0.98
-const float LEAST_POWER = 0.05;  // of g: after as many events these moments are not seen
+const float LEAST_POWER = 0.15;  // of g: after as many events these moments are not seen
 const int DRAINE_STEPS = 24;  // of Newton's method, or halvings of its bracket
 
 // In 1/sr. Turned around for g < 0, the base does not cancel.
@@ -62,18 +62,20 @@ float phase_value(vec4 phase, float cos_scatter) {
 // Phase function of light that was scattered before on its path from a light, times the probability that it was; less its
 // mean over all directions. In 1/sr. anisotropy: g, 0 to 1. By Legendre moments (2 l + 1) / 4 pi g^l (e^(-(1 - g^l) depth) - e^-depth), l > 0,
 // where the first decays by 1 - straight instead: 1 and 2 in closed form, the rest by number of events n, a Poisson number,
-// after which the phase function is that of g^(n + 1). depth: of scattering alone.
-vec3 phase_after_scattering(float cos_scatter, float anisotropy, float straight, vec3 depth) {
+// after which the phase function is that of g^(n + 1). depth: of scattering alone. lever: mean fraction of the way from the light at
+// which it is; as much of each deflection is seen, so before g^lever takes the place of g.
+vec3 phase_after_scattering(float cos_scatter, float anisotropy, float straight, vec3 depth, float lever) {
     float g = anisotropy;
+    float before = pow(g, lever);
     float second = 1.5 * cos_scatter * cos_scatter - 0.5;
     vec3 none = exp(-depth);
     vec3 sum = 3.0 * g * cos_scatter * (exp((straight - 1.0) * depth) - none)
-        + 5.0 * g * g * second * (exp((g * g - 1.0) * depth) - none);
+        + 5.0 * g * g * second * (exp((before * before - 1.0) * depth) - none);
     vec3 probability = none;
     float power = g;
     for (int n = 1; n <= AHEAD_EVENTS; ++n) {
         probability *= depth / float(n);
-        power *= g;
+        power *= before;
         if (power < LEAST_POWER) { break; }
         float base = (1.0 - power) * (1.0 - power) + 2.0 * power * (1.0 - cos_scatter);
         float beyond = (1.0 - power * power) / (base * sqrt(base)) - 1.0 - power * (3.0 * cos_scatter + 5.0 * power * second);

@@ -43,6 +43,7 @@ vec3 point_at(LightRay ray, float axial_depth) {
 struct LightDepth {
     vec3 depth;
     vec3 ahead;      // of it, that of scattering in media whose scattering ahead is followed
+    vec3 behind;     // the same times the metres from there to the point
     float steepest;  // of the crossings before, in axial depth per texel
     float visible;   // 0 where an opaque surface is in between
 };
@@ -71,6 +72,7 @@ void add_part(inout LightDepth sum, uint link, LightRay ray, float from, float t
     sum.depth += extinction * ((to - from) * ray.metres);
 #if SCATTERS_AGAIN
     sum.ahead += scattering * ((to - from) * ray.metres);
+    sum.behind += scattering * ((to - from) * (ray.axial_depth - 0.5 * (from + to)) * ray.metres * ray.metres);
 #endif
 #else
     sum.depth += light_media[link - 1u].rgb * ((to - from) * ray.metres);
@@ -80,7 +82,7 @@ void add_part(inout LightDepth sum, uint link, LightRay ray, float from, float t
 // Optical depth to the point of a ray, by the crossings of a texel, moved along their faces to this very ray. offset: of
 // the point from the texel's center.
 LightDepth texel_light_depth(uint cell, vec2 offset, LightRay ray) {
-    LightDepth sum = LightDepth(vec3(0.0), vec3(0.0), 0.0, 1.0);
+    LightDepth sum = LightDepth(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 1.0);
     float last = 0.0;
     uint behind = 0u;
     uint link = light_heads[cell];
@@ -130,14 +132,14 @@ LightDepth light_depth(int light, vec3 point) {
     vec2 offset = position - floor(position) - 0.5;
     uint cell = light_cell(cells, texel);
 #if SHADOWS
-    if (axial_depth > light_ends[cell] + 1.5 / views.z) { return LightDepth(vec3(0.0), vec3(0.0), 0.0, 0.0); }
+    if (axial_depth > light_ends[cell] + 1.5 / views.z) { return LightDepth(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0); }
 #endif
     vec3 travel = source.w == 0.0 ? -source.xyz : point - source.xyz;
     vec3 advance = travel / max(dot(scatter_views[4 * view + 3].xyz, travel), 1e-30);
     LightRay ray = LightRay(point, axial_depth, advance, length(advance));
     LightDepth found = texel_light_depth(cell, offset, ray);
     if (light_heads[cell] != 0u && found.steepest < STEEP_IN_LIGHT_VIEW) { return found; }
-    LightDepth sum = LightDepth(vec3(0.0), vec3(0.0), 0.0, 1.0);
+    LightDepth sum = LightDepth(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 1.0);
     float total = 0.0;
     ivec2 corner = texel - ivec2(lessThan(offset, vec2(0.0)));
     vec2 fraction = offset + vec2(texel - corner);
@@ -150,9 +152,11 @@ LightDepth light_depth(int light, vec3 point) {
         float weight = (weights.x * weights.y + 1e-4) / (found.steepest * found.steepest + 1e-9);
         sum.depth += weight * found.depth;
         sum.ahead += weight * found.ahead;
+        sum.behind += weight * found.behind;
         total += weight;
     }
     sum.depth /= max(total, 1e-30);
     sum.ahead /= max(total, 1e-30);
+    sum.behind /= max(total, 1e-30);
     return sum;
 }

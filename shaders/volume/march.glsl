@@ -58,9 +58,12 @@ vec3 scattered_from_light(float weights[SLOTS], int light, vec3 point, vec3 dire
     LightDepth path = light_depth(light, point);
     float cos_scatter = dot(arriving.towards, direction);
     vec3 sum = transmittance(path.depth) * scattering_phase(weights, cos_scatter);
+    vec4 source = light_position[light];
+    float metres = dot(path.behind, vec3(1.0)) / max(dot(path.ahead, vec3(1.0)), 1e-30);
+    float lever = source.w == 0.0 ? 1.0 : max(1.0 - metres / max(length(point - source.xyz), 1e-30), 0.0);
     for (int slot = 0; slot < SLOTS; ++slot) {
         if (weights[slot] > 0.0 && scattered_ahead[slot].x > 0.0) {
-            vec3 again = phase_after_scattering(cos_scatter, scattered_ahead[slot].x, scattered_ahead[slot].y, path.ahead);
+            vec3 again = phase_after_scattering(cos_scatter, scattered_ahead[slot].x, scattered_ahead[slot].y, path.ahead, lever);
             sum += weights[slot] * slot_scattering[slot].rgb * transmittance(path.depth - path.ahead) * again;
         }
     }
@@ -71,13 +74,23 @@ vec3 scattered_from_light(float weights[SLOTS], int light, vec3 point, vec3 dire
 struct Marched {
     vec3 color;  // at the segment's beginning
     vec3 depth;
+#if SCATTERS_AGAIN
+    vec3 ahead;  // of it, that of scattering in media whose scattering ahead is followed
+    int slot;    // of the last of these, or -1
+#endif
 };
+
+#if SCATTERS_AGAIN
+#define NOTHING_MARCHED(depth) Marched(vec3(0.0), depth, vec3(0.0), -1)
+#else
+#define NOTHING_MARCHED(depth) Marched(vec3(0.0), depth)
+#endif
 
 // The steps of one pass: emission and all lights, for variable = -1; or with equal angles one point light, which the first
 // pass then leaves out. before: transmittance from the eye to the segment. Where that of all channels falls below
 // LEAST_SEEN, sources are not looked for: what is left out is at most this fraction of what comes from there.
 Marched march_pass(float weights[SLOTS], int variable, ViewRay ray, float metres, vec3 sigma, vec3 emission, vec3 before) {
-    Marched sum = Marched(vec3(0.0), vec3(0.0));
+    Marched sum = NOTHING_MARCHED(vec3(0.0));
     for (int i = 0; i < march_steps; ++i) {
         vec3 fractions = step_fractions(i);
         float begin = metres_at_fraction(fractions.x, variable, ray, metres).x;
@@ -94,6 +107,10 @@ Marched march_pass(float weights[SLOTS], int variable, ViewRay ray, float metres
             sigma += here[slot] * slot_extinction[slot].rgb;
             source += here[slot] * slot_emission[slot].rgb;
 #if SCATTERS_AGAIN
+            if (here[slot] > 0.0 && scattered_ahead[slot].x > 0.0) {
+                sum.ahead += here[slot] * (end - begin) * slot_scattering[slot].rgb;
+                sum.slot = slot;
+            }
             if (here[slot] > 0.0) {
                 source += here[slot] * slot_scattering[slot].rgb * scattered_before(slot, ray.start + at.x * ray.direction, -ray.direction);
             }
@@ -129,7 +146,7 @@ Marched march_pass(float weights[SLOTS], int variable, ViewRay ray, float metres
 }
 
 Marched marched(float weights[SLOTS], ViewRay ray, float metres, vec3 sigma, vec3 emission, vec3 before) {
-    Marched sum = Marched(vec3(0.0), sigma * metres);
+    Marched sum = NOTHING_MARCHED(sigma * metres);
     for (int variable = -1; variable < scatter_light_count; ++variable) {
         bool angular = march_rule == MARCH_EQUIANGULAR && light_position[max(variable, 0)].w != 0.0;
         if (variable >= 0 && !angular) { continue; }
@@ -137,6 +154,9 @@ Marched marched(float weights[SLOTS], ViewRay ray, float metres, vec3 sigma, vec
         sum.color += pass.color;
 #if VARIES
         if (variable < 0) { sum.depth = pass.depth; }
+#if SCATTERS_AGAIN
+        if (variable < 0) { sum.ahead = pass.ahead; sum.slot = pass.slot; }
+#endif
 #endif
     }
     ++marched_segments;

@@ -7,6 +7,7 @@
 // a small-angle solution for what is peaked, a diffuse one for the rest (Romanova 1962; Budak, Klyuykov & Korkin 2010).
 
 #include <Density>
+#include "lib/environment.glsl"
 #include "lib/phase.glsl"
 
 uniform sampler3D scattered_light;  // grids of all bodies, one behind the other along z: mean radiance, and its gradient
@@ -27,4 +28,21 @@ vec3 scattered_before(int slot, vec3 point, vec3 direction) {
         mean += direction.z * textureLod(scattered_light, at + 3.0 * next, 0.0).rgb;
     }
     return mean;
+}
+
+// Light of the environment that is scattered ahead on a ray, at its beginning, less what cells hold of it: a picture of the
+// environment for each depth, behind the cells. depth: of scattering on the whole ray.
+vec3 environment_ahead(int slot, vec3 direction, vec3 depth) {
+    float deepest = scattered_ahead[slot].z;
+    if (deepest == 0.0) { return vec3(0.0); }
+    vec2 uv = equirectangular_uv(direction, 0.0);
+    vec3 size = vec3(textureSize(scattered_light, 0));
+    float first = scattered_grid[slot].w + 4.0 * scattered_grid[slot].z;
+    vec2 at = vec2(1.0 + AHEAD_WIDTH * fract(uv.x), clamp(AHEAD_HEIGHT * uv.y, 0.5, AHEAD_HEIGHT - 0.5));
+    vec3 level = sqrt(min(depth / deepest, vec3(1.0))) * (AHEAD_DEPTHS - 1.0) + 0.5 + first;
+    return vec3(
+        textureLod(scattered_light, vec3(at, level.r) / size, 0.0).r,
+        textureLod(scattered_light, vec3(at, level.g) / size, 0.0).g,
+        textureLod(scattered_light, vec3(at, level.b) / size, 0.0).b
+    );
 }

@@ -13,6 +13,7 @@ import translucent as tl
 from translucent.diffusion.volume import DiffusingVolume, VolumeField, VolumeGrid
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.rendered import Treatment
+from translucent.scene.environment_map import texel_directions
 
 SIZE = (12, 12)
 SKY = tl.Environment.gradient((0.2, 0.1, 0.05), (1, 1, 1))
@@ -52,11 +53,20 @@ def cloud(
     return tl.Scene([body], CAMERA, lights, environment)
 
 
+def patch() -> tl.Environment:
+    """A dark environment with a bright patch behind what is seen."""
+    directions = texel_directions(32, 64)
+    towards = np.array([-0.3, -0.15, -1.0]) / np.linalg.norm([-0.3, -0.15, -1.0])
+    bright = 30.0 * np.clip((directions @ towards - 0.95) / 0.05, 0.0, 1.0)
+    return tl.Environment.image(0.1 + bright[..., None] * np.array([1.0, 0.8, 0.6]))
+
+
 TRUTHS = {
     "sky": (cloud([], SKY), 0.03),
     "sun": (cloud([SUN], DARK), 0.08),
     "profile": (cloud([], SKY, density=tl.LinearDensity(1, 1.0, 0.05)), 0.03),
     "ahead": (cloud([], SKY, 40.0, anisotropy=0.8), 0.12),
+    "patch": (cloud([], patch(), 12.0, density=tl.LinearDensity(1, 1.0, 0.5), anisotropy=0.85), 0.12),
     "behind": (cloud([BEHIND], DARK, anisotropy=0.85), 0.12),
 }
 

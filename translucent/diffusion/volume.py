@@ -23,6 +23,7 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 from translucent.arrays import Array, Integers
 from translucent.diffusion.densities import cell_means
 from translucent.diffusion.entering import DIRECTIONS, environment_parts, even_directions, nearest_parts, path_inside
+from translucent.diffusion.environment_ahead import EnvironmentAhead, environment_ahead
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.photons import FineCells
 from translucent.diffusion.solution import CellSystem
@@ -89,11 +90,12 @@ def swept_moments(
     travel = -directions.T
     weights = solid_angles * np.vstack([np.ones(len(directions)), travel])[: len(emission)]
     sums = np.zeros(emission.shape)
+    cells, sources = extinction.astype(np.float32), emission.astype(np.float32)
     for axis in range(3):
+        matter, source = np.moveaxis(cells, axis, 0), np.moveaxis(sources, axis + 1, 0)
+        found = np.moveaxis(sums, axis + 1, 0)
         for alike in _alike(directions, axis):
             sweep = _Sweep.along(directions[alike.numbers], axis, alike.signs, step)
-            matter = np.moveaxis(extinction, axis, 0)
-            source, found = (np.moveaxis(values, axis + 1, 0) for values in (emission, sums))
             sweep.run(matter, source, found, arriving[alike.numbers], weights[:, alike.numbers])
     return sums
 
@@ -159,7 +161,7 @@ class _Sweep:
         length = (step / ahead).astype(np.float32)[:, None, None, None]
         return cls(signs[0] > 0.0, (near[0], near[1]), tuple(beside), length)
 
-    def run(self, extinction: Array, emission: Array, sums: Array, arriving: Array, weights: Array) -> None:
+    def run(self, extinction: Floats, emission: Floats, sums: Array, arriving: Array, weights: Array) -> None:
         """Add the weighted radiance of these directions to slices (x, m, y, z, 3) of an array."""
         count, (_, n, m, channels) = len(arriving), extinction.shape
         light = np.empty((count, n + 1, m + 1, channels), np.float32)
@@ -167,7 +169,7 @@ class _Sweep:
         weights = weights.astype(np.float32)
         travel = np.ascontiguousarray((weights[1:] / weights[0]).T)
         for i in range(len(extinction))[:: -1 if self.backwards else 1]:
-            sigma, source = extinction[i].astype(np.float32), emission[i].astype(np.float32)
+            sigma, source = extinction[i], emission[i]
             sent = source[0] if len(source) == 1 else source[0] + np.tensordot(travel, source[1:], axes=1)
             # All that leaves a cell gets into those of the next slice: nothing is lost between them.
             edge, depth, sent = self._between(light), sigma * self.length, sent * self.length
@@ -256,6 +258,8 @@ class VolumeField:
         g of this medium; 0 without a gradient.
     straight : float
         Fraction of scattered light that counts as unscattered here, beyond what rays find of each light themselves.
+    environment : EnvironmentAhead, optional
+        What rays find of the environment at their end.
     """
 
     mean_radiance: npt.NDArray[np.float32]
@@ -265,11 +269,13 @@ class VolumeField:
     gradient: tuple[Floats, ...] = ()
     mean_cosine: float = 0.0
     straight: float = 0.0
+    environment: EnvironmentAhead | None = None
 
     @property
     def volumes(self) -> tuple[npt.NDArray[np.float32], ...]:
         """Arrays (x, y, z, 3) that pictures look up."""
-        return (self.mean_radiance, *self.gradient)
+        ahead = () if self.environment is None else (self.environment.radiance,)
+        return (self.mean_radiance, *self.gradient, *ahead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -389,7 +395,8 @@ class DiffusingVolume:
             mean = _finer(mean, photons.cells.finer) + (1.0 - medium.anisotropy) / (4.0 * np.pi) * photons.fluence
             gradient = [_finer(part, photons.cells.finer) for part in gradient]
         volumes = tuple(np.ascontiguousarray(part, np.float32) for part in (mean, *gradient))
-        return VolumeField(volumes[0], cells.low, step, steps, volumes[1:], self._ahead, self._peak)
+        behind = environment_ahead(scene.environment, self._ahead) if self._ahead > 0.0 else None
+        return VolumeField(volumes[0], cells.low, step, steps, volumes[1:], self._ahead, self._peak, behind)
 
     @property
     def _ahead(self) -> float:

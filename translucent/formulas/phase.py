@@ -121,11 +121,15 @@ def phase_cosine(phase: npt.ArrayLike, share: npt.ArrayLike) -> Array:
 AHEAD_EVENTS = 16
 
 #: Mean cosine after several events below which their phase function has no moment of order 3 and more that is seen.
-LEAST_POWER = 0.05
+LEAST_POWER = 0.15
 
 
 def phase_after_scattering(
-    cos_scatter: npt.ArrayLike, anisotropy: npt.ArrayLike, straight: npt.ArrayLike, depth: npt.ArrayLike
+    cos_scatter: npt.ArrayLike,
+    anisotropy: npt.ArrayLike,
+    straight: npt.ArrayLike,
+    depth: npt.ArrayLike,
+    lever: npt.ArrayLike = 1.0,
 ) -> Array:
     """Phase function in 1/sr, less its mean over all directions, of light that was scattered before on its path.
 
@@ -134,6 +138,9 @@ def phase_after_scattering(
     it exp(-depth) (Goudsmit & Saunderson 1940). So after one more event (2 l + 1) / 4 pi g^l times their difference is
     the moment of order l. It equals a sum over a Poisson number n of events before, after which the phase function is
     that of g^(n + 1): orders 1 and 2 are in closed form here, and only the others are this sum.
+
+    Of light that comes from a point, and is scattered by a small angle at a fraction u of its way, a fraction u of the
+    angle is seen at its end. By small angles g^l = exp(-l |log g|) is then g^(u l): before, g^u takes the place of g.
 
     Parameters
     ----------
@@ -146,17 +153,20 @@ def phase_after_scattering(
         decays with 1 - straight here, not with 1 - g.
     depth : array_like
         Optical depth of scattering before, without absorption.
+    lever : array_like
+        Mean u over this depth; 1 for light from far away.
     """
     g, kept = np.asarray(anisotropy, np.float64), np.asarray(straight, np.float64)
     cosine, depth = np.asarray(cos_scatter, np.float64), np.asarray(depth, np.float64)
+    before = g ** np.asarray(lever, np.float64)
     second = 1.5 * cosine * cosine - 0.5
     with np.errstate(under="ignore"):
         none = np.exp(-depth)
         total = 3.0 * g * cosine * (np.exp((kept - 1.0) * depth) - none)
-        total = total + 5.0 * g * g * second * (np.exp((g * g - 1.0) * depth) - none)
+        total = total + 5.0 * g * g * second * (np.exp((before * before - 1.0) * depth) - none)
         probability, power = none, g
         for n in range(1, AHEAD_EVENTS + 1):
-            probability, power = probability * depth / n, power * g
+            probability, power = probability * depth / n, power * before
             lower = 1.0 + power * (3.0 * cosine + 5.0 * power * second)
             beyond = 4.0 * np.pi * henyey_greenstein(cosine, power) - lower
             total = total + np.where(power < LEAST_POWER, 0.0, probability * beyond)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
+from translucent.diffusion.environment_ahead import DEPTHS, HEIGHT, WIDTH
 from translucent.formulas.brdf_table import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
 from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS, LEAST_COSINE
@@ -109,6 +110,9 @@ CONSTANTS: dict[str, str] = {
     "STEEPEST_SHADOW": "64.0",  # texels along a light's rays that a surface may rise from one texel to the next
     **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
     "LEAST_SEEN": repr(LEAST_SEEN),
+    "AHEAD_DEPTHS": f"{DEPTHS}.0",
+    "AHEAD_HEIGHT": f"{HEIGHT}.0",
+    "AHEAD_WIDTH": f"{WIDTH}.0",
     "IN_SCATTERED_ROUGHNESS": repr(IN_SCATTERED_ROUGHNESS),
     "DENSITY_GRID": "1.0",
     "DENSITY_LINEAR": "2.0",

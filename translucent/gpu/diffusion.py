@@ -117,6 +117,7 @@ def slot_grids(light: DiffusedTexture | None, slots: Sequence[Slot], center: Arr
             low[i] = *(field.low - center), 1.0 / field.step
             grid[i] = *field.mean_radiance.shape[:3], light.first_layers[slot.objects[0]]
             ahead[i, :2] = field.mean_cosine, field.straight
+            ahead[i, 2] = 0.0 if field.environment is None else field.environment.deepest
     return {"scattered_low": low, "scattered_grid": grid, "scattered_ahead": ahead}
 
 

@@ -351,7 +351,8 @@ DENSITY = UniformBlock(
         ("density_grid", "f4", (MAX_SLOTS, 4)),  # voxels along x, y and z; the first layer in the texture of all grids
         ("scattered_low", "f4", (MAX_SLOTS, 4)),  # corner of the cells of light scattered before; cells in a metre
         ("scattered_grid", "f4", (MAX_SLOTS, 4)),  # cells along x, y and z; the first layer in the texture of all
-        # Mean cosine of scattering, 0 where cells do not know directions; fraction that counts as unscattered in cells
+        # Mean cosine of scattering, 0 where cells do not know directions; fraction that counts as unscattered in cells;
+        # last depth of what is scattered ahead of the environment, 0 where that is even
         ("scattered_ahead", "f4", (MAX_SLOTS, 4)),
     ),
 )

@@ -235,8 +235,8 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
     bodies = [body for body in scene.bodies if body.medium is not None and body.medium.scatters]
     if any(treatment_of(body) is Treatment.VOLUME for body in bodies):
         text = (
-            "what is scattered more than once: what opaque objects and other bodies keep from it, and where light of "
-            "the environment goes on ahead, as around bright parts of it behind media that scatter ahead"
+            "what is scattered more than once: what opaque objects and other bodies keep from it, and light of these "
+            "that is scattered ahead on its way to the eye"
         )
         if scene.opaque:
             text += "; grounds send none into it, which is up to 25 % of the light of what stands on a bright one"

@@ -155,8 +155,8 @@ __all__ = ["SCATTERINGS", "Diffusion", "Scattering", "ScatteringLayer", "SingleS
 SCATTERINGS: dict[str, type[Scattering]] = {one.name: one for one in (Diffusion, ScatteringLayer, SingleScattering)}
 
 
-#: Least reduced scattering across a body, sigma_s' times its mean thickness, at which the planner shows more than what
-#: single scattering does: of the environment's light, that is nothing.
+#: Least scattering across a body, sigma_s times its mean thickness, at which the planner shows more than what single
+#: scattering does: of the environment's light, that is nothing, and what goes on ahead is lost, too.
 LEAST_DEPTH = 0.01
 
 #: Optical depth across a cell from which on light of a body of one density leaves through its surface.
@@ -282,9 +282,8 @@ def _is_cloud(body: Object) -> bool:
 
 
 def _is_deep(body: Object, medium: Medium) -> bool:
-    reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
     densest = 1.0 if body.density is None else body.density.maximum
-    return bool(reduced.max() * densest * body.mean_thickness > LEAST_DEPTH)
+    return bool(np.asarray(medium.scattering).max() * densest * body.mean_thickness > LEAST_DEPTH)
 
 
 def _is_volume(body: Object, chosen: Diffusion) -> bool:

@@ -1,0 +1,83 @@
+"""Light of an environment that a medium scatters ahead: the background as a medium blurs it, by optical depth.
+
+References
+----------
+Goudsmit & Saunderson 1940, "Multiple scattering of electrons"; Premoze et al. 2004, "Practical rendering of multiple
+scattering effects in participating media", for the light that stays near a ray.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache, partial
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array
+from translucent.formulas.phase import henyey_greenstein
+from translucent.scene.environment import Environment
+from translucent.scene.environment_map import convolved, row_solid_angles, texel_directions
+
+#: Depths, rows and columns.
+DEPTHS, HEIGHT, WIDTH = 16, 32, 64
+
+#: Attenuation of the second Legendre moment, as an exponent, beyond which nothing is left.
+_GONE = 4.0
+
+#: Most events on a path that differ from many, and the mean cosine after them from which on they do.
+_MOST_EVENTS, _LEAST_POWER = 128, 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class EnvironmentAhead:
+    """Radiance along rays by light that was scattered on its way, less its mean and gradient over all directions.
+
+    Cells of a volume hold mean and gradient. Of order l > 1 a Legendre moment of the environment is multiplied by
+    exp(-(1 - g^l) depth) - exp(-depth): as by a Poisson number n > 0 of events, each of g^n together.
+
+    Attributes
+    ----------
+    radiance : (WIDTH + 2, HEIGHT, DEPTHS, 3) float32
+        An equirectangular picture, with a column more at each side, for each optical depth of scattering x. These are
+        `deepest` times the squares of even fractions.
+    deepest : float
+        The last depth.
+    """
+
+    radiance: npt.NDArray[np.float32]
+    deepest: float
+
+
+@lru_cache(maxsize=2)
+@np.errstate(under="ignore")
+def environment_ahead(environment: Environment, anisotropy: float) -> EnvironmentAhead | None:
+    """Find what media of a mean cosine g > 0 scatter ahead of an environment; None if it is too even to matter."""
+    if environment.kind != "image":
+        return None
+    directions, angles = texel_directions(HEIGHT, WIDTH), row_solid_angles(HEIGHT, WIDTH)[:, None, None]
+    fine = _means(environment)
+    mean = (fine * angles).sum(axis=(0, 1)) / (4.0 * np.pi)
+    first = np.einsum("yxc,yxd,yxo->cd", fine, directions, np.broadcast_to(angles, (HEIGHT, WIDTH, 1))) / (4.0 * np.pi)
+    gradient = 3.0 * directions @ first.T
+    deepest = _GONE / (1.0 - anisotropy**2)
+    events = [n for n in range(1, _MOST_EVENTS + 1) if anisotropy**n >= _LEAST_POWER]
+    blurred = [convolved(fine, partial(henyey_greenstein, anisotropy=anisotropy**n)) for n in events]
+    found = np.zeros((DEPTHS, HEIGHT, WIDTH, 3))
+    for i, depth in enumerate(deepest * (np.arange(DEPTHS) / (DEPTHS - 1)) ** 2):
+        probability = np.exp(-depth)
+        for n, picture in zip(events, blurred, strict=True):
+            probability *= depth / n
+            found[i] += probability * (picture - mean - anisotropy**n * gradient)
+    wrapped = np.concatenate([found[:, :, -1:], found, found[:, :, :1]], axis=2)
+    return EnvironmentAhead(np.ascontiguousarray(wrapped.transpose(2, 1, 0, 3), np.float32), deepest)
+
+
+def _means(environment: Environment) -> Array:
+    """(HEIGHT, WIDTH, 3): mean radiance of the environment's light in the texels of a small picture."""
+    times = 8
+    fine = environment.lighting(texel_directions(times * HEIGHT, times * WIDTH))
+    angles = row_solid_angles(times * HEIGHT, times * WIDTH)[:, None, None]
+    shape = HEIGHT, times, WIDTH, times, -1
+    total = (fine * angles).reshape(shape).sum(axis=(1, 3))
+    return np.asarray(total / np.broadcast_to(angles, fine[..., :1].shape).reshape(shape).sum(axis=(1, 3)))
