@@ -1,4 +1,4 @@
-"""Quadrature of the reflectance of rough interfaces; `translucent.formulas.brdf_table` stores its results."""
+"""Quadrature of the reflectance of rough interfaces; `translucent.formulas.bsdf` stores its results."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.formulas.brdf_table import TABLE_SIZE
+from translucent.formulas.bsdf import TABLE_SIZE
 
 #: Gauss-Legendre points in the polar and in the azimuthal angle, in `albedo`.
 POINTS = (24, 16)

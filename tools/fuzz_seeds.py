@@ -287,7 +287,7 @@ def _read_presets(path: Path) -> None:
 
 
 def _read_table(path: Path) -> None:
-    from translucent.media.batch import convert_table
+    from translucent.media.presets import convert_table
 
     convert_table(path, "m", "m", False)
 

@@ -53,7 +53,6 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.frames.metrics import interior as interior
     from translucent.frames.photographs import Photograph as Photograph
     from translucent.frames.photographs import fit_photographs as fit_photographs
-    from translucent.frames.tiled import Tile as Tile
     from translucent.geometry.mesh import Mesh as Mesh
     from translucent.gltf.materials import read_materials as read_materials
     from translucent.gltf.write import write_medium as write_medium
@@ -117,6 +116,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.scene.texture import Texture as Texture
     from translucent.scene_files import load_scene as load_scene
     from translucent.showing import show as show
+    from translucent.tiles import Tile as Tile
     from translucent.tiles import render_tiles as render_tiles
 
 #: Modules of the public names. Each is imported when it is first asked for: SciPy and OpenGL take their time.
@@ -137,7 +137,6 @@ _NAMES = {
     "frames.frame": "Frame",
     "frames.metrics": "Errors compare interior",
     "frames.photographs": "Photograph fit_photographs",
-    "frames.tiled": "Tile",
     "geometry.mesh": "Mesh",
     "gltf.materials": "read_materials",
     "gltf.write": "write_medium",
@@ -173,7 +172,7 @@ _NAMES = {
     "scene.texture": "Texture",
     "scene_files": "load_scene",
     "showing": "show",
-    "tiles": "render_tiles",
+    "tiles": "Tile render_tiles",
 }
 _MODULE_OF = {name: f"translucent.{module}" for module, names in _NAMES.items() for name in names.split()}
 

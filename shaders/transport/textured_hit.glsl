@@ -1,5 +1,5 @@
 // The surface of an object where a ray has hit it: the row of the object, with its textures and the colors of its vertices.
-// gpu/hit_textures.py writes their table behind the triangles of the hierarchies: a record for each object, corners of
+// gpu/hierarchies.py writes their table behind the triangles of the hierarchies: a record for each object, corners of
 // triangles, and texels. TEXTURED: there is one. Needs <ObjectRow> and hierarchy.glsl.
 
 #if TEXTURED

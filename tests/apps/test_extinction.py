@@ -22,8 +22,8 @@ from translucent.assets import mesh_path
 from translucent.commands.extinction import SIZE
 from translucent.formulas.color import linear_to_srgb
 from translucent.materials import TARGETS
-from translucent.media.batch import MOST_SHOWN, convert_table
 from translucent.media.colors import parse_color
+from translucent.media.presets import MOST_SHOWN, convert_table
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ from translucent.bench.truth import CaseTruth
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.shortcuts import DepthOnlyPass
-from translucent.gpu.passes.signed_depth import SignedDepthPass
+from translucent.gpu.passes.thickness import SignedDepthPass
 from translucent.gpu.targets import Storage, Targets
 from translucent.planning.passes import PassName
 

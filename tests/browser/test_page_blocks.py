@@ -16,7 +16,7 @@ import trimesh
 
 import translucent as tl
 from translucent.gpu.layout import BLOCKS, BODY
-from translucent.gpu.recording.frames import SIZE, FrameRecorder
+from translucent.gpu.recording import SIZE, FrameRecorder
 from translucent.page.payload import payload
 from translucent.page.plans import plan_page
 from translucent.planning.request import RenderRequest

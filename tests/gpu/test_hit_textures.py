@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.gpu.hierarchies import HierarchyCache
-from translucent.gpu.hit_textures import _mipmaps
+from translucent.gpu.hierarchies import HierarchyCache, _mipmaps
 
 BLACK = tl.Environment.constant((0.0, 0.0, 0.0))
 CAMERA = tl.Camera.orthographic((0, 0, 3), (0, 0, 0), up=(0, 1, 0), height=2.0)

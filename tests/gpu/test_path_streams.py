@@ -9,7 +9,7 @@ import translucent as tl
 from tests.gpu.test_path_traced import SCENES, SIZE, SKY, ball
 from translucent.assets import mesh_path
 from translucent.geometry.ray_caster import embree_refusal
-from translucent.gpu.passes import path_streams, path_trace
+from translucent.gpu.passes import path_trace
 
 EMBREE, SHADERS = tl.PathTraced(48, 3, hits="embree"), tl.PathTraced(48, 3, hits="gl")
 GLASS = tl.Medium(absorption=(0.1, 0.3, 0.6), ior=1.5)
@@ -68,7 +68,7 @@ def test_tiles_and_streams_leave_no_trace(most: int, renderer: tl.Renderer, monk
     """One stream for each pixel, several with other numbers of paths, and one for each path."""
     scene = ALL["ball in a ball"]
     whole = renderer.render(scene, SIZE, EMBREE)
-    monkeypatch.setattr(path_streams, "MOST_STREAMS", most)
+    monkeypatch.setattr(path_trace, "MOST_STREAMS", most)
     monkeypatch.setattr(path_trace.PathTracer.steps, "__kwdefaults__", {"seconds": 0.1, "tile": 5})
     shares: list[float] = []
     parts = renderer.render(scene, SIZE, EMBREE, progress=shares.append)

@@ -14,8 +14,8 @@ import translucent as tl
 from tests.command_line import Run
 from translucent.commands import render
 from translucent.errors import InputError, TranslucentWarning
-from translucent.frames.tiled import write_tiles
 from translucent.geometry.solids import Sphere
+from translucent.tiles import write_tiles
 
 SIZE, TILE = (40, 28), (16, 12)
 CAMERA = tl.Camera.look_at((0.3, 0.4, 5.0), (0, 0, 0), fov_y=30.0)

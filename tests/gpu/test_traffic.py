@@ -12,8 +12,8 @@ import pytest
 
 import translucent as tl
 from tests.gpu.test_compact import BALL, CAMERA, MEDIA, OPEN, SCENES, SIZE, balls, with_opaque
+from translucent.gpu import recording
 from translucent.gpu.pass_costs import PassTraffic, frame_traffic
-from translucent.gpu.recording import frames
 from translucent.gpu.targets import FORMATS, Targets
 from translucent.planning.passes import PassName
 
@@ -35,8 +35,8 @@ PLANS: dict[str, tuple[tl.Scene, tl.Method | None, dict[str, Any]]] = {
 
 def recorded(scene: tl.Scene, plan: tl.RenderPlan, monkeypatch: pytest.MonkeyPatch) -> dict[str, PassTraffic]:
     """Bytes of each pass, counted from the draws, clears and textures that it asks for."""
-    monkeypatch.setattr(frames, "RecordedJob", partial(frames.RecordedJob, compact=True))
-    recorder = frames.FrameRecorder(1, 4, 32)
+    monkeypatch.setattr(recording, "RecordedJob", partial(recording.RecordedJob, compact=True))
+    recorder = recording.FrameRecorder(1, 4, 32)
     steps = recorder.record(plan).single
     gl, units = recorder.gl, {"f4": 4, "f1": 1, "u4": 4}
 

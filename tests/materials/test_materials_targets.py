@@ -17,8 +17,14 @@ from translucent.formulas.color import srgb_to_linear, to_hex
 from translucent.gltf.file import GltfFile
 from translucent.gltf.materials import materials_of
 from translucent.materials import TARGETS, load_medium, text_block
-from translucent.materials.engines import LONGEST_CM, from_mean_free_path_cm, from_unity, mean_free_path_cm
-from translucent.materials.json_text import read_json, write_json
+from translucent.materials.engines import (
+    LONGEST_CM,
+    from_mean_free_path_cm,
+    from_unity,
+    mean_free_path_cm,
+    read_json,
+    write_json,
+)
 from translucent.materials.materialx import OPENPBR, STANDARD_SURFACE
 from translucent.media.medium import BLACKEST, color_at, extinction_at
 

@@ -7,7 +7,7 @@ import pytest
 
 from tools import brdf_quadrature
 from tools.brdf_quadrature import albedo
-from translucent.formulas.brdf_table import brdf_table as table
+from translucent.formulas.bsdf import brdf_table as table
 
 
 def sampled(n_v: float, roughness: float, count: int = 200_000) -> tuple[np.ndarray, np.ndarray]:

@@ -11,10 +11,10 @@ import pytest
 import translucent as tl
 from tests.values.plan_scenes import plan_over_backdrop
 from translucent.geometry.solids import Box
-from translucent.planning import surface_textures
+from translucent.planning import bodies
+from translucent.planning.bodies import halvings
 from translucent.planning.passes import NoteKind, PassName
 from translucent.planning.plan import plan
-from translucent.planning.surface_textures import halvings
 from translucent.scene.surface import Surface
 
 METHOD = tl.PathTraced(paths=16)
@@ -94,10 +94,10 @@ def test_textures_that_do_not_fit_are_halved_and_told(monkeypatch: pytest.Monkey
     surface = tl.Surface(color_texture=large, roughness_texture=small)
     one = scene(tl.Object(unwrapped, MILK, surface=surface))
     assert halvings(one) == {large: 0, small: 0}
-    monkeypatch.setattr(surface_textures, "MOST_TEXELS", 64 + 2 * 20)
+    monkeypatch.setattr(bodies, "MOST_TEXELS", 64 + 2 * 20)
     assert halvings(one) == {large: 1, small: 0}
     assert plan(one, METHOD).says(NoteKind.TEXTURES)
-    monkeypatch.setattr(surface_textures, "MOST_TEXELS", 2)
+    monkeypatch.setattr(bodies, "MOST_TEXELS", 2)
     assert halvings(one) == {large: 5, small: 3}
 
 

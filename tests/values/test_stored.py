@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from tools.brdf_quadrature import albedo
-from translucent.formulas.brdf_table import TABLE_SIZE, brdf_table
+from translucent.formulas.bsdf import TABLE_SIZE, brdf_table
 from translucent.formulas.sampling import MOST_POINTS, sobol_points
 
 #: Script that makes all that a picture of an own mesh on a stage is drawn from.
 PREPARED = """
 import sys, translucent as tl
 from translucent.assets import mesh_path
-from translucent.formulas.brdf_table import brdf_table
+from translucent.formulas.bsdf import brdf_table
 from translucent.formulas.sampling import sample_shifts
 from translucent.scene.environment import filtered
 from translucent.scene.shadow_directions import shadow_directions

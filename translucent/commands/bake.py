@@ -134,7 +134,7 @@ class BakeOptions:
     check: bool = option(False, help="Compare the look with the true one; write OUTPUT.check.png.")
     program: str | None = option(
         names=("--for",),
-        type=NamesOf("translucent.bake.programs", "PROGRAMS"),
+        type=NamesOf("translucent.bake.settings", "PROGRAMS"),
         help="Name, encode and scale the map as this program expects it; -o may be a folder.",
     )
     out_dir: Path | None = option(help="Bake each MODEL into this folder.")
@@ -293,10 +293,9 @@ def _read_scatter_job(model: str, output: Path, given: BakeOptions) -> ScatterJo
 
 
 def _bake_one(job: Job, given: BakeOptions, as_json: bool) -> None:
-    from translucent.bake.batch import reported_values
+    from translucent.bake.batch import bake_tiles, is_tiled, reported_values
     from translucent.bake.jobs import bake_file
-    from translucent.bake.programs import job_for, recipe_for
-    from translucent.bake.udim import bake_tiles, is_tiled
+    from translucent.bake.settings import job_for, recipe_for
 
     if given.check and given.vertices:
         raise InputError("--check", "it looks at maps", "leave --vertices out")

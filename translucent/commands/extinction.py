@@ -415,8 +415,8 @@ def _infinite(values: list[float | None]) -> list[float]:
 
 
 def _convert_table(table: Path, given: ExtinctionOptions) -> None:
-    from translucent.media.batch import check_batch_output, convert_table
     from translucent.media.conversion import CLAMP
+    from translucent.media.presets import check_batch_output, convert_table
 
     output = given.output
     if output is not None:

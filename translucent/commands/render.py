@@ -57,10 +57,10 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from translucent.frames.frame import Frame
-    from translucent.frames.tiled import Tile
     from translucent.planning.request import RenderRequest
     from translucent.renderer import Renderer
     from translucent.scene.scene import Scene
+    from translucent.tiles import Tile
 
 #: Below these fractions of light, passed straight or scattered back, a picture shows little but black.
 NEARLY_BLACK, HARDLY_LIT = 0.02, 0.05
@@ -379,8 +379,7 @@ class Pictures:
         self, scene: Scene, renderer: Renderer, request: RenderRequest, progress: Callable[[float], None]
     ) -> tuple[Frame, dict[str, Any]]:
         """Draw and write a large picture; returns a small frame of it, and the statistics of all its pixels."""
-        from translucent.frames.tiled import write_tiles
-        from translucent.tiles import Totals, tiles_requested
+        from translucent.tiles import Totals, tiles_requested, write_tiles
 
         totals, (width, height) = Totals(), self.size
 

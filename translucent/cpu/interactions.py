@@ -17,7 +17,7 @@ from translucent.formulas.bsdf import Interaction, below_coat, diffuse_radiance,
 from translucent.formulas.interface import CLEARCOAT_IOR, reflected_direction, refracted_direction
 from translucent.formulas.light import highlight_from
 from translucent.geometry.ray_caster import SceneRayCaster, dot, unit
-from translucent.planning.surface_textures import textured_at_hits
+from translucent.planning.bodies import textured_at_hits
 from translucent.reference.hits import Rays
 from translucent.reference.light_paths import SurfaceLight
 from translucent.reference.surfaces import interface_surfaces

@@ -10,7 +10,7 @@ import numpy as np
 from translucent.arrays import Array, Integers
 from translucent.cpu.interactions import BranchInteractions, InterfaceHits
 from translucent.cpu.interior_list import Branches
-from translucent.formulas.footprint import ALPHA_OF_DEVIATION, FOOTPRINT_STEP, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
+from translucent.formulas.sampling import ALPHA_OF_DEVIATION, FOOTPRINT_STEP, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
 from translucent.geometry.ray_caster import SceneRayCaster, dot
 from translucent.reference.hits import Rays
 from translucent.reference.refracted import places_on_backdrop

@@ -5,11 +5,16 @@ and transmittances are fractions of the light at an interface, by channel; a cos
 light comes from; ``ior`` is the index of the other side relative to this one. Directions (..., 3) are unit vectors in
 which light travels; a normal looks to the side that the light comes from.
 
+`brdf_table` is the reflectance of a rough interface under uniform light, for the split-sum approximation. With the
+Fresnel term F = F0 + (F90 - F0) (1 - v.h)^5 of Schlick it is ``F0 * scale + F90 * bias``. The microfacets are GGX with
+alpha = roughness^2 and height-correlated shadowing and masking (Heitz 2014, eq. 99), as in glTF 2.0, appendix B.
+
 References
 ----------
 Walter et al. 2007, "Microfacet models for refraction through rough surfaces"; Heitz 2014, "Understanding the masking-
 shadowing function in microfacet-based BRDFs"; Belcour & Barla 2017, "A practical extension to microfacet theory for the
-modeling of varying iridescence"; Schlick 1994, "An inexpensive BRDF model for physically-based rendering".
+modeling of varying iridescence"; Schlick 1994, "An inexpensive BRDF model for physically-based rendering"; Karis 2013,
+"Real Shading in Unreal Engine 4".
 """
 
 from __future__ import annotations
@@ -21,7 +26,11 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import interface, optics
+from translucent.formulas.stored import stored
 from translucent.formulas.thin_film import film_slab_reflectance, film_slab_transmittance, thin_film_reflectance
+
+#: Rows (roughness) and columns (cosine) of the table; both ends are in it.
+TABLE_SIZE = 64
 
 
 class Lobes(NamedTuple):
@@ -260,3 +269,8 @@ def microfacet_value(
     """
     density = interface.ggx_distribution(np.minimum(cos_half, 1.0), alpha)
     return np.asarray(density * interface.ggx_visibility(cos_light, cos_view, alpha))
+
+
+def brdf_table() -> npt.NDArray[np.float32]:
+    """(64, 64, 2) float32: scale and bias at roughness i / 63 in row i and cosine j / 63 in column j; stored."""
+    return stored("brdf")

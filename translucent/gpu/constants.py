@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import get_args
 
 from translucent.diffusion.environment_ahead import DEPTHS, HEIGHT, WIDTH
-from translucent.formulas.brdf_table import TABLE_SIZE
+from translucent.formulas.bsdf import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
 from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS, LEAST_COSINE
-from translucent.formulas.footprint import ALPHA_OF_DEVIATION, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
 from translucent.formulas.interface import CLEARCOAT_IOR
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
+from translucent.formulas.sampling import ALPHA_OF_DEVIATION, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
 from translucent.formulas.spherical_harmonics import BAND_0, BAND_1, BAND_2, BAND_2_ZONAL
 from translucent.formulas.thin_film import (
     FILM_BLUE_CENTER,

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from translucent.errors import RenderError
-from translucent.formulas.brdf_table import brdf_table
+from translucent.formulas.bsdf import brdf_table
 from translucent.gpu.shaders import before_drawing_with, before_making, set_uniform
 from translucent.scene.environment import Environment, filtered
 from translucent.scene.environment_map import EnvironmentMap

@@ -21,8 +21,7 @@ from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.files.reading import read_text
 from translucent.materials.blender import BLENDER
-from translucent.materials.engines import CSS, GODOT, THREEJS, UNITY, UNREAL
-from translucent.materials.json_text import GLTF, JSON
+from translucent.materials.engines import CSS, GLTF, GODOT, JSON, THREEJS, UNITY, UNREAL
 from translucent.materials.materialx import OPENPBR_TARGET, STANDARD_SURFACE_TARGET
 from translucent.materials.target import ExportTarget
 from translucent.materials.usd import USD

@@ -22,8 +22,8 @@ from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import BLOCKS, BODY, TABLES, PackedTable, UniformBlock
 from translucent.gpu.lifting import lift
 from translucent.gpu.placement import PlacedScene, face_counts
+from translucent.gpu.recording import FrameRecorder, RecordedFrame
 from translucent.gpu.recording.context import INFO, RecordingContext
-from translucent.gpu.recording.frames import FrameRecorder, RecordedFrame
 from translucent.gpu.uniforms import BodyRoles, bounded_extinction, media_center
 from translucent.media.medium import Medium
 from translucent.media.presets import presets

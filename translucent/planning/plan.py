@@ -20,9 +20,13 @@ from translucent.planning.bodies import (
     open_around_eye,
     open_bodies,
     overlapping_pair,
+    reduced_at_hits,
     require_clear_priorities,
     scatters,
     solids_of,
+    textured_at_hits,
+    unread_at_hits,
+    untextured_rays,
 )
 from translucent.planning.caustics import (
     UNREQUESTED,
@@ -74,7 +78,6 @@ from translucent.planning.rendered import Treatment, darkened, occluder_scene, o
 from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Scattering, SingleScattering, Treatments, choose_treatments, rendered_scene
 from translucent.planning.shadow_maps import ShadowMaps, shadow_passes, shadows_left_out
-from translucent.planning.surface_textures import reduced_at_hits, textured_at_hits, unread_at_hits, untextured_rays
 from translucent.scene.lights import SPREADS, PositionalLight, SphereLight, SpotLight, without_spheres
 from translucent.scene.scene import Object, Scene, check_scene, object_names
 

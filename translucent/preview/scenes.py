@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from translucent.assets import mesh_names, mesh_path
 from translucent.errors import InputError
-from translucent.formulas.brdf_table import brdf_table
+from translucent.formulas.bsdf import brdf_table
 from translucent.formulas.phase import parse_phase
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals, keep_drawn_normals

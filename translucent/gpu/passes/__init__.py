@@ -7,20 +7,16 @@ from typing import Protocol
 import moderngl
 
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
-from translucent.gpu.passes.backdrop import BackdropPass
 from translucent.gpu.passes.caustics import CausticsPass
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
-from translucent.gpu.passes.fragment_lists import FragmentListsPass
+from translucent.gpu.passes.fragment_lists import FragmentListsPass, KBufferPass
 from translucent.gpu.passes.interfaces import InterfacesPass, SurfacesPass
-from translucent.gpu.passes.k_buffer import KBufferPass
 from translucent.gpu.passes.layers import LayersPass
 from translucent.gpu.passes.light_views import LightViewsPass
-from translucent.gpu.passes.opaque import OpaquePass
+from translucent.gpu.passes.opaque import BackdropPass, OpaquePass
 from translucent.gpu.passes.path_trace import PathTracePass
 from translucent.gpu.passes.shadow_maps import ShadowMapsPass
-from translucent.gpu.passes.signed_depth import SignedDepthPass
-from translucent.gpu.passes.thin_layer import ThinLayerPass
+from translucent.gpu.passes.thickness import BackFaceDepthPass, SignedDepthPass, ThinLayerPass
 from translucent.gpu.passes.traced_interfaces import TracedInterfacesPass
 from translucent.gpu.passes.transmittance import TransmittancePass
 from translucent.planning.passes import PassName, PassSpec

@@ -1,18 +1,22 @@
-"""Opaque objects: the ends of rays through the media, and the radiance there."""
+"""Opaque objects, drawn or the picture of another renderer: the ends of rays through media, and radiance there."""
 
 from __future__ import annotations
+
+import math
 
 import moderngl
 import numpy as np
 
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.context import require_interfaces
-from translucent.gpu.job import CameraView, FrameJob
+from translucent.gpu.job import CameraView, FrameJob, TextureBackdrop
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.resources import Resources
 from translucent.gpu.shaders import set_uniform, set_used
+from translucent.media.colors import ColorLike
 from translucent.planning.passes import PassSpec
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS
+from translucent.scene.backdrop import Backdrop
 from translucent.scene.surface import TEXTURE_FIELDS, Surface
 
 _MAPS = (
@@ -26,6 +30,12 @@ _MAPS = (
 )
 #: Samplers of ``shaders/shade/opaque_surface.glsl``.
 SURFACE_SAMPLERS = *_MAPS, *TEXTURE_FIELDS
+
+#: Depth of infinitely far pixels: behind everything, and yet visible.
+_BEHIND_ALL = 0.1 * float(CONSTANTS["NOTHING"])
+
+#: Samplers of ``shaders/shade/backdrop_shadows.frag``.
+_SHADOW_SAMPLERS = ("opaque_axial_depth", "light_irradiance", "shadow_sums", "shadow_ends")
 
 
 class OpaquePass:
@@ -157,3 +167,71 @@ def _clear(framebuffer: moderngl.Framebuffer) -> None:
     framebuffer.color_mask = off, on
     framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
     framebuffer.color_mask = on, on
+
+
+class BackdropPass:
+    """Copy of the job's backdrop into the target of opaque objects, with the shadows of bodies on it; see
+    ``shaders/shade/backdrop.frag`` and ``shaders/shade/backdrop_shadows.frag``.
+    """
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        samplers = "backdrop_color", "backdrop_depth"
+        self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/backdrop.frag", *samplers)
+        self._shadows = Variants(gl, "geometry/fullscreen.vert", "shade/backdrop_shadows.frag", *_SHADOW_SAMPLERS)
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Fill the target; but for shadows of the environment, it is the same for all samples of a pixel."""
+        if isinstance(job.backdrop, Backdrop):
+            _upload(job, job.backdrop)
+        elif job.backdrop is not None:
+            self._draw(job, job.backdrop)
+        if job.backdrop is not None and job.features.shadows_backdrop:
+            self._shadow(job, job.backdrop.ambient)
+
+    def _draw(self, job: FrameJob, backdrop: TextureBackdrop) -> None:
+        job.targets["opaque"].use()
+        job.gl.enable_only(moderngl.NOTHING)
+        self._variants.bind(backdrop_color=backdrop.color, backdrop_depth=backdrop.depth)
+        program = self._variants.program(ORTHOGRAPHIC=backdrop.orthographic, INFINITE=math.isinf(backdrop.far))
+        media = job.placed.media
+        set_uniform(program, "near", backdrop.near)
+        if not math.isinf(backdrop.far):
+            set_uniform(program, "far", backdrop.far)
+        set_uniform(program, "media_near", media.near)
+        set_uniform(program, "media_length", media.length)
+        set_uniform(program, "gamma", backdrop.gamma)
+        set_uniform(program, "behind_all", _BEHIND_ALL)
+        self._variants.draw_fullscreen(program)
+
+    def _shadow(self, job: FrameJob, ambient: ColorLike | None) -> None:
+        """Multiply the radiance by the fraction of its light that reaches it."""
+        axial_depth = job.targets["opaque"].color_attachments[0]
+        job.targets.view("opaque", 1).use()  # what is read may not be attached
+        job.gl.enable_only(moderngl.BLEND)
+        job.gl.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
+        environment = job.scene.environment
+        light_map = ambient is None and environment.kind == "image"
+        program = self._shadows.program(
+            LIGHT_MAP=light_map, EVEN_LIGHT=ambient is not None, **shadow_switches(True, job.resources)
+        )
+        self._shadows.bind(opaque_axial_depth=axial_depth)
+        job.resources.shadows.use(self._shadows.units)
+        if light_map:
+            self._shadows.bind(light_irradiance=job.resources.environments.light(environment).irradiance)
+        set_uniform(program, "behind_all", _BEHIND_ALL)
+        if ambient is not None:
+            set_uniform(program, "even_light", ambient)
+        self._shadows.draw_fullscreen(program)
+
+
+def _upload(job: FrameJob, backdrop: Backdrop) -> None:
+    """Upload the arrays; distances are converted to depths in float64, so that far scenes lose no digits."""
+    with np.errstate(under="ignore"):
+        axial_depth = np.minimum((backdrop.depth - job.placed.media.near) / job.placed.media.length, _BEHIND_ALL)
+        axial_depth = axial_depth.astype(np.float32)
+    if backdrop.coverage is not None:
+        axial_depth = np.where(backdrop.coverage, axial_depth, np.float32(CONSTANTS["NOTHING"]))
+    radiance = np.ones((*axial_depth.shape, 4), dtype=np.float32)
+    radiance[..., :3] = backdrop.radiance
+    for texture, rows in zip(job.targets["opaque"].color_attachments, (axial_depth, radiance), strict=True):
+        texture.write(np.ascontiguousarray(rows[::-1]))

@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 import moderngl
 
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
+from translucent.gpu.passes.thickness import BackFaceDepthPass
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import build_program, set_uniform
 from translucent.gpu.targets import Targets, add_up

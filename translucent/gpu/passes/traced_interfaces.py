@@ -9,7 +9,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from translucent.formulas.footprint import FOOTPRINT_STEP
+from translucent.formulas.sampling import FOOTPRINT_STEP
 from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
