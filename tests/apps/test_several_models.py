@@ -11,7 +11,7 @@ import pytest
 import translucent as tl
 from tests.command_line import Run, one_error_line
 from translucent.assets import scene_names
-from translucent.commands.model import SceneRequest, read_scene
+from translucent.commands.model import NamedMedium, SceneRequest, read_scene
 from translucent.commands.options import FileOptions
 from translucent.preview.document import AUTO, Document, Look, Model
 from translucent.preview.exports import Recipe, command_line, python_code
@@ -50,6 +50,12 @@ def test_options_fill_what_has_no_material() -> None:
     assert (glass.medium, wine.medium) == (tl.preset("jade").medium, tl.preset("merlot").medium)
     assert glass.surface.roughness == 0.2
     assert wine.surface is None
+
+
+def test_a_mesh_of_the_toolkit_is_named_as_on_the_command_line() -> None:
+    media = [NamedMedium("goblet", tl.preset("crystal").medium, None)]
+    scene = read_scene("goblet wine:merlot", SceneRequest(media=media, stage="none"))
+    assert [item.medium for item in scene.objects] == [tl.preset("crystal").medium, tl.preset("merlot").medium]
 
 
 def test_a_height_scales_the_whole() -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 import shutil
 import subprocess
 import tarfile
@@ -10,6 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
+
+from translucent.cli import cli
 
 WEB = Path(__file__).resolve().parents[2] / "web"
 GENERATED = WEB / "src" / "generated" / "shaders.ts"
@@ -115,14 +120,24 @@ def test_a_pack_without_shaders_says_what_makes_them(package: Path) -> None:
     assert not list(package.glob("*.tgz"))
 
 
-@pytest.mark.parametrize("example", ["import-map", "webgpu"])
+def printed_shader(name: str) -> str:
+    """Shader that a command in the docs writes into a file of this name."""
+    page = (WEB.parent / "docs" / "engines" / "three-js.md").read_text(encoding="utf-8")
+    (command,) = re.findall(rf"^translucent (shader .*) > {re.escape(name)}$", page, re.MULTILINE)
+    return CliRunner().invoke(cli, shlex.split(command)).output
+
+
+@pytest.mark.parametrize("example", ["import-map", "webgpu", "by-hand"])
 def test_an_import_map_needs_no_build(chromium: Any, web_dist: Path, example: str) -> None:
     if not (WEB / "node_modules" / "three" / "build" / "three.module.js").is_file():
         pytest.skip("three is not there: run `make web`")
 
     def serve(route: Any) -> None:
         path = WEB / route.request.url.removeprefix(f"{ORIGIN}/")
-        route.fulfill(body=path.read_bytes(), content_type=_KINDS[path.suffix])
+        if path.suffix in _KINDS:
+            route.fulfill(body=path.read_bytes(), content_type=_KINDS[path.suffix])
+        else:
+            route.fulfill(body=printed_shader(path.name))
 
     context = chromium.new_context(viewport={"width": 200, "height": 160})
     errors: list[str] = []

@@ -467,7 +467,7 @@ def bake_tiles(job: Job, progress: Progress | None = None) -> tuple[Record, Resu
         if progress is not None:
             progress((number + 1) / len(tiles), rays)
     about = {"hash": content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
-    storing = {key: bool(job.get(key)) for key in ("normalize", "invert")}
+    storing = {key: bool(job.get(key)) for key in ("normalize", "invert", "values_only")}
     largest = max(float(np.max(one.values, initial=0.0)) for one in results.values())
     records = []
     with OutputFiles() as files:

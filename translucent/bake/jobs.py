@@ -13,6 +13,7 @@ A job holds what JSON can hold, so it can be kept, sent and hashed:
 ``vertices``     True: thickness per vertex instead of a map
 ``unwrap``       True: new UVs, whatever the model has
 ``normalize``    True: store fractions of the largest value; ``invert``: 1 minus them
+``values_only``  True: an .exr file has one channel
 ``outside``      True: read files that a glTF model links to wherever they are, not only below its folder
 ``resume``       True: keep finished parts in ``OUTPUT.resume.npz``, and go on from there
 ``threads``      how many (default: all processors); results do not depend on it
@@ -79,7 +80,7 @@ Progress = Callable[[float, int], None]
 
 KEYS = {
     "model", "output", "unit", "settings", "medium", "high", "cage", "vertices", "unwrap", "normalize", "invert",
-    "resume", "threads", "max_escaped", "outside",
+    "values_only", "resume", "threads", "max_escaped", "outside",
 }  # fmt: skip
 #: Version of the set of files that a bake writes; another number makes them anew.
 FILES = 2
@@ -105,7 +106,8 @@ def check_job(job: Job) -> None:
         raise InputError(f"max_escaped {fraction!r}", "not in 0..1", "give a share of the rays, for example 0.05")
     suffixes = VERTEX_SUFFIXES if job.get("vertices") else MAP_SUFFIXES
     output = Path(job["output"])
-    suffix = check_map_output(output, suffixes, **_storing(job))
+    storing = _storing(job)
+    suffix = check_map_output(output, suffixes, normalize=storing["normalize"], invert=storing["invert"])
     settings = job.get("settings", {})
     of_maps = [key for key in (*_OF_MAPS, "normalize", "invert", "resume") if job.get(key) or settings.get(key)]
     if job.get("vertices") and of_maps:
@@ -197,7 +199,7 @@ def bake_file(job: Job, progress: Progress | None = None, content: str | None = 
 
 
 def _storing(job: Job) -> dict[str, bool]:
-    return {key: bool(job.get(key)) for key in ("normalize", "invert")}
+    return {key: bool(job.get(key)) for key in ("normalize", "invert", "values_only")}
 
 
 def bake_one(

@@ -198,7 +198,7 @@ class Program:
     name : str
         Its file, where a folder is given.
     storing : Mapping
-        `normalize` and `invert` of a bake job.
+        `normalize`, `invert` and `values_only` of a bake job.
     unit : str
         Of its lengths, and `per_metre` of them in a metre.
     recipe : str
@@ -215,10 +215,11 @@ class Program:
 PROGRAMS = {
     "blender": Program(
         "{model}_thickness.exr",
-        {},
+        {"values_only": True},  # Cycles takes three channels for red, green and blue
         "m",
         1.0,
-        "Blender: Image Texture, color space Non-Color; values are metres, {largest} m at most",
+        "Blender: Image Texture, color space Non-Color, its Color into Subsurface Scale; values are metres, "
+        "{largest} m at most",
     ),
     "unreal": Program(
         "T_{model}_Thickness.png",

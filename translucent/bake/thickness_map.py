@@ -5,7 +5,8 @@ Each file appears complete, with its record beside it, or not at all:
 ==========  =========================================================================================
 file        holds
 ==========  =========================================================================================
-.exr        float32: ``Y`` the values, ``standard_error.Y``, ``coverage.Y``; unit, mode, settings in its header
+.exr        float32: ``Y`` the values, ``standard_error.Y``, ``coverage.Y``; or ``Y`` alone; unit, mode,
+             settings in its header
 .npy        float32: the values
 .npz        ``values``, ``standard_error``, ``coverage``, ``scale``, ``offset``
 .png        16-bit gray; scale, offset, unit and mode in its text chunks
@@ -279,6 +280,7 @@ def save_map(
     *,
     normalize: bool = False,
     invert: bool = False,
+    values_only: bool = False,
     about: Record | None = None,
 ) -> Record:
     """Write a thickness map, and beside it its record and, if it has new UVs, the mesh with them.
@@ -292,6 +294,8 @@ def save_map(
         Store fractions of the largest value. A PNG always does; what turns them into metres is in file and record.
     invert : bool
         Store 1 minus that fraction, the translucency that some engines want.
+    values_only : bool
+        An ``.exr`` file has the channel ``Y`` alone, as programs need that take three channels for red, green and blue.
     about : dict, optional
         More for the record, such as where the mesh is from.
 
@@ -314,7 +318,8 @@ def save_map(
     with OutputFiles() as files:
         if result.report.uv_from == "xatlas":
             about["uv_file"] = add_uv_file(files, mesh_file(result.mesh), path)
-        return add_map(files, result, path, normalize=normalize, invert=invert, about=about)
+        storing = {"normalize": normalize, "invert": invert, "values_only": values_only}
+        return add_map(files, result, path, **storing, about=about)
 
 
 def add_map(
@@ -324,6 +329,7 @@ def add_map(
     *,
     normalize: bool,
     invert: bool,
+    values_only: bool = False,
     about: Record,
     largest: float | None = None,
 ) -> Record:
@@ -335,12 +341,12 @@ def add_map(
     levels = PNG_LEVELS if suffix == ".png" else 0
     of = result.values if largest is None else np.array([largest])
     encoding = Encoding.of(of, levels, normalize=normalize, invert=invert, unit=result.settings.unit)
-    filled = files.write(path, partial(_fill, result=result, encoding=encoding, suffix=suffix))
+    filled = files.write(path, partial(_fill, result=result, encoding=encoding, suffix=suffix, alone=values_only))
     return add_record(files, path, {**fingerprint(path, filled), **about, **result.record(encoding)})
 
 
-def _fill(path: Path, result: ThicknessMap, encoding: Encoding, suffix: str) -> None:
-    """Write the file of a map, without its record."""
+def _fill(path: Path, result: ThicknessMap, encoding: Encoding, suffix: str, alone: bool) -> None:
+    """Write the file of a map, without its record; an .exr file has values `alone`, or errors too."""
     settings, values = result.settings, encoding.encode(result.values)
     definition = DEFINITIONS[settings.mode]
     stated = {
@@ -354,7 +360,7 @@ def _fill(path: Path, result: ThicknessMap, encoding: Encoding, suffix: str) -> 
     }
     errors, coverage = result.standard_error, result.coverage
     if suffix == ".exr":
-        channels = {"Y": values, "standard_error.Y": errors, "coverage.Y": coverage}
+        channels = {"Y": values} if alone else {"Y": values, "standard_error.Y": errors, "coverage.Y": coverage}
         comments = f"{definition}; value = offset + scale * Y in {encoding.unit}"
         write_exr(path, channels, {"comments": comments, **stated})
     elif suffix == ".npy":

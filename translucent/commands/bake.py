@@ -135,7 +135,7 @@ class BakeOptions:
     program: str | None = option(
         names=("--for",),
         type=NamesOf("translucent.bake.settings", "PROGRAMS"),
-        help="Name, encode and scale the map as this program expects it; -o may be a folder.",
+        help="Name and encode the map as this program expects it, and print what to set there; -o may be a folder.",
     )
     out_dir: Path | None = option(help="Bake each MODEL into this folder.")
     usd: Path | None = option(
@@ -150,7 +150,7 @@ class BakeOptions:
 
 @click.command(
     cls=VerbCommand,
-    usual="output mode size rays unit height preset high vertices invert check out_dir",
+    usual="output program mode size rays unit height preset high vertices check out_dir",
     epilog="Example: translucent bake bear -o thickness.exr --size 128 --rays 16",
 )
 @click.argument("models", nargs=-1, required=True, metavar="MODEL...")

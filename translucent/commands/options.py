@@ -550,12 +550,12 @@ class ChoiceOptions:
     )
     interfaces: str | None = option(
         type=NamesOf("translucent.planning.interfaces", "INTERFACES"),
-        help="Where light bends and is mirrored: at all interfaces, traced through the meshes; where it enters bodies "
-        "and where it leaves them, in screen space (quicker); or only where it enters (quickest). Default: traced, "
-        "where bodies are solid and rays can be; the plan says what was taken.",
+        help="Where light is reflected and refracted. traced: at all interfaces, by rays through the meshes. screen: "
+        "where it enters bodies and where it leaves them, in screen space (quicker). front: only where it enters "
+        "(quickest). Default: traced, where bodies are solid and rays can be; the plan says which it is.",
     )
     interface_depth: int | None = option(
-        metavar="N", help="Of --interfaces traced: interfaces that a ray may hit. Default: 8; 12 without --interfaces."
+        metavar="N", help="Of --interfaces traced: interfaces that a ray may hit, 1 to 64. Default: 24."
     )
     interface_forks: int | None = option(
         metavar="N",
@@ -568,10 +568,11 @@ class ChoiceOptions:
     )
     scattering: str | None = option(
         type=NamesOf("translucent.planning.scattering", "SCATTERINGS"),
-        help="Light that media scatter many times: as it diffuses in the body (wax, milk, jade); as a flat layer gives "
-        "it back (quicker where the light or the medium changes all the time); or not at all, with what is scattered "
-        "once alone (smoke, clear drinks). Default: diffusion in closed bodies with an interface, layers in sheets and "
-        "open meshes, single where there is no interface or little scatters.",
+        help="Light that media scatter many times. diffusion: it spreads in the body (wax, milk, jade). layer: it "
+        "leaves where it entered, as from a flat layer (quicker where the light or the medium changes all the time). "
+        "single: only light that is scattered once is rendered (smoke, clear drinks). Default: diffusion in closed "
+        "bodies with an interface, layer in sheets and open meshes, single where there is no interface or little "
+        "scatters.",
     )
     diffusion_resolution: int | None = option(
         metavar="N", help="Of --scattering diffusion: a body gets about N^3 / 4 cells, 8 to 128. Default: 32."
@@ -631,7 +632,7 @@ class ChoiceOptions:
         return method.with_thickness(parse_length(self.thickness))
 
     def _interfaces(self) -> InterfaceMode | None:
-        from translucent.planning.interfaces import INTERFACES, TracedInterfaces
+        from translucent.planning.interfaces import INTERFACES, USUAL_DEPTH, TracedInterfaces
 
         stated: dict[str, Any] = {
             "depth": self.interface_depth,
@@ -642,9 +643,9 @@ class ChoiceOptions:
         if given and self.interfaces != TracedInterfaces.name:
             requested = f"--interface-{next(iter(given))}"
             raise InputError(requested, "only --interfaces traced takes it", "add --interfaces traced")
-        return (
-            TracedInterfaces(**given) if given else None if self.interfaces is None else INTERFACES[self.interfaces]()
-        )
+        if self.interfaces == TracedInterfaces.name:
+            return TracedInterfaces(**{"depth": USUAL_DEPTH, **given})
+        return None if self.interfaces is None else INTERFACES[self.interfaces]()
 
     def _scattering(self) -> Scattering | None:
         from translucent.planning.scattering import SCATTERINGS, Diffusion

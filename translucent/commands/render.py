@@ -114,8 +114,8 @@ class RenderOptions:
         (),
         names=("--object",),
         metavar="NAME",
-        help="What follows of a medium, as --preset P or --color C --distance D, is this object's alone; may be "
-        "repeated.",
+        help="The medium that follows, as --preset P or --color C --distance D, is for the object of this name alone; "
+        "may be repeated.",
     )
     variant: str | None = option(
         metavar="NAME", help="Materials of this variant of a glTF file (KHR_materials_variants)."
@@ -172,9 +172,14 @@ class RenderOptions:
 def render(model: str, given: RenderOptions, as_json: bool) -> None:
     """Render MODEL, a file or one of the toolkit's own meshes, to a picture with its physical quantities.
 
-    The model stands on a ground with its shadow; see --stage. A .glb or .gltf file is rendered as the scene that it is,
-    with the media of its materials; --color, --preset or --scattering-color replaces them. All other files are one
-    mesh. Behind an --object they are for this object alone:
+    The model stands on a ground with its shadow; see --stage. A .glb or .gltf file keeps its camera, lights and media;
+    --color, --preset or --scattering-color replaces the media. All other files are one mesh.
+
+    Several models, each with its material:
+
+    translucent render goblet:crystal wine:red_wine -o wine.png
+
+    A medium behind an --object is for the object of that name:
 
     translucent render bar.glb -o bar.png --object Wine --preset merlot --object Glass --preset crystal
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TypeVar
 
 import numpy as np
@@ -253,7 +253,8 @@ def filled(
 
 
 def objects_named(scene: Scene, name: str) -> tuple[Object, ...]:
-    """Objects of a name: those whose mesh has it, or, where none has, the parts of one, as ``Cup`` of ``Cup[0]``.
+    """Objects of a name: those whose mesh has it, or, where none has, the parts of one, as ``Cup`` of ``Cup[0]``, or
+    those of a file of that name, as ``goblet`` of ``goblet.ply``.
 
     Raises
     ------
@@ -264,6 +265,7 @@ def objects_named(scene: Scene, name: str) -> tuple[Object, ...]:
     for items in (
         [item for item in scene.objects if item.mesh.name == name],
         [item for item in scene.objects if item.mesh.name.startswith(f"{name}[")],
+        [item for item in scene.objects if name and PurePath(item.mesh.name).stem == name],
     ):
         if items:
             return tuple(items)
