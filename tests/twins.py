@@ -160,6 +160,14 @@ def _emergent_arguments() -> list[np.ndarray]:
     return [_triples(fluence), _triples(entering), _triples(albedo), conductance, mean_cosine, cosine]
 
 
+def _first_event_arguments(count: int) -> list[np.ndarray]:
+    """Phase functions, albedos and `count` cosines."""
+    phases = np.array([(0, 0, 0, 0), (0.2, 0, 0, 0), (-0.5, 0, 0, 0), (0.85, 0, 0, 0), (0.6, -0.3, 4, 0.3)])
+    number, *cosines = _mixed(np.arange(len(phases)), *[np.array([0.0, 0.3, 0.9, 1.0])] * count)
+    scale = np.resize([1.0, 1.25, 4.0], len(number))
+    return [phases[number.astype(int)].astype(np.float32), _triples(scale), *cosines]
+
+
 def _harmonic_arguments() -> list[np.ndarray]:
     """Transfer and light of both signs, some of whose products cancel or sum to less than nothing."""
     rng = np.random.default_rng(8)
@@ -339,6 +347,8 @@ ARGUMENTS = {
     "mirrored_reflectance": _mirrored_arguments(),
     "mirrored_transmittance": _mirrored_arguments(),
     "emergent_radiance": _emergent_arguments(),
+    "first_events_excess": _first_event_arguments(1),
+    "mean_first_events_excess": _first_event_arguments(2),
     "real_harmonics": [np.concatenate([_unit_vectors(), np.eye(3, dtype=np.float32), -np.eye(3, dtype=np.float32)])],
     "scattered_radiance": _harmonic_arguments(),
     "exit_lobe": _mixed(UNIT, np.array([1.0, 1.0001, 1.33, 1.5, 2.4]), np.array([0.5, 0.91, 1.0])),
@@ -366,11 +376,15 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
     "henyey_greenstein": 64.0,  # a power of 1.5 of a small difference
     "draine": 64.0,
     "phase_value": 64.0,
+    "first_events_excess": 64.0,
+    "mean_first_events_excess": 64.0,
     "phase_after_scattering": 256.0,  # the same, 16 times
     "equirectangular_uv": 4096.0,
     "tone_agx": 64.0,  # powers
 }
 FLOOR = {
+    "first_events_excess": 1e-5,  # less 1
+    "mean_first_events_excess": 1e-5,
     "filmed_reflectance": 4e-5,  # as thin_film_reflectance
     "filmed_facing": 2e-4,  # the same, over 1 - (1 - cos)^5, which is above 0.2 here
     "microfacet_normal": 1e-5,  # near normal incidence the axes across it are as wrong as its sine is small

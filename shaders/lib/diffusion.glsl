@@ -1,6 +1,9 @@
 // Light that leaves a body in which it diffuses. Pure. Fluence and flux in W/m^2 for radiance in W/(m^2 sr). Each function is
 // the float32 twin of the same name in translucent/formulas/diffusion.py, where it is derived.
 
+#include <constants>
+#include "lib/phase.glsl"
+
 // Radiance times 4 pi, inside a body below its surface and towards it, of light that has been scattered: fluence phi at the
 // surface, flux E that enters there times the albedo w, conductance c of the interface, mean cosine m of entering light inside.
 vec3 emergent_radiance(vec3 fluence, vec3 entering, vec3 albedo, float conductance, float mean_cosine, float cosine) {
@@ -12,4 +15,21 @@ vec3 emergent_radiance(vec3 fluence, vec3 entering, vec3 albedo, float conductan
     vec3 gathered = (own + once * (mean_cosine * cosine) / (d * slant)) / (1.0 + k * cosine);
     vec3 rising = 1.0 + conductance * cosine / d + k * k * cosine * cosine;
     return once + albedo * (gathered + (fluence - own) * rising);
+}
+
+// Radiance by first events at an angle, over that by as many events that scatter to all sides alike, less 1. scale: albedo of single
+// scattering over the reduced one.
+vec3 first_events_excess(vec4 phase, vec3 scale, float cos_scatter) {
+    return 4.0 * PI * phase_value(phase, cos_scatter) * scale - 1.0;
+}
+
+// The same, mean over azimuths: light that enters with a cosine of `down` with the normal, and leaves with one of `up`.
+vec3 mean_first_events_excess(vec4 phase, vec3 scale, float down, float up) {
+    float level = sqrt(max((1.0 - down * down) * (1.0 - up * up), 0.0));
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < AZIMUTHS; ++i) {
+        float azimuth = PI * (float(i) + 0.5) / float(AZIMUTHS);
+        sum += first_events_excess(phase, scale, level * cos(azimuth) - down * up);
+    }
+    return sum / float(AZIMUTHS);
 }

@@ -5,7 +5,8 @@
 #include "shade/diffused_texture.glsl"
 
 // Fluence, and flux that enters with its mean cosine inside, at a point of a surface: of each side as much as the normal looks there.
-void light_at_surface(ObjectRow row, vec3 point, vec3 normal, out vec3 fluence, out vec4 entering) {
+// travel: mean direction of that light along the axes of the grid, shorter than 1 where it comes from several; 0 if unknown.
+void light_at_surface(ObjectRow row, vec3 point, vec3 normal, out vec3 fluence, out vec4 entering, out vec3 travel) {
     vec3 texels = vec3(textureSize(diffused_light, 0));
     vec3 place = point - row.grid_low;
     vec3 at = vec3(dot(place, row.grid_x), dot(place, row.grid_y), dot(place, row.grid_z));
@@ -15,28 +16,47 @@ void light_at_surface(ObjectRow row, vec3 point, vec3 normal, out vec3 fluence, 
     vec3 part = total > 0.0 ? towards * towards / total : vec3(1.0 / 3.0);
     fluence = vec3(0.0);
     entering = vec4(0.0);
+    travel = vec3(0.0);
     for (int axis = 0; axis < 3; ++axis) {
         if (part[axis] == 0.0) { continue; }
         vec3 side = vec3(towards[axis] < 0.0 ? row.grid_size.x : 0.0, float(axis) * row.grid_size.y, 0.0);
         fluence += part[axis] * textureLod(diffused_light, (at + side) / texels, 0.0).rgb;
-        entering += part[axis] * textureLod(diffused_light, (at + side + vec3(0.0, 0.0, row.grid_size.z)) / texels, 0.0);
+        side.z += row.grid_size.z;
+        entering += part[axis] * textureLod(diffused_light, (at + side) / texels, 0.0);
+        if (row.turned > 0.0) {
+            side.z += row.grid_size.z;
+            travel += part[axis] * (textureLod(diffused_light, (at + side) / texels, 0.0).rgb - 1.0);
+        }
     }
 }
 
-// Basic radiance L / n^2 inside an object, below a point of its surface and towards it. normal: outwards, or 0 deep inside; cosine:
-// of the direction there; optical_depth: of the path back through the object, on which it has been scattered.
-vec3 subsurface_exitance(int object, vec3 point, vec3 normal, float cosine, vec3 optical_depth) {
+// Basic radiance L / n^2 inside an object, below a point of its surface and against a ray there in a `direction`. normal: outwards,
+// or 0 deep inside; cosine: between both; optical_depth: of the path back through the object, on which it has been scattered.
+vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, float cosine, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
     if (row.diffuses < 0.5) { return vec3(0.0); }
     vec3 fluence;
     vec4 entering;
-    light_at_surface(row, point, normal, fluence, entering);
+    vec3 travel;
+    light_at_surface(row, point, normal, fluence, entering, travel);
     float m = clamp(entering.a, LEAST_ENTERING_COSINE, 1.0);
     vec3 emergent = emergent_radiance(fluence, entering.rgb, row.albedo, row.conductance, m, cosine);
     // Scaled so that the flux that leaves is that of the diffusion.
     vec3 flux = vec3(0.0);
     for (int i = 0; i < 3; ++i) {
         flux += row.exit_weights[i] * emergent_radiance(fluence, entering.rgb, row.albedo, row.conductance, m, row.exit_cosines[i]);
+    }
+    float together = length(travel);
+    if (row.turned > 0.0 && together > 0.0) {
+        // Light from several directions is scattered as by a phase function whose moments are as much smaller.
+        vec4 phase = row.phase * vec4(together, together, 1.0, 1.0);
+        vec3 scale = 1.0 / (row.albedo + (1.0 - row.albedo) * row.turned);
+        vec3 back = normalize(vec3(dot(direction, row.grid_x), dot(direction, row.grid_y), dot(direction, row.grid_z)));
+        emergent += entering.rgb / (cosine + m) * first_events_excess(phase, scale, -dot(travel, back) / together);
+        for (int i = 0; i < 3; ++i) {
+            float up = row.exit_cosines[i];
+            flux += row.exit_weights[i] * entering.rgb / (up + m) * mean_first_events_excess(phase, scale, m, up);
+        }
     }
     vec3 scale = row.exit_share * fluence / max(flux, vec3(1e-30));
     return emergent * scale * opacity((1.0 - row.ahead) * optical_depth) / (4.0 * PI * row.ior * row.ior);
@@ -47,7 +67,7 @@ vec3 inclusion_exitance(int object, vec3 point, vec3 color) {
     ObjectRow row = object_table_row(object);
     vec3 place = point - row.grid_low;
     vec3 at = vec3(dot(place, row.grid_x), dot(place, row.grid_y), dot(place, row.grid_z));
-    at = clamp(at, vec3(0.5), row.grid_size - 0.5) + vec3(0.0, 0.0, row.first_layer + 2.0 * row.grid_size.z);
+    at = clamp(at, vec3(0.5), row.grid_size - 0.5) + vec3(0.0, 0.0, row.first_layer + (row.turned > 0.0 ? 3.0 : 2.0) * row.grid_size.z);
     vec3 irradiance = textureLod(diffused_light, at / vec3(textureSize(diffused_light, 0)), 0.0).rgb;
     return color * irradiance / (PI * row.ior * row.ior);
 }
@@ -63,7 +83,7 @@ vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) {
     return in_scattered * (far + row.in_scattered_near * environment_light(-direction, IN_SCATTERED_ROUGHNESS));
 }
 #else
-vec3 subsurface_exitance(int object, vec3 point, vec3 normal, float cosine, vec3 optical_depth) { return vec3(0.0); }
+vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, float cosine, vec3 optical_depth) { return vec3(0.0); }
 vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
 vec3 inclusion_exitance(int object, vec3 point, vec3 color) { return vec3(0.0); }
 #endif

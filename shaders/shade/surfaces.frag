@@ -124,8 +124,8 @@ vec3 multiply_scattered(Surface surface, int object, vec3 point, vec3 normal, ve
         light += layer_exitance(surface, point, normal, crossing.thickness, transmittance(crossing.optical_depth));
     }
     float cosine_inside = starts_inside ? 1.0 : refracted_cosine(cosine, surface.ior);
-    light += subsurface_exitance(object, point, starts_inside ? vec3(0.0) : normal, cosine_inside, crossing.optical_depth);
     vec3 inside = starts_inside ? ray : refracted_direction(ray, normal, surface.ior);
+    light += subsurface_exitance(object, point, starts_inside ? vec3(0.0) : normal, inside, cosine_inside, crossing.optical_depth);
     return light + ahead_in_scattered(object, inside, crossing.optical_depth);
 }
 

@@ -173,7 +173,7 @@ vec3 through_media(inout Ray ray, int effective, Hit hit) {
     }
     if (effective != AIR) {
         float cosine = clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0);
-        traced_radiance += ray.throughput * subsurface_exitance(effective, ray.origin, ray.outwards, cosine, medium.extinction * path);
+        traced_radiance += ray.throughput * subsurface_exitance(effective, ray.origin, ray.outwards, ray.direction, cosine, medium.extinction * path);
         traced_radiance += ray.throughput * ahead_in_scattered(effective, ray.direction, medium.extinction * path);
     }
     ray.throughput *= passed;

@@ -12,13 +12,14 @@ from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
     FACETS,
     NODES,
+    bare_half_space,
     diffuse_interface,
     diffusion_coefficient,
     exit_quadrature,
     half_space_reflectance,
     half_space_reflectances,
 )
-from translucent.formulas.diffusion import UNIFORM_COSINE, emergent_radiance
+from translucent.formulas.diffusion import UNIFORM_COSINE, emergent_radiance, mean_first_events_excess
 from translucent.formulas.phase import HenyeyGreenstein
 from translucent.reference.microfacets import scattered_at_interface
 
@@ -259,6 +260,29 @@ def test_half_spaces_are_seen_by_the_angle_of_the_light(albedo: float, most: flo
     found = emergent_radiance(*arguments, cosine)
     ratio = found / shape
     assert np.abs(ratio / ratio.mean() - 1).max() < most
+
+
+@pytest.mark.parametrize(("albedo", "g"), [(0.6, 0.2), (0.9, 0.5), (0.97, 0.5)])
+@pytest.mark.parametrize("entering", [5, 10, 17])
+def test_first_events_have_the_phase_function(albedo: float, g: float, entering: int) -> None:
+    """Against matched half-spaces that scatter ahead, by their modes, as means over azimuths."""
+    interface, phase = diffuse_interface(1.0), HenyeyGreenstein(g)
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    cosine, weight = 0.5 * (nodes + 1), 0.5 * weights
+    down = float(cosine[entering])
+    exact = bare_half_space(albedo, phase, cosine, weight, 48)[:, entering] / (weight[entering] * down)
+    passed = cosine * weight
+    fluence = float(half_space_reflectances(down, albedo, phase=phase)) / interface.exit_share
+    reduced = albedo * (1 - g) / (1 - albedo * g)
+
+    def error(found: np.ndarray) -> float:
+        found = found * (passed @ exact) / (passed @ found)
+        return math.sqrt(passed @ (found - exact) ** 2 * passed.sum()) / (passed @ exact)
+
+    alike = emergent_radiance(fluence, reduced, reduced, interface.conductance, down, cosine)
+    excess = mean_first_events_excess(phase.parameters, albedo / reduced, down, cosine[:, None])[:, 0]
+    found = alike + reduced / (cosine + down) * excess
+    assert error(found) < max(0.5 * error(alike), 0.042)
 
 
 @pytest.mark.parametrize("ior", [1.0, 1.5])

@@ -144,7 +144,7 @@ class DiffusionFields:
         for number, field in self._fields.items():
             own = np.flatnonzero(body == number)
             if own.size:
-                found[own] = field.scattered_radiance(points[own], outwards[own], np.abs(along[own]))
+                found[own] = field.scattered_radiance(points[own], outwards[own], directions[own], np.abs(along[own]))
         return found
 
 

@@ -33,7 +33,15 @@ from translucent.diffusion.sides import read_sides
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, exit_quadrature
-from translucent.formulas.diffusion import LEAST_COSINE, UNIFORM_COSINE, emergent_radiance, in_scattered_shares
+from translucent.formulas.diffusion import (
+    LEAST_COSINE,
+    UNIFORM_COSINE,
+    emergent_radiance,
+    first_events_excess,
+    in_scattered_shares,
+    mean_first_events_excess,
+)
+from translucent.formulas.phase import PhaseFunction
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
 from translucent.scene.lights import DirectionalLight, PositionalLight
@@ -44,6 +52,10 @@ Volume = npt.NDArray[np.float32]
 
 #: Least fraction of the paths through a body on which light counts as scattered: thinner parts hardly scatter.
 LEAST_SCATTERED = 0.02
+
+#: Mean cosine of scattering, at least, of media without an interface whose light is seen by the angle that it turns by
+#: at first events. Behind an interface light enters and leaves in a cone, and that angle is about the same for all.
+DIRECTED = 0.05
 
 #: Fraction of a cell that is inside from which all of it is.
 _WHOLE = 1.0 - 1e-9
@@ -60,6 +72,9 @@ class DiffusionField:
         `SurfaceSides`.
     cosine : (6, x, y, z, 1) float32
         Mean cosine of that light, inside.
+    travel : (6, x, y, z, 3) float32, optional
+        Mean direction of that light, inside, along the axes of the grid, plus 1; None where it does not matter, see
+        `DIRECTED`.
     scattered : (6, x, y, z, 3) float32
         Fraction of the paths through the body, from its surface, on which light is scattered; 1 deep inside.
     inclusions : (x, y, z, 3) float32, optional
@@ -72,6 +87,7 @@ class DiffusionField:
         Side of a cell in metres.
     albedo : (3,) float64
         Of single scattering after similarity: sigma_s' / (sigma_a + sigma_s').
+    phase : PhaseFunction
     conductance, exit_share : float
         Of the interface; see `DiffuseInterface`.
     exits : (3,), (3,) float64
@@ -93,12 +109,14 @@ class DiffusionField:
     fluence: Volume
     entering: Volume
     cosine: Volume
+    travel: Volume | None
     scattered: Volume
     inclusions: Volume | None
     low: Array
     turn: Array
     step: float
     albedo: Array
+    phase: PhaseFunction
     conductance: float
     exit_share: float
     exits: tuple[Array, Array]
@@ -113,12 +131,14 @@ class DiffusionField:
     def volumes(self) -> tuple[Volume, ...]:
         """Arrays (2 x, 3 y, z, 3) that pictures look up: along paths on which all light is scattered.
 
-        Sides are beside each other: outwards and inwards along each axis in two columns, the axes in three rows. The
-        last one is `inclusions`, if there are any.
+        Sides are beside each other: outwards and inwards along each axis in two columns, the axes in three rows. Then
+        come `travel` and `inclusions`, if there are any.
         """
         with np.errstate(under="ignore"):
-            sides = _beside(self.fluence / self.scattered), _beside(self._scattered_entering)
-        return sides if self.inclusions is None else (*sides, self.inclusions)
+            sides = [_beside(self.fluence / self.scattered), _beside(self._scattered_entering)]
+        if self.travel is not None:
+            sides.append(_beside(self.travel))
+        return (*sides,) if self.inclusions is None else (*sides, self.inclusions)
 
     def radiance(self, points: Array, normals: Array, cosine: Array) -> Array:
         """(k, 3): basic radiance L / n^2 below points of the surface, towards it: the mean over paths through the body.
@@ -134,15 +154,19 @@ class DiffusionField:
         fluence, entering = (self.at_surface(volume, points, normals) for volume in volumes)
         return self._emergent(fluence, entering, cosine)
 
-    def scattered_radiance(self, points: Array, normals: Array, cosine: Array) -> Array:
+    def scattered_radiance(self, points: Array, normals: Array, directions: Array, cosine: Array) -> Array:
         """`radiance` as if all light was scattered on the path through the body: the twin of ``diffused_light.glsl``.
 
-        Its file is in ``shaders/shade``. Along a real path the fraction counts that is scattered there.
+        Its file is in ``shaders/shade``. Along a real path the fraction counts that is scattered there. It is seen
+        against rays in directions (k, 3).
         """
         with np.errstate(under="ignore"):
             volumes = self.fluence / self.scattered, self._scattered_entering
         fluence, entering = (self.at_surface(volume, points, normals) for volume in volumes)
-        return self._emergent(fluence, entering, cosine)
+        if self.travel is None:
+            return self._emergent(fluence, entering, cosine)
+        travel = self.at_surface(self.travel, points, normals) - 1.0
+        return self._emergent(fluence, entering, cosine, travel, directions @ self.turn)
 
     @property
     def _scattered_entering(self) -> Volume:
@@ -153,7 +177,15 @@ class DiffusionField:
         """(k, n): values (6, x, y, z, n) of cells at points (k, 3) of the surface with normals (k, 3)."""
         return read_sides(volume, (points - self.low) @ self.turn / self.step, normals @ self.turn)
 
-    def _emergent(self, fluence: Array, entering: Array, cosine: Array) -> Array:
+    def _emergent(
+        self,
+        fluence: Array,
+        entering: Array,
+        cosine: Array,
+        travel: Array | None = None,
+        directions: Array | None = None,
+    ) -> Array:
+        """Radiance against rays at cosines (k,), and in directions (k, 3) in the grid where light has one (k, 3)."""
         mean = np.clip(entering[:, 3:], LEAST_COSINE, 1.0)
 
         def light(mu: npt.ArrayLike) -> Array:
@@ -161,7 +193,20 @@ class DiffusionField:
 
         with np.errstate(under="ignore"):
             flux = np.sum([weight * light(mu) for mu, weight in zip(*self.exits, strict=True)], axis=0)
-            scaled = light(cosine[:, None]) * self.exit_share * fluence / np.maximum(flux, 1e-30)
+            found = light(cosine[:, None])
+            if travel is not None and directions is not None:
+                together = np.linalg.norm(travel, axis=1)
+                # Light from several directions is scattered as by a phase function whose moments are as much smaller.
+                phase = np.tile(self.phase.parameters, (len(travel), 1))
+                phase[:, :2] *= together[:, None]
+                scale = 1.0 / (self.albedo + (1.0 - self.albedo) * (1.0 - self.phase.mean_cosine))
+                turned = -(travel * directions).sum(axis=1) / np.maximum(together, np.finfo(np.float64).tiny)
+                once = entering[:, :3]
+                found = found + once / (cosine[:, None] + mean) * first_events_excess(phase, scale, turned[:, None])
+                for mu, weight in zip(*self.exits, strict=True):
+                    excess = mean_first_events_excess(phase, scale, mean, mu)
+                    flux = flux + weight * once / (mu + mean) * excess
+            scaled = found * self.exit_share * fluence / np.maximum(flux, 1e-30)
             return np.asarray(scaled / (4.0 * np.pi * self.ior**2))
 
 
@@ -303,9 +348,14 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     albedo = np.where(total > 0.0, reduced / np.where(total > 0.0, total, 1.0), 0.0)
     interface, polished = diffuse_interface(medium.ior, roughness), diffuse_interface(medium.ior)
     scattered = np.maximum(found.scattered, LEAST_SCATTERED)
-    values = np.concatenate([found.fluence, albedo * found.entering, found.cosine[:, None], scattered], axis=1)
-    uniform = np.full((grid.count, 1), UNIFORM_COSINE)
-    deep = np.concatenate([found.inside, np.zeros_like(found.inside), uniform, np.ones_like(found.inside)], axis=1)
+    uniform, ones = np.full((grid.count, 1), UNIFORM_COSINE), np.ones_like(found.inside)
+    parts = [found.fluence, albedo * found.entering, found.cosine[:, None], scattered]
+    below = [found.inside, np.zeros_like(found.inside), uniform, ones]
+    directed = medium.ior == 1.0 and abs(medium.anisotropy) >= DIRECTED
+    if directed:
+        # Of signs of their own, and no part of a grid is negative.
+        parts, below = [*parts, 1.0 + found.travel], [*below, ones]
+    values, deep = np.concatenate(parts, axis=1), np.concatenate(below, axis=1)
     volume = lit.shape.sides.volume(values.astype(np.float32), deep.astype(np.float32))
     inclusions = None if grid.inclusions is None else lit.shape.on_inclusions(found.at_inclusions)
     # Light leaves as through a polished interface, and more of it through a rough one.
@@ -318,11 +368,13 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
         entering=np.ascontiguousarray(volume[..., 3:6]),
         cosine=np.ascontiguousarray(volume[..., 6:7]),
         inclusions=inclusions,
-        scattered=np.where(volume[..., 7:] > 0.0, volume[..., 7:], np.float32(1.0)),
+        travel=np.ascontiguousarray(volume[..., 10:13]) if directed else None,
+        scattered=np.where(volume[..., 7:10] > 0.0, volume[..., 7:10], np.float32(1.0)),
         low=lit.pose.outwards(grid.cells.low) + lit.pose.shift,
         turn=lit.pose.turn,
         step=grid.cells.step,
         albedo=albedo,
+        phase=medium.phase_function,
         conductance=interface.conductance,
         exit_share=interface.exit_share,
         exits=(cosines, interface.entering / polished.entering * weights),

@@ -233,6 +233,8 @@ class DiffuseSolution:
         Irradiance at the samples of opaque inclusions.
     cosine : (s,) float64
         Mean cosine of the light that enters, inside; see `emergent_radiance`.
+    travel : (s, 3) float64
+        Mean direction of that light, inside; shorter than 1 where it comes from several.
     leaving : (s, 3) float64
         Flux that leaves the samples: what has been in the body, and what its surface mirrors.
     scattered : (s, 3) float64
@@ -246,6 +248,7 @@ class DiffuseSolution:
     inside: Array
     at_inclusions: Array
     cosine: Array
+    travel: Array
     leaving: Array
     scattered: Array
     steps: int
@@ -359,8 +362,10 @@ class BodySystem:
             inclusions[:, channel] = system.at_inclusions(cells[:, channel], flux[:, channel], straight)
             scattered[:, channel] = system.scattered
             steps += taken
-        cosine = _mean_cosine(flux.sum(axis=1), ray.entering.sum(axis=1), path)
-        return DiffuseSolution(fluence, flux, cells, inclusions, cosine, leaving, scattered, steps)
+        total, directed = flux.sum(axis=1), ray.entering.sum(axis=1)
+        cosine = _mean_cosine(total, directed, path)
+        travel = _mean_direction(total, directed, path, self._grid.face_normals)
+        return DiffuseSolution(fluence, flux, cells, inclusions, cosine, travel, leaving, scattered, steps)
 
 
 def _mean_cosine(flux: Array, directed: Array, path: EntryPaths) -> Array:
@@ -374,6 +379,15 @@ def _mean_cosine(flux: Array, directed: Array, path: EntryPaths) -> Array:
     total = np.maximum(rest + rays, np.finfo(np.float64).tiny)
     mean = (inverse + rest / (0.5 + UNIFORM_COSINE)) / total
     return np.where(mean > 0.0, 1.0 / np.where(mean > 0.0, mean, 1.0) - 0.5, UNIFORM_COSINE)
+
+
+def _mean_direction(flux: Array, directed: Array, path: EntryPaths, normals: Array) -> Array:
+    """(s, 3): mean direction of the light that enters at samples with normals (s, 3), as of `_mean_cosine`."""
+    rays = np.stack([np.bincount(path.samples, directed * part, len(flux)) for part in path.directions.T], axis=1)
+    rest = np.maximum(flux - np.bincount(path.samples, directed, len(flux)), 0.0)
+    # 2/3 is the mean cosine of uniform light.
+    total = np.maximum(flux, np.finfo(np.float64).tiny)[:, None]
+    return np.asarray((rays - 2.0 / 3.0 * rest[:, None] * normals) / total)
 
 
 @dataclass(frozen=True, eq=False)

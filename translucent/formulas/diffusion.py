@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
+from translucent.formulas.phase import phase_value
 
 #: Roughness of the mirror that blurs the environment as media blur what they scatter ahead: half of the directions are
 #: within 40 degrees, as after one to three events with g = .8.
@@ -20,6 +21,9 @@ IN_SCATTERED_ROUGHNESS = 0.8
 
 #: Least cosine of entering light with the normal, inside.
 LEAST_COSINE = 0.05
+
+#: Azimuths at which the phase function is looked at for its mean over all of them.
+AZIMUTHS = 4
 
 #: Cosine that uniform light counts with in `emergent_radiance`: so lossless bodies in it are as bright at all angles
 #: (Eddington 1926).
@@ -74,6 +78,45 @@ def emergent_radiance(
     gathered = (own + once * m * mu / (d * (1.0 + k * m))) / (1.0 + k * mu)
     rising = 1.0 + c * mu / d + (k * mu) ** 2
     return np.asarray(once + w * (gathered + (phi - own) * rising))
+
+
+def first_events_excess(phase: npt.ArrayLike, scale: npt.ArrayLike, cos_scatter: npt.ArrayLike) -> Array:
+    """Radiance by first events at an angle, over that by as many events that scatter to all sides alike, less 1.
+
+    `emergent_radiance` takes similarity for the phase function: it scatters to all sides alike, and as much less. Light
+    that has been scattered once still has the phase function's shape, and the albedo of single scattering (as in the
+    correction of Nakajima & Tanaka 1988, "Algorithms for radiative intensity calculations").
+
+    Parameters
+    ----------
+    phase : array_like (..., 4)
+        `PhaseFunction.parameters`.
+    scale : array_like (..., 3)
+        Albedo of single scattering over the reduced one.
+    cos_scatter : array_like (..., 1)
+    """
+    value = phase_value(np.asarray(phase)[..., None, :], cos_scatter)
+    return np.asarray(4.0 * np.pi * value * np.asarray(scale, np.float64) - 1.0)
+
+
+def mean_first_events_excess(
+    phase: npt.ArrayLike, scale: npt.ArrayLike, down: npt.ArrayLike, up: npt.ArrayLike
+) -> Array:
+    """Mean of `first_events_excess` over all azimuths.
+
+    Parameters
+    ----------
+    phase, scale
+        See there.
+    down, up : array_like (..., 1)
+        Cosines of the light that enters and of the light that leaves with the normal, inside.
+    """
+    down, up = np.asarray(down, np.float64), np.asarray(up, np.float64)
+    level = np.sqrt(np.maximum((1.0 - down * down) * (1.0 - up * up), 0.0))
+    azimuths = np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
+    return np.asarray(
+        np.mean([first_events_excess(phase, scale, level * np.cos(angle) - down * up) for angle in azimuths], axis=0)
+    )
 
 
 def in_scattered_shares(reflected: npt.ArrayLike, passed: npt.ArrayLike) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ from typing import get_args
 from translucent.diffusion.environment_ahead import DEPTHS, HEIGHT, WIDTH
 from translucent.formulas.bsdf import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
-from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS, LEAST_COSINE
+from translucent.formulas.diffusion import AZIMUTHS, IN_SCATTERED_ROUGHNESS, LEAST_COSINE
 from translucent.formulas.interface import CLEARCOAT_IOR
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
 from translucent.formulas.sampling import ALPHA_OF_DEVIATION, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
@@ -142,6 +142,7 @@ CONSTANTS: dict[str, str] = {
     "HARMONIC_2": repr(BAND_2),
     "HARMONIC_2_ZONAL": repr(BAND_2_ZONAL),
     "LEAST_ENTERING_COSINE": repr(LEAST_COSINE),
+    "AZIMUTHS": repr(AZIMUTHS),
     "CLEARCOAT_IOR": repr(CLEARCOAT_IOR),
     "GROUND_TOLERANCE": "1e-3",  # distance from its plane up to which a point is on a ground, in sizes of its map
     "FILM_CENTERS": f"vec3{FILM_CENTERS}",

@@ -82,6 +82,8 @@ class DiffusedTexture:
                 "grid_size": field.fluence.shape[1:4],
                 "first_layer": self.first_layers[number],
                 "albedo": field.albedo,
+                "turned": 0.0 if field.travel is None else 1.0 - field.phase.mean_cosine,
+                "phase": field.phase.parameters,
                 "conductance": field.conductance,
                 "exit_cosines": field.exits[0],
                 "exit_weights": field.exits[1],

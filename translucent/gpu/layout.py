@@ -415,6 +415,11 @@ OBJECT_ROW = PackedTable(
         ("conductance", "f4", ()),
         ("grid_z", "f4", (3,)),
         ("albedo", "f4", (3,)),
+        (
+            "turned",
+            "f4",
+            (),
+        ),  # 1 - mean cosine of scattering where the grid holds the direction of entering light, else 0
         ("exit_cosines", "f4", (3,)),  # see exit_quadrature
         ("exit_weights", "f4", (3,)),
         ("ahead", "f4", (3,)),  # fraction of its extinction by light that is scattered ahead

@@ -181,6 +181,7 @@ _NO_DIFFUSION: Fields = {
     "grid_size": 1.0,
     "first_layer": 0.0,
     "albedo": 0.0,
+    "turned": 0.0,
     "conductance": 0.0,
     "exit_cosines": 0.0,
     "exit_weights": 0.0,
