@@ -215,7 +215,7 @@ def test_vertices_of_a_glb_are_in_the_frame_of_their_object(run: Run, tmp_path: 
     np.testing.assert_allclose(primitive["extras"][EXTRAS]["metres"], [0.06, 0.12, 0.09], rtol=1e-5)
     assert told["record"]["primitives"][0]["ior"] == preset.medium.ior
     (errors,) = told["check"].values()
-    assert errors["uniform"]["mean_nrmse"] < 0.02  # between vertices that are half a centimetre apart
+    assert errors["uniform"]["mean_nrmse"] < 0.025  # between vertices that are half a centimetre apart
     assert (tmp_path / "out.glb.check.png").is_file()
 
 

@@ -51,7 +51,7 @@ from translucent.scene.scene import Light, Object, Scene
 Volume = npt.NDArray[np.float32]
 
 #: Least fraction of the paths through a body on which light counts as scattered: thinner parts hardly scatter.
-LEAST_SCATTERED = 0.02
+LEAST_SCATTERED = 0.002
 
 #: Mean cosine of scattering, at least, of media without an interface whose light is seen by the angle that it turns by
 #: at first events. Behind an interface light enters and leaves in a cone, and that angle is about the same for all.

@@ -9,7 +9,7 @@ enters at a slant.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -243,12 +243,20 @@ class Events:
         Cells in which light is scattered below that depth, and fractions.
     reached : (k,) float64
         Fraction that comes to an opaque inclusion, unscattered.
+    counted : (k,) float64
+        Fraction that is scattered or absorbed in all, as cells count it.
     """
 
     near: Array
     above: Array
     below: list[tuple[Integers, Array]]
     reached: Array
+    counted: Array
+
+    def scaled(self, factor: float) -> Events:
+        """More events, or fewer, by a factor."""
+        below = [(cell, factor * weight) for cell, weight in self.below]
+        return replace(self, near=factor * self.near, above=factor * self.above, below=below)
 
     def power(self, grid: BodyGrid, samples: Integers, flux: Array) -> Array:
         """(cells,): scattered power in each cell for a flux (k,) that enters at samples (k,), in W."""
@@ -313,6 +321,7 @@ class FirstEvents:
             near, above = near - fewer * less_near, above - fewer * less_above
         slant = layer.depth[paths.samples] / cosine
         below, deep = optics.transmittance(extinction * slant), []
+        counted = 1.0 - below
         farthest = grid.cells.step * sum(grid.number.shape)
         quantiles = _places(len(grid.points))[1][:, paths.samples] if below.max(initial=0.0) > _NOTHING else ()
         for quantile in quantiles:
@@ -321,13 +330,15 @@ class FirstEvents:
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
             cell, weight = grid.cell_at(paths.start + metres.astype(np.float32) * paths.per_metre)
             weight = np.where(metres < paths.limit, weight, 0.0)
-            weight = self._albedo / DEEP_EVENTS * below * weight
+            weight = below * weight / DEEP_EVENTS
+            counted += weight
+            weight *= self._albedo
             if np.any(straight):
                 weight *= 1.0 - straight * optics.transmittance(STRAIGHT * extinction * length)
             deep.append((cell, weight))
         # As if the density was even up to there.
         reached = optics.transmittance(np.where(np.isfinite(paths.limit), extinction * paths.limit, np.inf))
-        return Events(self._albedo * near / self._d - excess, self._albedo * above, deep, reached)
+        return Events(self._albedo * near / self._d - excess, self._albedo * above, deep, reached, counted)
 
 
 @lru_cache(maxsize=16)

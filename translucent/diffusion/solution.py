@@ -213,6 +213,8 @@ MOST_RETURNED = 0.99
 #: Bounds of the correction by uniform light.
 LEAST_CORRECTION, MOST_CORRECTION = 0.5, 2.0
 
+_TINY = np.finfo(np.float64).tiny
+
 #: Least fraction of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
 
@@ -439,8 +441,9 @@ class _ChannelSystem:
         self._extinctions = extinction, absorption + scattering / (1.0 - phase.mean_cosine)
         self._ior, self._chord, self._interface = ior, chord, interface
         self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord)
-        self._diffuse, self._paths = self._first.of(paths), paths
-        self._all = paths.samples
+        diffuse, self._paths, self._all = self._first.of(paths), paths, paths.samples
+        # Cells that the surface cuts count a little too many events, or too few. The lengths of paths say how many.
+        self._diffuse = diffuse.scaled(float(grid.areas @ scattered) / max(float(grid.areas @ diffuse.counted), _TINY))
         reflected = np.zeros(0) if reflected is None else reflected
         self._inclusions = _InclusionLosses.of(grid, absorption, d, reflected)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
@@ -461,8 +464,7 @@ class _ChannelSystem:
             lossless = _ChannelSystem(grid, ior, roughness, 0.0, extinction, *same, reflected=white, corrected=False)
             # What half-spaces absorb has not been in the body long enough to get to other parts of it.
             reflectance = half_space_reflectance(round(self._albedo, 6), ior)
-            found = lossless.by_uniform_light()
-            self._correction = 1.0 + reflectance * (found - 1.0)
+            self._correction = 1.0 + reflectance * (lossless.by_uniform_light() - 1.0)
 
     def by_uniform_light(self) -> Array:
         """(s,): factors of the fluence with which a lossless body in uniform light is as invisible as it has to be.
@@ -474,12 +476,8 @@ class _ChannelSystem:
         even = np.ones(len(self._grid.points))
         source = self._power(even)
         cells, _ = self._cells.solved(source, self._cells.even(source), ROUGH)
-        found = (self._read @ cells) * self._attenuated + self._diffuse.near
-        found, target = found[self._grid.nearest].mean(axis=1), self.scattered
-        # The sum over the surface is right.
-        least, areas = np.finfo(np.float64).tiny, self._grid.areas
-        correction = target / max(float(areas @ target), least) * float(areas @ found) / np.maximum(found, least)
-        return np.asarray(np.clip(correction, LEAST_CORRECTION, MOST_CORRECTION))
+        found = self._exit_fraction * ((self._read @ cells) * self._attenuated + self._diffuse.near)
+        return np.asarray(np.clip(self.scattered / np.maximum(found, _TINY), LEAST_CORRECTION, MOST_CORRECTION))
 
     def _emitted_again(self, emission: float) -> tuple[Array, Array, float]:
         """Power in the cells (cells,), and fluence at the samples (s,), of emitted light at its first scattering event.
@@ -575,7 +573,10 @@ class _ChannelSystem:
             return np.asarray(self._exit_fraction * fluence + self._mirrored * flux + straight.mirrored + unscattered)
 
         def received(fluence: Array, flux: Array) -> Array:
-            return entering if returned is None else entering + returned(leaving(fluence, flux))
+            if returned is None:
+                return entering
+            # Light that nothing scatters or absorbs on its way through falls on other parts, too; rays see it alone.
+            return entering + returned(leaving(fluence, flux) + (1.0 - self.scattered) * flux)
 
         near, flux, steps = self._cells.even(source(entering)), entering, 0
         before, tolerance = np.zeros_like(entering), TOLERANCE
