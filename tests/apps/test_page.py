@@ -22,7 +22,7 @@ import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
 from tests.textured import TEXTURED
 from translucent.gpu.recording import FrameRecorder
-from translucent.page.payload import MAGIC, Container
+from translucent.page.container import MAGIC, Container
 from translucent.page.plans import TEXTURE_UNITS, plan_page, simplified, triangles
 from translucent.planning.passes import NoteKind
 from translucent.planning.request import RenderRequest

@@ -14,6 +14,9 @@ import trimesh
 
 import translucent as tl
 from tests.browser.pages import WebPage, decoded
+from translucent.formulas.color import to_hex
+from translucent.formulas.diffuse_interface import half_space_reflectance
+from translucent.page.albedos import with_albedo
 
 SIZE = (160, 100)
 
@@ -297,3 +300,38 @@ def test_half_floats_are_told(web_page: WebPage, web_dist: Path, tmp_path: Path,
     web_page.page.wait_for_function("() => viewer.still")
     assert "16 bits" in web_page.page.locator(".notes").inner_text()
     assert web_page.page.evaluate("viewer.probe(0.5, 0.5).thickness") == pytest.approx(0.04, rel=5e-3)
+
+
+def test_color_of_a_medium_that_scatters(
+    web_page: WebPage, web_dist: Path, renderer: tl.Renderer, tmp_path: Path, tools: str
+) -> None:
+    """Light at another color is what is solved for it, about as near as the page says; set back, nothing is changed."""
+    wax = tl.Medium((40.0, 60.0, 90.0), (900.0, 800.0, 700.0), anisotropy=0.3, ior=1.4)
+    made = trimesh.creation.icosphere(3, 0.02)
+    egg = tl.Mesh(made.vertices * (1.0, 1.6, 0.7), made.faces)
+    scene = scene_of(tl.Object(egg, wax), lights=[tl.DirectionalLight((-0.4, -1, -0.3), 2.0)])
+    coarse = tl.Diffusion(resolution=16)
+    opened(web_page, scene, tmp_path, tools, scattering=coarse)
+    before = radiance(web_page, samples=1)
+    page = web_page.page
+    page.evaluate("async () => { window.viewer = await translucent; }")
+    page.locator("#color").fill("#4aa8c0")
+    assert page.locator("#color").is_enabled()
+    assert page.locator("#roughness").is_disabled()
+    albedos = page.evaluate("({ error: viewer.page.albedos.error, found: viewer.state().media[0].albedo })")
+    assert page.locator(".albedo-error").inner_text() == f"of thick parts, within {100 * albedos['error']:.2g} %"
+    assert albedos["error"] < 0.03
+    found = np.array(albedos["found"])
+    color = [half_space_reflectance(float(one), wax.ior) for one in found]
+    assert to_hex(color) == "#4aa8c0"
+    other = dataclasses.replace(scene, objects=[dataclasses.replace(scene.objects[0], medium=with_albedo(wax, found))])
+    true = renderer.render(other, SIZE, samples=1, scattering=coarse)
+    shown = radiance(web_page, samples=1)
+    mean = true.radiance[true.coverage].mean(axis=0)
+    off, was = (np.abs(one - true.radiance)[true.coverage] / mean for one in (shown, before))
+    # Highlights at outlines apart: see `error`.
+    assert (np.median(off, axis=0) < albedos["error"]).all()
+    assert (np.quantile(off, 0.95, axis=0) < 2 * albedos["error"]).all()
+    assert (np.median(was, axis=0) > 0.2).all()
+    page.evaluate("viewer.resetMaterial()")
+    np.testing.assert_array_equal(radiance(web_page, samples=1), before)

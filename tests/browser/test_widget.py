@@ -12,7 +12,8 @@ import trimesh
 
 import translucent as tl
 from tests.browser.pages import WebPage
-from translucent.page.payload import header_of, payload
+from translucent.page.container import header_of
+from translucent.page.payload import payload
 from translucent.page.plans import plan_page
 
 SIZE, HEIGHT = (48, 36), 140

@@ -15,7 +15,8 @@ from translucent.extras import install_command, require_package
 from translucent.formulas.color import to_hex
 from translucent.frames.writing import Bundle, bundle, png
 from translucent.model_size import size_note
-from translucent.page.payload import header_of, payload
+from translucent.page.container import header_of
+from translucent.page.payload import payload
 from translucent.page.plans import plan_page
 from translucent.planning.interfaces import InterfaceMode
 from translucent.planning.methods import Method

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gzip
-import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,12 +25,10 @@ from translucent.gpu.recording.context import INFO, RecordingContext
 from translucent.gpu.uniforms import BodyRoles, bounded_extinction, media_center
 from translucent.media.medium import Medium
 from translucent.media.presets import presets
+from translucent.page.container import Container
 from translucent.page.plans import PagePlan, current, editable, variant
 from translucent.scene.scene import Object, Scene
 from translucent.version import VERSION
-
-#: First bytes of a container.
-MAGIC = b"TLPAGE01"
 
 #: Bits of the mantissa of light that are kept: errors are 5e-4 of each value at most, a tenth of a step of 8 bits.
 LIGHT_BITS = 10
@@ -50,7 +46,16 @@ _LIGHT = ("light_map", "light_levels", "light_irradiance", "seen_map", "diffused
 _PARTS = ("once", "single", "averaged")
 
 
-def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, exposure: float, tone: str) -> bytes:
+def payload(
+    planned: PagePlan,
+    name: str,
+    size: tuple[int, int],
+    samples: int,
+    exposure: float,
+    tone: str,
+    *,
+    albedos: bool = False,
+) -> bytes:
     """Data of a page that shows a scene.
 
     Parameters
@@ -65,6 +70,8 @@ def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, e
     exposure : float
         Stops brighter.
     tone : {"none", "neutral", "agx"}
+    albedos : bool
+        The page can change the albedo of a medium that scatters: it holds light of several.
     """
     scene = planned.scene
     recorder = FrameRecorder(samples, planned.most_layers, planned.texture_units)
@@ -103,8 +110,10 @@ def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, e
         },
     }
     sections = _Sections(gl, into, kept)
-    light = _light(frames)
+    light = _held_as(frames, _LIGHT)
     header["textures"] = [sections.texture(entry, i in light) for i, entry in enumerate(gl.textures)]
+    if albedos:
+        _add_albedos(header, recorder, planned, into, frames)
     header["programs"], header["framebuffers"] = gl.programs, gl.framebuffers
     _number_blocks(header, sections)
     return into.packed(header)
@@ -134,6 +143,37 @@ def _recorded(
     return frames, aliases
 
 
+def _add_albedos(
+    header: dict[str, Any],
+    recorder: FrameRecorder,
+    planned: PagePlan,
+    into: Container,
+    frames: Mapping[str, tuple[Scene, RecordedFrame]],
+) -> None:
+    """Add light of the scattering medium at other albedos, and why that of media without it stays."""
+    texture = recorder.resources.diffusion.of(planned.plan)
+    if texture is None:
+        return
+    from translucent.page.albedos import AlbedoLight, fixed_albedo  # loads much of SciPy
+
+    scene, fixed = planned.scene, fixed_albedo(planned.plan)
+    light = None if fixed else AlbedoLight.of(planned.plan)
+    for i, body in enumerate(scene.objects):
+        if body.medium is None or not body.medium.scatters or body.covers:
+            continue
+        entry = header["scene"]["media"][header["scene"]["objects"][i]["medium"]]
+        if light is not None and i in light.surfaces:
+            entry["has_albedo"] = True
+        elif "Its color" not in entry["why"]:
+            entry["why"] += f" Its color stays, too: {fixed or 'light does not diffuse in it'}."
+    if light is not None:
+        header["albedos"] = {
+            **light.entry(into, texture.first_layers, texture.ground_layer),
+            "objects": [body.mean_thickness if i in light.surfaces else None for i, body in enumerate(scene.objects)],
+            "textures": sorted(_held_as(frames, ("diffused_light",))),
+        }
+
+
 class _Sections:
     """Numbers of sections for arrays of a recording."""
 
@@ -155,10 +195,10 @@ class _Sections:
         return {**entry, "content": self.number(content, "picture" if light else "plain", LIGHT_BITS if light else 23)}
 
 
-def _light(frames: Mapping[str, tuple[Scene, RecordedFrame]]) -> set[int]:
-    """Textures that hold light."""
+def _held_as(frames: Mapping[str, tuple[Scene, RecordedFrame]], names: Sequence[str]) -> set[int]:
+    """Textures that samplers of these names read."""
     steps = [step for _, frame in frames.values() for part in _PARTS for step in getattr(frame, part)]
-    return {step["textures"][name] for step in steps for name in _LIGHT if name in step.get("textures", {})}
+    return {step["textures"][name] for step in steps for name in names if name in step.get("textures", {})}
 
 
 def _number_blocks(header: dict[str, Any], sections: _Sections) -> None:
@@ -220,6 +260,7 @@ def _medium_entry(planned: PagePlan, medium: Medium) -> dict[str, Any]:
         "distance": planned.panel_distance(first),
         "preset": _preset_of(planned, first),
         "editable": not why,
+        "has_albedo": False,
         "why": why,
     }
 
@@ -362,73 +403,3 @@ def _normals(mesh: Mesh, faces: np.ndarray, into: Container) -> dict[str, int | 
         "normals": into.add(found.astype(np.float32), "rows"),
         "normal_index": into.add(index.reshape(faces.shape).astype(np.uint32), "rows"),
     }
-
-
-class Container:
-    """Header and sections of a page's data.
-
-    Attributes
-    ----------
-    sections : list of dict
-        Where each array is, and how it is packed.
-    """
-
-    def __init__(self) -> None:
-        self.sections: list[dict[str, Any]] = []
-        self._bytes: list[bytes] = []
-        self._end = 0
-
-    def add(self, values: npt.NDArray[Any], packing: str = "plain", bits: int = 23) -> int:
-        """Number of a new section that holds an array.
-
-        Parameters
-        ----------
-        values : ndarray
-            Of float32, float16, uint32 or uint8.
-        packing : {"plain", "rows", "picture"}
-            As it is; of 4-byte values, differences along the last axis but one; or differences to what the pixels to
-            the left and above let expect, along the last axes but one. Bytes of one rank are together.
-        bits : int
-            Bits of the mantissa of floats that are kept; 23 are all.
-        """
-        held = np.ascontiguousarray(values)
-        kinds = {"f4": "float32", "f2": "float16", "u4": "uint32", "u1": "uint8"}
-        section: dict[str, Any] = {"type": kinds[held.dtype.str[1:]], "shape": list(held.shape), "packing": packing}
-        if packing == "plain":
-            packed = held.tobytes()
-        else:
-            section["shift"] = 23 - bits
-            packed = _planes(held.view(np.uint32), packing, 23 - bits)
-        section |= {"offset": self._end, "bytes": len(packed)}
-        padded = packed + bytes(-len(packed) % 8)
-        self._bytes.append(padded)
-        self._end += len(padded)
-        self.sections.append(section)
-        return len(self.sections) - 1
-
-    def packed(self, header: dict[str, Any]) -> bytes:
-        """Header and sections, compressed."""
-        text = json.dumps({**header, "sections": self.sections}, separators=(",", ":"), allow_nan=False).encode()
-        text += b" " * (-len(text) % 8)
-        whole = MAGIC + len(text).to_bytes(8, "little") + text + b"".join(self._bytes)
-        return gzip.compress(whole, 9, mtime=0)
-
-
-def header_of(data: bytes) -> dict[str, Any]:
-    """Header of a packed container."""
-    whole = gzip.decompress(data)
-    start = len(MAGIC) + 8
-    header: dict[str, Any] = json.loads(whole[start : start + int.from_bytes(whole[len(MAGIC) : start], "little")])
-    return header
-
-
-def _planes(words: npt.NDArray[np.uint32], packing: str, shift: int) -> bytes:
-    """Differences of words, their lowest `shift` bits rounded away, as planes of bytes."""
-    rounded = (words.astype(np.uint64) + ((1 << shift) >> 1)) >> np.uint64(shift)
-    found = rounded.astype(np.uint32)
-    if packing == "picture":
-        found = np.diff(found, axis=-3, prepend=np.zeros_like(found[..., :1, :, :]))
-    found = np.diff(found, axis=-2, prepend=np.zeros_like(found[..., :1, :]))
-    signed = found.view(np.int32)
-    folded = ((signed << 1) ^ (signed >> 31)).view(np.uint32)
-    return b"".join((folded >> np.uint32(8 * plane)).astype(np.uint8).tobytes() for plane in range(4))

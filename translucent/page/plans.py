@@ -76,8 +76,8 @@ def editable(body: Object) -> str:
         return "opaque"
     if np.any(np.asarray(medium.scattering) > 0):
         return (
-            "This medium scatters light. How that spreads was solved when the page was written, for this medium alone: "
-            "it stays, while view, exposure and other media change. For another one, write the page again."
+            "This medium scatters light. How that spreads was solved for when the page was written: "
+            "density, index and roughness stay. For another one, write the page again."
         )
     if medium.emits:
         return "This medium glows: it stays as it is."

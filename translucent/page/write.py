@@ -158,7 +158,7 @@ def page_html(
         )
     name = name.encode("utf-8", "replace").decode()  # a name of a file may hold what is no character
     script = web_path("page.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
-    data = payload(planned, name, size, samples, exposure, tone)
+    data = payload(planned, name, size, samples, exposure, tone, albedos=True)
     picture = "" if poster is None else f'<img alt="" src="{_data_url(poster)}">'
     return _TEMPLATE.format(
         version=VERSION,

@@ -1,4 +1,4 @@
-// Container of a page's data: see translucent/page/payload.py.
+// Container of a page's data: see translucent/page/container.py.
 
 const MAGIC = "TLPAGE01";
 const TYPES = { float32: Float32Array, float16: Uint16Array, uint32: Uint32Array, uint8: Uint8Array };

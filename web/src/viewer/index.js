@@ -253,13 +253,20 @@ export class Viewer {
 
   /**
    * Change a medium.
-   * @param {{color?: string, distance?: number, preset?: string, extinction?: number[], ior?: number, roughness?: number}} values
-   *   color after distance in metres; names of `presets`; extinction in 1/m
+   * @param {{color?: string, distance?: number, preset?: string, extinction?: number[], ior?: number, roughness?: number, albedo?: number[]}} values
+   *   color after distance in metres; names of `presets`; extinction in 1/m. Of a medium that scatters color, of thick
+   *   parts in white light, or albedo alone; see `state().media[i].albedo`
    * @param {number} medium
    */
   setMaterial(values, medium = 0) {
     const held = this.materials.media[medium];
-    if (!held || !this.page.scene.media[medium].editable) return;
+    const told = this.page.scene.media[medium];
+    if (held && told.has_albedo && (values.albedo || values.color)) {
+      this.materials.setAlbedo(medium, { albedo: values.albedo, color: values.color && colorOf(values.color) });
+      this.panel.refresh();
+      this.#changed();
+    }
+    if (!held || !told.editable) return;
     const next = { ior: values.ior, roughness: values.roughness, distance: values.distance };
     const preset = this.page.presets.find(({ name }) => name === values.preset);
     if (preset) Object.assign(next, { extinction: preset.extinction, ior: preset.ior, roughness: preset.roughness, preset: preset.name });

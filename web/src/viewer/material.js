@@ -1,5 +1,7 @@
 // Media of a page as its panel changes them, and what blocks and tables hold of them.
 
+import { aheadShares, albedoOf, mediumOf } from "./albedos.js";
+
 const BLACKEST = 1e-5;
 const MOST_DEPTH = 1e30;
 /** Types of objects, as the table of objects numbers them. */
@@ -37,8 +39,9 @@ export class Materials {
   }
 
   reset() {
-    this.media = this.page.scene.media.map(({ extinction, ior, roughness, distance }) => ({
+    this.media = this.page.scene.media.map(({ extinction, ior, roughness, distance, has_albedo }) => ({
       extinction: [...extinction], ior, roughness, distance, preset: "", changed: false,
+      albedo: has_albedo ? [...this.page.albedos.albedo] : null,
     }));
   }
 
@@ -51,6 +54,20 @@ export class Materials {
     if (roughness != null) medium.roughness = Math.min(Math.max(Number(roughness), 0), 1);
     if (distance != null && distance > 0) medium.distance = Number(distance);
     medium.changed = true;
+  }
+
+  /** Change the albedo of a scattering medium, by itself or by the linear color of thick parts in white light. */
+  setAlbedo(index, { albedo, color }) {
+    const told = this.page.albedos, medium = this.media[index];
+    const wanted = albedo ?? albedoOf(told, color);
+    medium.albedo = wanted.map((x) => Math.min(Math.max(Number(x), told.least), 1));
+    medium.extinction = mediumOf(told, medium.albedo).extinction;
+    medium.changed = true;
+  }
+
+  /** Albedo of the scattering medium, if it is not that of the page. */
+  get albedo() {
+    return this.media.find((medium) => medium.albedo && medium.changed)?.albedo ?? null;
   }
 
   get #free() {
@@ -87,12 +104,14 @@ export class Materials {
 
   #editable(object) {
     const { medium } = this.page.scene.objects[object];
-    return medium != null && this.page.scene.media[medium].editable ? medium : null;
+    if (medium == null) return null;
+    const { editable, has_albedo } = this.page.scene.media[medium];
+    return editable || (has_albedo && this.media[medium].changed) ? medium : null;
   }
 
   roughness(object) {
     const medium = object == null ? null : this.#editable(object);
-    return medium == null || !this.media[medium].changed ? null : this.media[medium].roughness;
+    return medium == null || !this.media[medium].changed || this.media[medium].albedo ? null : this.media[medium].roughness;
   }
 
   /** Write the blocks of a frame. */
@@ -129,14 +148,25 @@ export class Materials {
   writeObject(row, object) {
     const medium = this.#editable(object);
     if (medium == null) return;
-    const { ior, roughness, changed } = this.media[medium];
+    const { ior, roughness, changed, albedo } = this.media[medium];
     const sigma = this.#bounded(medium);
     const metres = row.type[0] === THIN_WALL || row.type[0] === ABSORBER ? this.page.scene.objects[object].sheet ?? 1 : 1;
     row.extinction.set(sigma.map((x) => metres * x));
     row.ior[0] = ior;
     row.stream_absorption.set(sigma.map((x) => 2 * x));
     row.inner_mirror[0] = this.#innerMirror(ior);
-    if (changed) row.roughness[0] = roughness;
+    if (albedo) this.#writeScattering(row, object, albedo);
+    else if (changed) row.roughness[0] = roughness;
+  }
+
+  #writeScattering(row, object, albedo) {
+    const { albedos } = this.page;
+    const { absorption, scattering, extinction } = mediumOf(albedos, albedo);
+    const shares = aheadShares(albedos, row.inner_mirror[0], absorption, albedos.objects[object]);
+    row.albedo.set(albedo);
+    row.ahead.set(scattering.map((sigma, c) => (Math.max(albedos.anisotropy, 0) * sigma) / extinction[c]));
+    row.in_scattered_far.set(shares.map(([far]) => far));
+    row.in_scattered_near.set(shares.map(([, near]) => near));
   }
 
   #innerMirror(ior) {

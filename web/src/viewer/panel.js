@@ -1,5 +1,6 @@
 // The panel beside the picture: material, view, probe, and what the page does not show.
 
+import { reflectanceOf } from "./albedos.js";
 import { colorAfter, hexOf } from "./material.js";
 
 /** CSS pixels by which a finger that taps may move. */
@@ -87,8 +88,8 @@ const BODY = `
       <p class="fixed" style="margin:0;grid-column:1/-1;color:#9ea2a9;display:none"></p>
       <label for="preset">Preset</label><select id="preset"></select>
       <label for="color">Color</label>
-      <div class="row"><input type="color" id="color" aria-label="Color of white light behind so much of it"><span>at</span>
-        <input type="number" id="distance" min="0" step="any" aria-label="Distance"><select id="unit" aria-label="Unit of the distance">
+      <div class="row"><input type="color" id="color" aria-label="Color of white light behind so much of it"><span class="albedo-error"></span><span class="at-distance">at</span>
+        <input type="number" class="at-distance" id="distance" min="0" step="any" aria-label="Distance"><select id="unit" class="at-distance" aria-label="Unit of the distance">
         <option>mm</option><option>cm</option><option>m</option></select></div>
       <label for="ior">IOR</label>
       <div class="row"><input type="range" id="ior" min="1" max="2.5" step="0.01"><input type="number" id="ior-number" min="1" max="3" step="0.01" aria-label="Index of refraction"></div>
@@ -179,7 +180,11 @@ export class Panel {
     const written = told.preset ? `${told.preset.replaceAll("_", " ")}, as written` : "as written";
     this.$("#preset").options[0].text = medium.changed && !medium.preset ? "of your own" : written;
     set("#preset", medium.preset);
-    set("#color", hexOf(colorAfter(medium.extinction, medium.distance)));
+    const { albedos } = viewer.page;
+    set("#color", hexOf(medium.albedo ? reflectanceOf(albedos, medium.albedo) : colorAfter(medium.extinction, medium.distance)));
+    this.$("#color").ariaLabel = medium.albedo ? "Color of thick parts in white light" : "Color of white light behind so much of it";
+    for (const item of this.shadow.querySelectorAll(".at-distance")) item.style.display = medium.albedo ? "none" : "";
+    this.$(".albedo-error").textContent = medium.albedo ? `of thick parts, within ${digits(100 * albedos.error, 2)} %` : "";
     set("#distance", digits(medium.distance / UNITS[this.$("#unit").value], 4));
     set("#ior", medium.ior);
     set("#ior-number", digits(medium.ior, 4));
@@ -188,7 +193,7 @@ export class Panel {
     set("#exposure", viewer.stops);
     set("#exposure-number", digits(viewer.stops, 3));
     for (const id of ["preset", "color", "distance", "ior", "ior-number", "roughness", "roughness-number"]) {
-      this.$(`#${id}`).disabled = !told.editable;
+      this.$(`#${id}`).disabled = !told.editable && !(told.has_albedo && id === "color");
     }
     const fixed = this.$(".fixed");
     fixed.style.display = told.editable ? "none" : "";

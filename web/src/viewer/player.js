@@ -1,6 +1,7 @@
 // Plays recorded frames in WebGL2: the steps of translucent/gpu/recording, with the numbers of a camera and a material.
 
 import { fieldsOf, writeBlocks } from "./blocks.js";
+import { changedLight } from "./albedos.js";
 import { drawn } from "./meshes.js";
 import { sceneHierarchies } from "./hierarchy.js";
 
@@ -112,10 +113,26 @@ export class Player {
       this.shadows = shadows;
     }
     this.#upload(live);
+    this.#relight(material.albedo);
     if (several && view.sample === 0) this.clear(variant.targets.average_target, size);
     const uniforms = several ? { sample_number: view.sample } : {};
     this.#play(several ? variant.averaged : variant.single, key, size, material, uniforms);
     return where;
+  }
+
+  /** Put light of another albedo into the textures that hold it; null: that of the page. */
+  #relight(albedo) {
+    const { gl, page } = this;
+    const key = albedo?.join() ?? "";
+    if (key === (this.lit ?? "")) return;
+    this.lit = key;
+    for (const number of page.albedos.textures) {
+      const { size, content } = page.textures[number];
+      const texels = page.sections[content];
+      gl.bindTexture(gl.TEXTURE_3D, this.#texture(number, size));
+      const found = albedo ? changedLight(page.albedos, texels, size, albedo, page.sections) : texels;
+      gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, ...size, gl.RGBA, gl.FLOAT, found);
+    }
   }
 
   #upload(live) {
