@@ -190,8 +190,8 @@ class AlbedoLight:
                 fluence, entering = (part.astype(np.float32) for part in parts)
                 whole = np.ones_like(fluence)
                 found = replace(known, fluence=fluence, entering=entering, cosine=own.cosine, scattered=whole)
-                wanted = known.scattered_radiance(points, normals, cosine)
-                off = found.scattered_radiance(points, normals, cosine) - wanted
+                wanted = known.scattered_radiance(points, normals, -normals, cosine)
+                off = found.scattered_radiance(points, normals, -normals, cosine) - wanted
                 error = max(error, float((_rms(off) / np.maximum(wanted.mean(axis=0), _TINY)).max()))
         at = np.linspace(0.0, float(_variable(np.array(SOLVED[0]))), STEPS)
         few = at[:: (STEPS - 1) // 16]
