@@ -1,7 +1,7 @@
 """Sentences to paraphrase: drawn at random from the README, the docs, the help texts and the messages.
 
-``python tools/draw_sentences.py 60 --seed 1`` prints 60 of them, each with its place, for a reader who knows graphics and
-not this project. ``--lengths`` prints how long sentences and pages are instead.
+``python tools/draw_sentences.py 60 --seed 1`` prints 60 of them, each with its place, for a reader who knows graphics
+and not this project. ``--lengths`` prints how long sentences and pages are instead.
 """
 
 from __future__ import annotations

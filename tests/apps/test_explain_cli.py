@@ -79,7 +79,7 @@ def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:
     assert (told["lights"], told["left_out"]) == (0, [])
     assert told["plan"]["passes"][-1]["name"] == "traced_interfaces"
     assert told["plan"]["interfaces"] == "TracedInterfaces(depth=24, forks=2)"
-    assert "not modelled: light that meets more than 24 interfaces, or is the weaker of" in result.out
+    assert "not modelled: rays that cross more than 24 interfaces, or that follow the weaker of" in result.out
     told = strict_json(run("explain", model, "--interfaces", "screen", "--json").out)
     assert told["plan"]["passes"][-1]["name"] == "surfaces"
     assert told["plan"]["interfaces"] == "ScreenInterfaces()"

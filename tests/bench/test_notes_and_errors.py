@@ -36,9 +36,9 @@ def test_no_error_is_larger_than_the_notes_say(one: Case, renderer: tl.Renderer)
 def test_notes_name_what_they_are_about() -> None:
     """A matched body on a ground, a leaf, a glow, and opaque objects in bodies: each has its words, and no other."""
     words = {
-        "matched wax in the sun": "grounds send none into it",
+        "matched wax in the sun": "light that grounds reflect into it",
         "thin leaf": "leaves and edges are",
-        "neon": "what they emit and scatter is",
+        "neon": "light that they emit and scatter is",
         "ball in soap": "the light around 'sphere' in them",
         "cubes in and behind glass": "light that interfaces bend on its way to 'cube'",
     }

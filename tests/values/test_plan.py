@@ -134,9 +134,14 @@ def test_convex_is_what_back_face_depth_is_exact_for() -> None:
             [body()],
             None,
             0,
-            "1 body in one unsorted draw each: exits minus entries add up to thickness, since all bodi",
+            "1 body in one unsorted draw each: distances where rays leave, minus those where they enter, add up to thi",
         ),
-        ([body(), body(WINE)], None, 0, "2 bodies in one unsorted draw each: exits minus entries add up to optical de"),
+        (
+            [body(), body(WINE)],
+            None,
+            0,
+            "2 bodies in one unsorted draw each: distances where rays leave, minus those where",
+        ),
         ([body()], None, -1, "Beer-Lambert: what is behind, through exp(-optical depth)"),
         ([body(FIRE)], None, -1, "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T"),
         (

@@ -212,7 +212,10 @@ def test_traced_interfaces_draw_the_first_and_trace_the_others(method: Any) -> N
     assert (steps[PassName.INTERFACES].geometry_passes, steps[PassName.INTERFACES].objects) == (1, (0,))
     assert steps[PassName.INTERFACES].cost == front[PassName.INTERFACES].cost
     assert steps[PassName.TRACED].cost == TRACE_COST
-    assert "at most 8 interfaces, twice as the weaker of reflected and refracted light" in steps[PassName.TRACED].reason
+    assert (
+        "at most 8 interfaces, and twice along the weaker of the reflected and the refracted ray"
+        in steps[PassName.TRACED].reason
+    )
     assert traced.interfaces == TRACED
     assert traced.limits == drawn.limits
     assert traced.summary()["interfaces"] == "TracedInterfaces(depth=8, forks=2)"
@@ -221,15 +224,19 @@ def test_traced_interfaces_draw_the_first_and_trace_the_others(method: Any) -> N
 @pytest.mark.parametrize(
     ("depth", "forks", "told"),
     [
-        (3, 1, "more than 3 interfaces, or is the weaker of reflected and refracted light more often than once: "),
-        (12, 3, "more than 12 interfaces, or is the weaker of reflected and refracted light more often than 3 times: "),
-        (1, 0, "more than 1 interface, or is the weaker of reflected and refracted light: "),
+        (3, 1, "3 interfaces, or that follow the weaker of the reflected and the refracted ray more often than once: "),
+        (
+            12,
+            3,
+            "12 interfaces, or that follow the weaker of the reflected and the refracted ray more often than 3 times: ",
+        ),
+        (1, 0, "1 interface, or that follow the weaker of the reflected and the refracted ray: "),
     ],
 )
 def test_traced_interfaces_tell_what_they_cut_off_and_no_more(depth: int, forks: int, told: str) -> None:
     (note,) = plan(scene(body(DIAMOND)), interfaces=tl.TracedInterfaces(depth, forks)).unmodelled
     assert note.kind is NoteKind.CUT_OFF_PATHS
-    assert note.startswith(f"light that meets {told}")
+    assert note.startswith(f"rays that cross more than {told}")
 
 
 def test_traced_interfaces_need_no_order_where_bodies_touch() -> None:

@@ -34,7 +34,9 @@ BENT = "refracted and reflected light"
 )
 @pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.ThinLayer(), *ORDERED])
 def test_an_effect_that_no_pass_renders_is_told(objects: list[tl.Object], effects: list[str], method: Any) -> None:
-    cut_off = "light that meets more than 24 interfaces, or is the weaker of reflected and refracted light more often"
+    cut_off = (
+        "rays that cross more than 24 interfaces, or that follow the weaker of the reflected and the refracted ray more"
+    )
     first_interval = "refraction and reflection beyond the first interval"
     traced = first_interval if method == tl.ThinLayer() else cut_off  # sheets bend no ray
     for interfaces, bent in ((None, traced), (tl.ScreenInterfaces(), first_interval)):

@@ -108,7 +108,7 @@ def test_lights_through_bodies_onto_bodies_are_told_where_no_rays_are_traced() -
     found = [plan(asked, interfaces=front).says(NoteKind.SHADOWS) for asked in (one, clear, dimmed)]
     assert found == [False, False, True]
     assert not plan(dimmed).says(NoteKind.SHADOWS)
-    assert ["straight on to the lights" in plan(asked).passes[-1].reason for asked in (one, dimmed)] == [False, True]
+    assert ["straight rays to the lights" in plan(asked).passes[-1].reason for asked in (one, dimmed)] == [False, True]
     assert not plan(dimmed, None, TRACED).says(NoteKind.SHADOWS)
     assert not plan(scene(body(DIAMOND), body(WINE, x=3)), interfaces=front).says(NoteKind.SHADOWS)
     painted = scene(body(DIAMOND, surface=tl.Surface(transmission=0.5)), environment_shadows=8)

@@ -122,8 +122,8 @@ def test_what_an_ordered_method_makes_of_a_scene(kind: str, method: Any, name: s
 def test_sheets_among_intervals_that_emit_are_a_limit(medium: tl.Medium, other: tl.Medium) -> None:
     found = plan(scene(body(medium), sheet(other)), tl.FragmentLists())
     assert found.limits == (
-        "declared sheets among emitting media have no place in the order: they dim all light, and what they emit is "
-        "left out",
+        "declared sheets among media that emit: they dim all light on a ray, also light in front of them, and their "
+        "own emission is left out",
     )
     # Without emission the order of sheets matters to nothing, and without sheets there is none.
     assert plan(scene(body(GLASS), sheet(WINE)), tl.FragmentLists()).exact
@@ -245,7 +245,7 @@ def test_without_opengl_slots_and_emitting_sheets_are_no_limit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scattering", "told"), [(True, "light scattered more than once"), (False, "in-scattered light")]
+    ("scattering", "told"), [(True, "light that is scattered more than once"), (False, "in-scattered light")]
 )
 def test_without_opengl_light_may_be_followed_or_not(scattering: bool, told: str) -> None:
     lit = scene(body(tl.Medium(scattering=1.0)), lights=[tl.DirectionalLight((0, -1, 0), (1, 1, 1))])

@@ -304,11 +304,11 @@ class TracedInterfaces(InterfaceMode):
         effects = effects_of(scene, bends=not straight, mirrored="what is around them")
         traced = f"{effects}; rays are traced from there on, through at most {self._count}"
         if self.forks:
-            traced += f", {self._times} as the weaker of reflected and refracted light"
+            traced += f", and {self._times} along the weaker of the reflected and the refracted ray"
         if (mirror := mirror_of(scene)) is not None:
             traced += f"; {mirror.ground.mesh.name!r} mirrors what stands on it, once"
         if dims_interfaces(scene):
-            traced += "; rays straight on to the lights find what bodies keep of highlights and diffuse reflection"
+            traced += "; straight rays to the lights find how much bodies dim highlights and diffuse reflection"
         return (
             PassSpec(PassName.INTERFACES, found, with_interfaces(scene), 1, cost=DRAW_COST * ONE_DRAWN),
             PassSpec(PassName.TRACED, traced, cost=TRACE_COST),
@@ -318,8 +318,8 @@ class TracedInterfaces(InterfaceMode):
         """Notes: what the tree leaves out."""
         often = f" more often than {self._times}" if self.forks else ""
         text = (
-            f"light that meets more than {self._count}, or is the weaker of reflected and refracted light{often}: "
-            "looked up in the environment, as if nothing was ahead"
+            f"rays that cross more than {self._count}, or that follow the weaker of the reflected and the refracted "
+            f"ray{often}: they see the environment, as if nothing was in front of it"
         )
         return [Note(NoteKind.CUT_OFF_PATHS, text)]
 

@@ -116,8 +116,8 @@ def sheet_limits(scene: Scene) -> list[Note]:
     if not sheets_of(scene) or not any(body.medium is not None and body.medium.emits for body in scene.bodies):
         return []
     text = (
-        "declared sheets among emitting media have no place in the order: they dim all light, and what they emit "
-        "is left out"
+        "declared sheets among media that emit: they dim all light on a ray, also light in front of them, and their "
+        "own emission is left out"
     )
     return [Note(NoteKind.SHEETS_WITHOUT_ORDER, text)]
 
@@ -235,19 +235,19 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
     bodies = [body for body in scene.bodies if body.medium is not None and body.medium.scatters]
     if any(treatment_of(body) is Treatment.VOLUME for body in bodies):
         text = (
-            "what is scattered more than once: what opaque objects and other bodies keep from it, and light of these "
-            "that is scattered ahead on its way to the eye"
+            "light that is scattered more than once: shadows that opaque objects and other bodies throw into it, and "
+            "light of these objects that is scattered ahead on its way to the eye"
         )
         if scene.opaque:
-            text += "; grounds send none into it, which is up to 25 % of the light of what stands on a bright one"
+            text += "; light that grounds reflect into it, up to 25 % of the light of a body on a bright ground"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     rendered = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
     if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in rendered]:
         if followed:
             densest = max(float(np.max(np.asarray(medium.scattering))) for medium in media)
             text = (
-                "light scattered more than once, which is much in bodies that are thicker than a mean free "
-                f"path, here {1 / densest:.2g} m; light of the environment scattered"
+                "light that is scattered more than once, much in bodies that are thicker than a mean free path, here "
+                f"{1 / densest:.2g} m; and light of the environment that is scattered"
             )
             return [*notes, Note(NoteKind.SCATTERED_AGAIN, text)]
         if not scene.lights:
@@ -274,23 +274,23 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
     notes = []
     if any(treatment_of(body) is Treatment.LAYER for body in scene.bodies):
         text = (
-            "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the "
-            "path of the ray, which edges and folds are not"
+            "sideways spread of light that is scattered many times: it leaves as from a flat layer, as thick as the "
+            "path of the ray, so edges and folds are wrong"
         )
         notes.append(Note(NoteKind.SPREAD_INSIDE, text))
     if bodies := [body for body in scene.bodies if treatment_of(body) is Treatment.DIFFUSION]:
         text = (
-            f"{object_names(bodies)}: what other bodies scatter of the environment's light reaches them, and "
-            "what is smaller than a cell has no light of its own: thin walls, leaves and edges are up to 15 % dark"
+            f"{object_names(bodies)}: light of the environment that other bodies scatter onto them, and details that "
+            "are smaller than a cell: thin walls, leaves and edges are up to 15 % dark"
         )
         if any(body.medium is not None and body.medium.emits for body in bodies):
-            text += "; what they emit and scatter is up to 10 % dark"
+            text += "; light that they emit and scatter is up to 10 % dark"
         if held := [item for item in scene.opaque if any(_may_hold(body, item) for body in bodies)]:
             text += f"; the light around {object_names(held)} in them is up to 25 % off"
         ground = ground_below(scene, [i for i, body in enumerate(scene.objects) if body in bodies])
         beside = [item for item in scene.opaque if not any(_may_hold(body, item) for body in bodies)]
         if others := [item for item in beside if ground is None or item is not ground.ground]:
-            text += f"; of the light that they send out, none reaches {object_names(others)}"
+            text += f"; their light does not reach {object_names(others)}"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes
 

@@ -1,4 +1,4 @@
-"""Signed depth: exits minus entries, in any order."""
+"""Signed depth: distances where a ray leaves, minus those where it enters, in any order."""
 
 from __future__ import annotations
 
@@ -52,7 +52,8 @@ class SignedDepth(Method):
             if spectral
             else "thickness, since all bodies share one medium"
         )
-        reason = f"{count_of(solids, 'body', 'bodies')} in one unsorted draw each: exits minus entries add up to {what}"
+        draws = f"{count_of(solids, 'body', 'bodies')} in one unsorted draw each"
+        reason = f"{draws}: distances where rays leave, minus those where they enter, add up to {what}"
         return (PassSpec(PassName.SIGNED_DEPTH, reason, solids, 1, cost=self.cost_for(spectral=spectral)),)
 
     def limits(self, scene: Scene) -> list[Note]:
