@@ -141,7 +141,7 @@ def save_png(a: Artist) -> Waiting:
 
 def save_turntable(a: Artist) -> Waiting:
     yield from a.panel("Files")
-    a.state.export["pictures"] = 6  # no knob asks for so few
+    a.state.change("export.pictures", 6.0, step=True)
     yield from a.click("Turntable ...")
     path = a.folder / "turntable.gif"
     yield from a.answer(path)

@@ -146,8 +146,8 @@ def load_scene(
     variant : str, optional
         Name of a variant of materials of a glTF file (KHR_materials_variants). Default: those of the primitives.
     time : float, optional
-        Seconds on the clock of a glTF file's animations at which nodes stand; see `translucent.gltf.nodes`. Default: as
-        the nodes are written. Skins and morph targets are left out, whatever the time.
+        Seconds on the clock of a glTF file's animations at which nodes, skins and morph targets stand. Default: as they
+        are written.
     draft_extensions : bool
         Whether to read KHR_materials_scatter and KHR_materials_volume_scatter of a glTF file, which are drafts.
 

@@ -18,7 +18,7 @@ Json = dict[str, Any]
 
 COLOR = [0.1, 0.5, 0.9]
 TYPES = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
-KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 BOX = trimesh.creation.box((2.0, 4.0, 6.0))
 # 90 degrees about y: x goes to -z.
 TURN = [0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5)]

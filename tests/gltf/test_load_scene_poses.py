@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 import translucent as tl
-from tests.gltf.gltf_writer import WINE, Json, Writer, glass, load
+from tests.gltf.gltf_writer import BOX, WINE, Json, Writer, glass, load
 from translucent.gltf.nodes import sampled_channel
 
 HALF = math.sqrt(0.5)
@@ -109,12 +109,61 @@ def test_without_a_time_nodes_stand_as_written_and_animations_are_told(tmp_path:
     assert item.transform[0, 3] == 5
 
 
-def test_morph_targets_and_skins_are_told(tmp_path: Path) -> None:
-    writer = animated("weights", [0], [1.0])
-    writer.add("skins", joints=[0])
-    with pytest.warns(tl.TranslucentWarning) as caught:
-        pose(writer, tmp_path, 1.0)
-    assert "animated weights (number 0); skins (1)" in str(caught[0].message)
+def test_morph_targets_move_vertices_by_their_animated_weights(tmp_path: Path) -> None:
+    """The second of two targets makes the box twice as large, by half of its weight halfway."""
+    writer = animated("weights", [0, 1], [0, 0, 0, 1])
+    zero, own = (writer.accessor(factor * np.asarray(BOX.vertices)) for factor in (0.0, 1.0))
+    writer.tree["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": zero}, {"POSITION": own}]
+    writer.tree["meshes"][0]["weights"] = [0.0, 0.25]
+    with pytest.warns(tl.TranslucentWarning, match="animations"):
+        (item,) = load(writer, tmp_path).objects
+    np.testing.assert_allclose(np.ptp(item.mesh.vertices, axis=0), 1.25 * np.ptp(BOX.vertices, axis=0), rtol=1e-6)
+    for time, factor in ((0.0, 1.0), (0.5, 1.5), (1.0, 2.0)):
+        (item,) = load(writer, tmp_path, time=time).objects
+        np.testing.assert_allclose(np.ptp(item.mesh.vertices, axis=0), factor * np.ptp(BOX.vertices, axis=0), rtol=1e-6)
+        assert item.mesh.diagnosis.solid
+    assert load(writer, tmp_path, time=0.0).duration == 1.0
+
+
+def test_a_skin_moves_vertices_by_its_joints_whatever_its_node(tmp_path: Path) -> None:
+    """The upper half of a box turns by 90 degrees about the joint above its middle, the lower half stays."""
+    writer = animated("rotation", [0, 1], TURNS)  # of node 0, which is a joint here
+    count = len(BOX.vertices)
+    upper = (np.asarray(BOX.vertices)[:, 1] > 0).astype(float)
+    attributes = writer.tree["meshes"][0]["primitives"][0]["attributes"]
+    attributes["JOINTS_0"] = writer.accessor(np.tile([0, 1, 0, 0], (count, 1)), "u1")
+    attributes["WEIGHTS_0"] = writer.accessor(np.stack([upper, 1 - upper, 0 * upper, 0 * upper], axis=1))
+    joint, fixed = 0, 1
+    del writer.tree["nodes"][joint]["mesh"]
+    writer.tree["nodes"][joint]["translation"] = [0.0, 1.0, -7.0]
+    back = [np.eye(4), np.eye(4)]
+    back[0][3, 1], back[1][3, 2] = -1.0, -7.0  # by columns: from the places of the joints
+    inverse = writer.accessor(np.stack(back).reshape(2, 16))
+    skin = writer.add("skins", joints=[joint, fixed], inverseBindMatrices=inverse)
+    writer.add("nodes", mesh=0, skin=skin, translation=[99.0, 0.0, 0.0], name="Body")
+    item = load(writer, tmp_path, time=1.0).objects[0]
+    found = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+    assert np.abs(found).max() < 4.0, "its node has no effect"
+    low, high = found[found[:, 1] < 0], found[found[:, 1] > 0]
+    np.testing.assert_allclose(np.abs(low).max(axis=0), [1, 2, 3], atol=1e-6)
+    np.testing.assert_allclose(np.abs(high).max(axis=0), [3, 2, 1], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"joints": []}, "not a list of nodes"),
+        ({"joints": [9]}, "nodes 9"),
+        ({"joints": [0]}, "joints or weights 0 are not as many as the vertices"),
+    ],
+)
+def test_a_broken_skin_is_refused(tmp_path: Path, change: Json, message: str) -> None:
+    writer = animated("translation", [0], [[1, 0, 0]])
+    attributes = writer.tree["meshes"][0]["primitives"][0]["attributes"]
+    attributes["JOINTS_0"] = attributes["WEIGHTS_0"] = writer.accessor(np.ones((2, 4)))
+    writer.tree["nodes"][0]["skin"] = writer.add("skins", **change)
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        load(writer, tmp_path, time=0.0)
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from tests.preview.waiting import SIZE, finish, pixels
+from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.gpu import refinement
 from translucent.preview.actions import OrbitBy, SetField
 from translucent.preview.viewport_renderer import ViewportRenderer
+from translucent.preview.worker import Pool
 from translucent.preview.workspace import Workspace
 
 
@@ -45,6 +46,21 @@ def test_a_still_picture_converges_until_something_changes(
     # They are the same paths, whatever the passes.
     assert np.abs(pixels(view) - truth.to_srgb8().astype(int)).max() <= 1
     assert np.abs(pixels(view) - interactive).mean() > 1.0
+    noisy = pixels(view)
+    given: list[np.ndarray] = []
+
+    def call(_: Pool, task: object, work: object, radiance: np.ndarray, *arguments: object) -> np.ndarray:
+        given.append(radiance)
+        return np.full_like(radiance, 0.25)
+
+    monkeypatch.setattr(Pool, "call", call)
+    work.do(SetField("display.denoise", True))
+    wait(work, lambda: not view.draw(work, SIZE) and "denoised at 16 paths" in view.paths.note)
+    np.testing.assert_allclose(given[0], truth.radiance, rtol=1e-3, atol=1e-4)
+    assert (pixels(view) == pixels(view)[0, 0]).all(), "what the denoiser made is on show"
+    work.do(SetField("display.denoise", False))
+    finish(view, work)
+    np.testing.assert_array_equal(pixels(view), noisy)
     probe = view.probe(80, 48)
     assert probe is not None
     assert probe.thickness == pytest.approx(truth.thickness[48, 80], rel=1e-5)
@@ -67,6 +83,6 @@ def test_what_paths_cannot_follow_stays_as_it_is_and_says_so(view: ViewportRende
     body = scene.objects[0]
     hole = tl.Mesh(body.mesh.vertices, body.mesh.faces[1:])
     broken = tl.Scene([tl.Object(hole, body.medium)], scene.camera, environment=scene.environment)
-    more, changed = view.paths.step(broken, view.renderer, view.viewport, 1.0)
+    more, changed = view.paths.step(broken, view.renderer, view.viewport, 1.0, work)
     assert (more, changed) == (False, False)
     assert "not converging: PathTraced of" in view.paths.note

@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from translucent.cli import main
+from translucent.preview.session import load_session
 
 SCRIPT = """
 [[action]]
@@ -60,6 +61,54 @@ model = "{bad}"
 do = "save"
 kind = "save session"
 file = "{session}"
+[[action]]
+do = "view"
+name = "front"
+[[action]]
+do = "key"
+name = "w"
+[[action]]
+do = "point"
+x = 0.535
+y = 0.433
+[[action]]
+do = "press"
+[[action]]
+do = "point"
+x = 0.6
+y = 0.433
+[[action]]
+do = "release"
+[[action]]
+do = "add_light"
+[[action]]
+do = "light"
+field = "radius"
+value = 0.0
+[[action]]
+do = "keep"
+name = "1"
+[[action]]
+do = "scatter"
+color = "#f2e0b8"
+radius = "2mm"
+[[action]]
+do = "save"
+kind = "save session"
+file = "{changed}"
+[[action]]
+do = "recall"
+name = "1"
+[[action]]
+do = "remove_light"
+number = 0
+[[action]]
+do = "place"
+field = "location"
+value = [0.0, 0.0, 0.0]
+[[action]]
+do = "select"
+panel = "Material"
 [[action]]
 do = "key"
 name = "f1"
@@ -131,10 +180,11 @@ def test_a_display_that_does_not_answer_is_told() -> None:
 
 
 def test_the_window_does_what_a_script_says(preview, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    names = ("bad.glb", "session.toml", "asked.toml", "picture.png")
-    bad, session, asked, picture = (tmp_path / name for name in names)
+    names = ("bad.glb", "session.toml", "changed.toml", "asked.toml", "picture.png")
+    files = {Path(name).stem: tmp_path / name for name in names}
+    bad, session, changed, asked, picture = files.values()
     bad.write_bytes(b"")
-    done = preview("leaf", script=SCRIPT.format(bad=bad, session=session, asked=asked, picture=picture))
+    done = preview("leaf", script=SCRIPT.format(**files))
     assert done.returncode == 2, "a file that is none was opened; the actions after it are done all the same"
     told = json.loads(done.stdout)
     assert told["model"] == "leaf"
@@ -144,7 +194,14 @@ def test_the_window_does_what_a_script_says(preview, tmp_path: Path) -> None:  #
     assert "bad.glb" in texts["error"][1]
     assert f"wrote {picture}" in texts["info"]
     assert "color = [" in session.read_text()
-    assert asked.read_text() == session.read_text(), "the built-in browser asks where it is to be written"
+    document = load_session(changed)
+    ((x, y, z),) = (place.location for place in document.placed)
+    assert x > 0.001, "the arrow of the gizmo was dragged to the right"
+    assert (round(y, 6), round(z, 6)) == (0.0, 0.0)
+    assert [light.radius for light in document.lights] == [0.0]
+    assert [one.name for one in document.snapshots] == ["1"]
+    assert min(document.material.scattering) > 100.0
+    assert load_session(asked).placed == (), "the built-in browser asks where it is to be written"
     assert "[deep_red]" in (tmp_path / "translucent" / "presets" / "deep_red.toml").read_text()
     window = np.asarray(Image.open(tmp_path / "window.png").convert("RGB"))
     assert window.shape == (480, 640, 3)

@@ -122,7 +122,7 @@ class RenderOptions:
     )
     time: float | None = option(
         metavar="S",
-        help="Nodes of a glTF file as its animations have them after S seconds, without skins and morph targets. "
+        help="Nodes, skins and morph targets of a glTF file as its animations have them after S seconds. "
         "Default: as the file has them.",
     )
     file: FileOptions = group(FileOptions)

@@ -40,16 +40,28 @@ def denoised(frame: Frame, scene: Scene) -> Frame:
     """
     oidn = require_package("pyoidn", "denoise", "render with more samples")
     began = time.perf_counter()
-    albedo, normals = features(scene, frame.size)
-    radiance = np.ascontiguousarray(np.maximum(frame.radiance, 0.0), dtype=np.float32)
-    made = oidn.denoise(radiance, albedo, normals, hdr=True)
-    made = np.where(np.isfinite(made).all(axis=-1, keepdims=True), made, radiance)
+    made = denoised_radiance(frame.radiance, scene)
     library, binding = oidn.version.oidn_version, version("pyoidn")
     provenance = {**frame.provenance, "denoiser": f"Open Image Denoise {library} (pyoidn {binding})"}
     seconds = {**frame.seconds, "denoise": time.perf_counter() - began}
     return dataclasses.replace(
         frame, radiance=made, standard_error=None, provenance=provenance, seconds=seconds, scene=frame.scene
     )
+
+
+def denoised_radiance(radiance: Floats, scene: Scene) -> Floats:
+    """Radiance (h, w, 3) of a scene without its noise.
+
+    Raises
+    ------
+    RenderError
+        If pyoidn is not installed.
+    """
+    oidn = require_package("pyoidn", "denoise", "render with more samples")
+    albedo, normals = features(scene, (radiance.shape[1], radiance.shape[0]))
+    radiance = np.ascontiguousarray(np.maximum(radiance, 0.0), dtype=np.float32)
+    made = oidn.denoise(radiance, albedo, normals, hdr=True)
+    return np.where(np.isfinite(made).all(axis=-1, keepdims=True), made, radiance)
 
 
 def features(scene: Scene, size: tuple[int, int]) -> tuple[Floats, Floats]:

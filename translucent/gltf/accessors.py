@@ -25,7 +25,7 @@ Indices = npt.NDArray[np.int64]
 
 #: Types of NumPy by componentType.
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 #: Bytes of memory per vertex until its mesh is welded and diagnosed: counted where no buffer holds it.
@@ -125,20 +125,21 @@ class Accessors:
         return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
 
 
-def primitive_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
+def primitive_mesh(accessors: Accessors, primitive: Json, name: str, moved: Array | None = None) -> Mesh | None:
     """The mesh of a primitive in the file's unit, welded and wound as by `load_mesh`; None for points and lines.
 
-    Raises `InputError` like `raw_mesh`, and if a coordinate is not finite.
+    Its vertices are at the positions `moved` (n, 3), if these are given. Raises `InputError` like `raw_mesh`, and if a
+    coordinate is not finite.
     """
-    raw = raw_mesh(accessors, primitive, name)
+    raw = raw_mesh(accessors, primitive, name, moved)
     if raw is None:
         return None
     raw.require_finite()
     return mended(raw)
 
 
-def raw_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
-    """The mesh of a primitive in the file's unit, as the file has it; None for points and lines.
+def raw_mesh(accessors: Accessors, primitive: Json, name: str, moved: Array | None = None) -> Mesh | None:
+    """The mesh of a primitive in the file's unit, as the file has it, or `moved` there; None for points and lines.
 
     Raises
     ------
@@ -149,7 +150,7 @@ def raw_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
     if mode in _POINTS_AND_LINES:
         return None
     attributes = primitive["attributes"]
-    positions = accessors.vectors(attributes.get("POSITION"), "VEC3")
+    positions = accessors.vectors(attributes.get("POSITION"), "VEC3") if moved is None else moved
     corners = accessors.indices(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
     if corners.max(initial=0) >= len(positions):
         found = f"{name!r}: index {corners.max()} points outside the {len(positions)} vertices"

@@ -24,6 +24,7 @@ from translucent.files.reading import require_room
 from translucent.geometry.foreign import foreign_name, is_scene, unit_of
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh, Triangles, joined
 from translucent.gltf.accessors import Accessors, raw_mesh
+from translucent.gltf.deforming import animation_end
 from translucent.gltf.file import COMPRESSIONS, GltfFile, JsonFields, LeftOut, gltf_of, label, read_gltf
 from translucent.gltf.materials import (
     CLEARCOAT,
@@ -85,11 +86,14 @@ class GltfScene(Scene):
         Whether the camera is one of the file's, rather than one that frames all objects.
     variants : tuple of str
         Names of the file's variants of materials, for `variant` of `load_scene`.
+    duration : float, optional
+        Seconds of the file's animations, for `time` of `load_scene`; None: it has none.
     """
 
     left_out: tuple[str, ...] = ()
     has_camera: bool = False
     variants: tuple[str, ...] = ()
+    duration: float | None = None
 
 
 @checked_but("path", "camera", "size")
@@ -123,18 +127,18 @@ def load_scene(
     variant : str, optional
         Name of a variant of materials (KHR_materials_variants). Default: the materials that primitives have themselves.
     time : float, optional
-        Seconds on the clock of the animations at which nodes stand; see `translucent.gltf.nodes`. Default: as the
-        nodes are written. Skins and morph targets are left out, whatever the time.
+        Seconds on the clock of the animations at which nodes, skins and morph targets stand; see
+        `translucent.gltf.nodes` and `translucent.gltf.deforming`. Default: as they are written.
     draft_extensions : bool
         Whether to read KHR_materials_scatter and KHR_materials_volume_scatter, which are drafts.
 
     Returns
     -------
     GltfScene
-        One object per node and primitive. Nodes that share a mesh share it here, too; a mesh has its node's name, and a
-        shared one its own. Meshes are welded and wound as by `load_mesh`. What materials make of objects says
-        `translucent.gltf.objects`. The environment, which glTF does not have, is `Environment.studio`, or that of
-        `showcase` in a file without materials.
+        One object per node and primitive. Nodes that share a mesh share it here, too, unless a skin or morph targets
+        move it; a mesh has its node's name, and a shared one its own. Meshes are welded and wound as by `load_mesh`.
+        What materials make of objects says `translucent.gltf.objects`. The environment, which glTF does not have, is
+        `Environment.studio`, or that of `showcase` in a file without materials.
         `left_out` lists what the scene does not hold, and a `TranslucentWarning` reports it.
 
     Raises
@@ -156,9 +160,8 @@ def load_scene(
         objects = scene_objects(file, transforms, metres, left_out, draft_extensions, variant)
         own = scene_camera(file, transforms, camera, metres, left_out)
         lights = scene_lights(file, transforms, metres, left_out)
-    for key in ("animations", "skins"):
-        if file.items(key) and not (key == "animations" and time is not None):
-            left_out.add(key, f"{len(file.items(key))}")
+    if file.items("animations") and time is None:
+        left_out.add("animations", f"{len(file.items('animations'))}")
     if lost := left_out.lines():
         warnings.warn(f"scene {file.path.name!r}: left out: {'; '.join(lost)}", TranslucentWarning, stacklevel=3)
     # Surfaces mirror what is around them: that should be more than a gradient.
@@ -166,7 +169,16 @@ def load_scene(
     environment = Environment.studio() if polished else LIGHT_TABLE
     view = own or framing(objects, size)
     variants = variant_names(file)
-    return GltfScene(objects, view, lights, environment, left_out=lost, has_camera=own is not None, variants=variants)
+    return GltfScene(
+        objects,
+        view,
+        lights,
+        environment,
+        left_out=lost,
+        has_camera=own is not None,
+        variants=variants,
+        duration=animation_end(file),
+    )
 
 
 def _exported(scene: Any) -> GltfFile:

@@ -8,7 +8,7 @@ and world coincide.
 Source: KHR_materials_volume ("thickness in the coordinate space of the mesh"), KHR_materials_variants, glTF 2.0
 section 3.5.
 
-Not read: skins, morph targets, instancing extensions.
+Not read: instancing extensions. `translucent.gltf.deforming` has skins and morph targets.
 
 Animations follow glTF 2.0, section 3.11 and appendix C (interpolation): STEP, LINEAR (spherical for rotations, along
 the shorter arc) and CUBICSPLINE. Before the first key of a sampler its first value holds, after the last its last. A
@@ -223,7 +223,7 @@ def thickness_at(file: GltfFile, material: GltfMaterial, uv: npt.ArrayLike) -> A
     return sample(image, material.thickness_transform.apply(coordinates), sampler)
 
 
-_KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
+_KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 _MODES = ("LINEAR", "STEP", "CUBICSPLINE")
 
 #: Cosine between quaternions from which a straight line between them is as good as an arc.
@@ -239,7 +239,7 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
     seconds : float
         >= 0, on the clock of the keys.
     left_out : LeftOut
-        Gets what moves and is not supported: weights of morph targets, and what extensions point at.
+        Gets what moves and is not supported: what extensions point at.
 
     Raises
     ------
@@ -262,7 +262,7 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
                 left_out.add(f"animated {path if isinstance(path, str) else 'properties'}", name)
                 continue
             file.item("nodes", node)
-            if "matrix" in moved[node]:
+            if "matrix" in moved[node] and path != "weights":
                 raise file.refused(f"animation {name} moves node {label(moved, node)}, which has a matrix")
             if (node, path) in taken:
                 left_out.add(f"animations that move what another does ({path})", name)
@@ -302,6 +302,8 @@ def _value(
     times = accessors.vectors(sampler.get("input"), "SCALAR")[:, 0]
     values = accessors.vectors(sampler.get("output"), _KINDS[path])
     per_key = 3 if mode == "CUBICSPLINE" else 1
+    if path == "weights" and len(times) and len(values) % (per_key * len(times)) == 0:
+        values = values.reshape(per_key * len(times), -1)  # of all targets at a key
     if len(values) != per_key * len(times) or not (np.isfinite(times).all() and np.isfinite(values).all()):
         raise file.refused(f"animation {name}: {len(values)} values for {len(times)} keys, or one that is not finite")
     if (np.diff(times) <= 0).any():

@@ -51,6 +51,7 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.geometry.mesh import MIN_DIAGONAL, Mesh
 from translucent.gltf.accessors import Accessors, primitive_mesh
+from translucent.gltf.deforming import Deformer
 from translucent.gltf.file import GltfFile, Json, JsonFields, LeftOut, label
 from translucent.gltf.materials import (
     CLEARCOAT,
@@ -318,12 +319,12 @@ def scene_objects(
     scale = np.diag([metres, metres, metres, 1.0])
     objects: list[Object] = []
     materials: list[SceneMaterial] = []
-    for mesh, index, node in _placed_meshes(file, transforms, left_out, variant_index(file, variant)):
+    for mesh, index, place in _placed_meshes(file, transforms, left_out, variant_index(file, variant)):
         material, surface = _fitted(material_of(index), mesh, left_out)
         if material.hidden:
             left_out.add("objects hidden by their alpha", repr(mesh.name))
             continue
-        objects.append(Object(mesh, None, scale @ transforms[node], color=material.color, surface=surface))
+        objects.append(Object(mesh, None, scale @ place, color=material.color, surface=surface))
         materials.append(material)
     if not objects:
         raise file.refused("its scene has no triangles", "give a file with a mesh")
@@ -392,31 +393,34 @@ def _with_medium(item: Object, material: SceneMaterial, wall: float) -> Object:
 
 def _placed_meshes(
     file: GltfFile, transforms: dict[int, Array], left_out: LeftOut, variant: int | None
-) -> Iterator[tuple[Mesh, int | None, int]]:
-    """Mesh, material and node of every primitive that a node places; each mesh is read once."""
+) -> Iterator[tuple[Mesh, int | None, Array]]:
+    """Mesh, material and transform of every primitive that a node places; each mesh that nothing moves is read once."""
     nodes = file.items("nodes")
     accessors = Accessors(file)
+    deformer = Deformer(file, accessors)
     placed = {node: nodes[node]["mesh"] for node in transforms if "mesh" in nodes[node]}
     users = Counter(index for index in placed.values() if isinstance(index, int))
-    known: dict[tuple[int, int], Mesh | None] = {}
+    known: dict[tuple[int, int, int | None], Mesh | None] = {}
     for node, index in placed.items():
         entry = file.item("meshes", index)
-        if not transforms[node][:3, :3].any():
+        place = np.eye(4) if deformer.skins(nodes[node]) else transforms[node]
+        if not place[:3, :3].any():
             # "This provides a mechanism to animate visibility" (glTF 2.0, section on transformations).
             left_out.add("objects hidden by a scale of 0", label(nodes, node))
             continue
         for i, primitive in enumerate(listed := primitives(file, entry)):
-            if (index, i) not in known:
+            moves = deformer.moves(nodes[node], primitive)
+            key = index, i, node if moves else None
+            if key not in known:
                 name = _mesh_name(nodes[node], entry, index, shared=users[index] > 1) + (
                     f"[{i}]" if len(listed) > 1 else ""
                 )
-                known[index, i] = made = primitive_mesh(accessors, primitive, name)
-                if made is None:
+                moved = deformer.positions(nodes[node], entry, primitive) if moves else None
+                known[key] = primitive_mesh(accessors, primitive, name, moved)
+                if known[key] is None:
                     left_out.add("points and lines", repr(name))
-                elif primitive.get("targets"):
-                    left_out.add("morph targets", repr(name))
-            if (mesh := known[index, i]) is not None:
-                yield mesh, material_index(file, primitive, variant), node
+            if (mesh := known[key]) is not None:
+                yield mesh, material_index(file, primitive, variant), place
 
 
 def _mesh_name(node: Json, entry: Json, index: int, *, shared: bool) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import moderngl
@@ -24,6 +24,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import before_drawing, before_making, build_program, set_uniform
 from translucent.planning.render_plan import RenderPlan
+from translucent.scene.lens import Lens
 
 #: Strides of steps; the sides of pictures are multiples of the largest.
 STRIDES = (1, 2, 4, 8, 16)
@@ -269,10 +270,12 @@ class Viewport:
         stride: int,
         samples: int = SAMPLES,
         photons: moderngl.Texture | None = None,
+        lens: Lens | None = None,
     ) -> None:
         """Draw the next sample of a side, of `samples` a pixel besides its center; a picture has one stride.
 
-        Light of `photons`, as a picture of the viewport's size has it, takes the place of those of a plan.
+        Light of `photons`, as a picture of the viewport's size has it, takes the place of those of a plan. All samples
+        but the first are through points of a lens, if there is one.
         """
         chosen = self._side(side, self.size)
         chosen.stride = stride
@@ -281,6 +284,9 @@ class Viewport:
         right, down = shifts(samples)[(round_ - 1) % samples] if round_ else (0.0, 0.0)
         self._rest.use()
         engine, size = self.engine, (self.size[0] // stride, self.size[1] // stride)
+        if lens is not None and round_:
+            camera = lens.camera(plan.scene.camera, size, (round_ - 1) % samples, samples)
+            plan = replace(plan, scene=replace(plan.scene, camera=camera))
         job = engine.prepare(plan, size)
         if photons is not None:
             job.photon_light = photons, stride, phase
@@ -298,6 +304,21 @@ class Viewport:
         """Show the picture of a job of the viewport's size in place of a side's samples."""
         chosen = self._side(side, self.size)
         self._add(job, chosen, (0, 0), first=True)
+        chosen.stride = 1
+
+    def radiance(self, side: int) -> npt.NDArray[np.float32]:
+        """(h, w, 3): mean radiance of the samples of a side whose pixels were all drawn at once; reads them back."""
+        chosen = self._side(side, self.size)
+        values = np.frombuffer(chosen.light.read(components=4, dtype="f4"), np.float32)
+        values = values.reshape(self.size[1], self.size[0], 4)
+        return np.asarray(values[..., :3] / np.maximum(values[..., 3:], 1.0))
+
+    def put_radiance(self, side: int, radiance: npt.NDArray[np.float32]) -> None:
+        """Show a radiance (h, w, 3) in place of a side's samples."""
+        light = np.ones((*radiance.shape[:2], 4), dtype=np.float32)
+        light[..., :3] = radiance
+        chosen = self._side(side, self.size)
+        chosen.textures[0].write(light)
         chosen.stride = 1
 
     def steps(self, side: int) -> int:

@@ -8,18 +8,25 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from translucent.errors import InputError
 from translucent.formulas.phase import parse_phase
 from translucent.gltf.load import SUFFIXES
+from translucent.media.albedo import hulst_color, scattering_medium
 from translucent.media.conversion import extinction_from_colors
 from translucent.media.medium import MAX_COEFFICIENT, Medium, color_at
 from translucent.media.presets import preset
 from translucent.preview.document import (
+    AddedLight,
     Assigned,
     Document,
     Material,
     Model,
     Orbit,
+    Placed,
+    Snapshot,
+    Triple,
     checked,
     medium_fields,
     panned,
@@ -68,6 +75,14 @@ class ChoosePreset:
 
 
 @dataclass(frozen=True)
+class SetMaterial:
+    """Fill the bodies with a material. Changes of one `drag` are one step of undo."""
+
+    material: Material
+    drag: int | None = None
+
+
+@dataclass(frozen=True)
 class Assign:
     """Give an object a material of its own, or none again. Those of one `drag` are one step of undo."""
 
@@ -81,6 +96,51 @@ class Hide:
     """Hide these objects, and show all others."""
 
     objects: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Move, rotate and scale an object. Those of one `drag` are one step of undo."""
+
+    place: Placed
+    drag: int | None = None
+
+
+@dataclass(frozen=True)
+class SetLights:
+    """Light the model with these lights of the user's. Changes of one `drag` are one step of undo."""
+
+    lights: tuple[AddedLight, ...]
+    drag: int | None = None
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Let an axis of the model's coordinates, ``y`` or ``z``, point upwards."""
+
+    up: str
+
+
+@dataclass(frozen=True)
+class SetTime:
+    """Show a time of the model's animations in seconds; None: as they are written. A `drag` is one step of undo."""
+
+    time: float | None
+    drag: int | None = None
+
+
+@dataclass(frozen=True)
+class Keep:
+    """Keep what is on show as a snapshot, in place of one with the same name."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Recall:
+    """Show a snapshot, from the present camera."""
+
+    name: str
 
 
 @dataclass(frozen=True)
@@ -129,7 +189,11 @@ class Zoom:
     down: float = 0.0
 
 
-Action = SetField | Open | Resize | ChoosePreset | Assign | Hide | Adopt | Replace | SetOrbit | OrbitBy | Pan | Zoom
+Move = SetOrbit | OrbitBy | Pan | Zoom
+Action = (
+    SetField | Open | Resize | Stand | SetTime | ChoosePreset | SetMaterial | Assign | Hide | Place | SetLights | Keep
+    | Recall | Adopt | Replace | Move
+)  # fmt: skip
 
 #: Fields with which a preset is none any more.
 _OF_PRESET = ("absorption", "scattering", "anisotropy", "phase", "emission")
@@ -152,14 +216,39 @@ def apply(document: Document, action: Action) -> Document:
             # A glTF file shows its own media; on a mesh, which has none, a material of the user's own stays.
             if not _is_mesh(action.path) or material.source == "file":
                 material = Material()
-            return replace(model=model, material=material, orbit=None, assigned=(), hidden=())
+            return replace(
+                model=model, material=material, orbit=None, assigned=(), hidden=(), placed=(), lights=(), snapshots=()
+            )
         case Resize():
             model = dataclasses.replace(document.model, unit=checked("model.unit", action.unit, "m"))
             factor = metres_per_unit(model.unit) / metres_per_unit(document.model.unit)
             material = dataclasses.replace(document.material, thickness=factor * document.material.thickness)
             return _viewed_alike(replace(model=model, material=material), document)
+        case Stand():
+            model = dataclasses.replace(document.model, up=checked("model.up", action.up, "y"))
+            return replace(model=model, orbit=document.orbit if model == document.model else None)
+        case SetTime():
+            time = checked("model.time", action.time, None)
+            return replace(model=dataclasses.replace(document.model, time=time))
+        case Place():
+            placed = {one.object: one for one in document.placed} | {action.place.object: action.place}
+            moved = (placed[number] for number in sorted(placed) if placed[number] != Placed(number))
+            return replace(placed=tuple(moved))
+        case SetLights():
+            return replace(lights=action.lights)
+        case Keep():
+            kept = Snapshot(action.name, replace(snapshots=()))
+            others = {one.name: one for one in document.snapshots} | {action.name: kept}
+            return replace(snapshots=tuple(others[name] for name in sorted(others)))
+        case Recall():
+            if (found := document.snapshot(action.name)) is None:
+                names = ", ".join(one.name for one in document.snapshots) or "none is kept"
+                raise InputError(f"snapshot {action.name!r}", "there is none of that name", f"use one of: {names}")
+            return document.seen_as(found.document)
         case ChoosePreset():
             return replace(material=preset_material(document.material, action.name))
+        case SetMaterial():
+            return replace(material=action.material)
         case Assign():
             assigned = {one.object: one for one in document.assigned if one.object != action.object}
             if action.material is not None:
@@ -234,6 +323,40 @@ def preset_material(material: Material, name: str) -> Material:
     return _with_color(dataclasses.replace(material, **stated, roughness=roughness))
 
 
+def scattering_of(material: Material) -> tuple[Triple, float] | None:
+    """Diffuse color of a medium, and the mean of its mean free paths in metres; None if it does not scatter."""
+    absorption, scattering = np.asarray(material.absorption), np.asarray(material.scattering)
+    extinction = absorption + scattering
+    if not (extinction > 0).all() or not scattering.any():
+        return None
+    color = hulst_color(scattering / extinction, material.anisotropy)
+    return triple_of(np.clip(color, 0.0, 1.0)), float(np.mean(1.0 / extinction))
+
+
+def scattered_material(material: Material, color: Triple | None = None, radius: float | None = None) -> Material:
+    """Material with another diffuse color where it is thick, or another mean free path in metres.
+
+    Channels keep the proportions of their mean free paths. One that scattered nothing gets the other of the two from
+    its color and its distance.
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range.
+    """
+    known = scattering_of(material)
+    before, mean = known or (material.color, 0.1 * material.distance)
+    path = np.full(3, mean)
+    if known is not None:
+        path = 1.0 / (np.asarray(material.absorption) + np.asarray(material.scattering))
+    if radius is not None:
+        path = path * radius / mean
+    made = scattering_medium(before if color is None else color, path, material.anisotropy)
+    coefficients = {name: checked(f"material.{name}", triple_of(getattr(made, name)), (0.0, 0.0, 0.0))
+                    for name in ("absorption", "scattering")}  # fmt: skip
+    return _with_color(dataclasses.replace(material, **coefficients, source="coefficients", preset="", phase=""))
+
+
 def _with_color(material: Material) -> Material:
     """Material with the color at a distance of its coefficients, as ``translucent extinction`` states it."""
     medium = Medium(material.absorption, material.scattering)
@@ -263,13 +386,13 @@ class History:
         """History after an action; one that changes nothing leaves no step, and a drag leaves one."""
         after = apply(self.present, action)
         # Moves of the camera are no steps, and undo leaves it where it is.
-        if isinstance(action, (SetOrbit, OrbitBy, Pan, Zoom, Adopt)):
+        if isinstance(action, (Move, Adopt)):
             return dataclasses.replace(self, present=after)
         if after == self.present:
             return self
         drag = None
-        if isinstance(action, (SetField, Assign)) and action.drag is not None:
-            drag = action.field if isinstance(action, SetField) else f"object {action.object}", action.drag
+        if isinstance(action, (SetField, SetMaterial, Assign, Place, SetLights, SetTime)) and action.drag is not None:
+            drag = _dragged(action), action.drag
         if drag is not None and drag == self.drag:
             return dataclasses.replace(self, present=after, future=())
         return History(after, (*self.past, self.present)[-MAX_STEPS:], (), drag)
@@ -287,6 +410,18 @@ class History:
             return self
         after = _with_view_of(self.present, self.future[-1])
         return History(after, (*self.past, self.present), self.future[:-1])
+
+
+def _dragged(action: SetField | SetMaterial | Assign | Place | SetLights | SetTime) -> str:
+    """What a drag changes: others are steps of undo of their own."""
+    match action:
+        case SetField():
+            return action.field
+        case Assign():
+            return f"object {action.object}"
+        case Place():
+            return f"place {action.place.object}"
+    return type(action).__name__
 
 
 def _with_view_of(present: Document, other: Document) -> Document:

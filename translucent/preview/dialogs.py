@@ -139,6 +139,8 @@ MODELS = ["Models", "*.glb *.gltf *.obj *.stl *.ply *.off", "All files", "*"]
 SESSIONS = ["Sessions", "*.toml", "All files", "*"]
 PANORAMAS = ["Pictures of all directions", "*.hdr *.exr *.png *.jpg", "All files", "*"]
 
+TEXTURES = ["Pictures", "*.png *.jpg *.jpeg", "All files", "*"]
+
 #: Kinds of dialogs: the title, the file that is proposed where one is written, and the kinds.
 QUESTIONS: dict[str, tuple[str, str | None, list[str]]] = {
     "open": ("Open a model", None, MODELS),
@@ -146,6 +148,8 @@ QUESTIONS: dict[str, tuple[str, str | None, list[str]]] = {
     "save session": ("Save the session", "session.toml", SESSIONS),
     "environment": ("Light with a picture", None, PANORAMAS),
     "background": ("A picture behind the model", None, PANORAMAS),
+    "color texture": ("A picture that tints the surface", None, TEXTURES),
+    "roughness texture": ("A picture that multiplies the roughness", None, TEXTURES),
     "png": ("Save the picture", "picture.png", ["PNG", "*.png"]),
     "exr": ("Save the picture and its quantities", "picture.exr", ["OpenEXR", "*.exr"]),
     "turntable": ("Save a turntable", "turntable.gif", ["Animations", "*.gif *.webp *.mp4"]),

@@ -22,6 +22,7 @@ from translucent.planning.methods import METHODS
 from translucent.planning.scattering import SCATTERINGS
 from translucent.scene.camera import MAX_COORDINATE, Camera, direction_from, framing_directions
 from translucent.scene.environment import MAX_EXPOSURE
+from translucent.scene.lens import Lens
 from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.scene import Object
 from translucent.scene.showcase import DEFAULT_COLOR, framing
@@ -32,13 +33,17 @@ from translucent.units import metres_per_unit
 Triple = tuple[float, float, float]
 Source = Literal["file", "color", "preset", "coefficients"]
 Mode = Literal["picture", "thickness", "transmittance", "validity"]
-Compare = Literal["off", "method", "reference", "error"]
+Compare = Literal["off", "method", "snapshot", "reference", "error"]
+Up = Literal["y", "z"]
 
 #: Name of the method, scattering, stage and tone curve that leaves the choice to ``translucent render``.
 AUTO = "auto"
 
 #: Names of stages.
 STAGE_WORDS = (AUTO, NO_STAGE, *STAGES)
+
+#: Names of snapshots, by their keys.
+SNAPSHOTS = tuple("123456789")
 
 #: Units of length that panels offer.
 SHOWN_UNITS = ("mm", "cm", "m", "in")
@@ -50,8 +55,11 @@ MAX_PITCH = 89.9
 #: Methods of pictures that move: random paths are seen by `Display.converge`.
 METHOD_NAMES = (AUTO, *(name for name, method in METHODS.items() if not method.follows_paths))
 
-#: Largest length of a material in metres.
-_LONGEST = 1e12
+#: Largest width and height of exported pictures in pixels.
+MOST_PIXELS = 16384.0
+
+#: Largest length of a material in metres, and latest time of an animation in seconds.
+_LONGEST, _LATEST = 1e12, 1e6
 
 
 @dataclass(frozen=True)
@@ -76,12 +84,23 @@ def one_of(default: str, words: Iterable[str]) -> Any:
 
 @dataclass(frozen=True)
 class Model:
-    """Model: a file, or one of the toolkit's own meshes by name, with the unit of its coordinates, as ``mm`` or
-    ``25mm``, which is its scale, too.
+    """Model: a file, or one of the toolkit's own meshes by name.
+
+    Attributes
+    ----------
+    path : str
+    unit : str
+        Unit of its coordinates, as ``mm`` or ``25mm``, which is its scale, too.
+    up : {"y", "z"}
+        Axis of its coordinates that points upwards.
+    time : float, optional
+        Seconds on the clock of its animations; None: as the file's nodes, skins and morph targets are written.
     """
 
     path: str = "goblet"
     unit: str = "m"
+    up: Up = one_of("y", get_args(Up))
+    time: float | None = field(default=None, metadata={"range": FieldRange(0.0, _LATEST)})
 
 
 @dataclass(frozen=True)
@@ -112,6 +131,9 @@ class Material:
     clearcoat, clearcoat_roughness : float
     thickness : float
         thicknessFactor in metres, written to files and taken by thin layers.
+    color_texture, roughness_texture : str
+        Files of pictures that multiply the tint of the surface (baseColorTexture) and its roughness
+        (metallicRoughnessTexture, G), over the texture coordinates of the mesh; or nothing: those of the model.
     """
 
     source: Source = one_of("file", get_args(Source))
@@ -133,6 +155,8 @@ class Material:
     clearcoat: float = ranged(0.0, 0.0, 1.0)
     clearcoat_roughness: float = ranged(0.0, 0.0, 1.0)
     thickness: float = ranged(0.001, 0.0, _LONGEST, above=True)
+    color_texture: str = ""
+    roughness_texture: str = ""
 
     @property
     def surface_values(self) -> dict[str, float]:
@@ -148,7 +172,9 @@ class Material:
 
 #: Fields of a material that its surface has, too; color and ior are those of its medium.
 SURFACE_FIELDS = tuple(
-    name for name in Material.__dataclass_fields__ if name in Surface.__dataclass_fields__.keys() - {"color", "ior"}
+    name
+    for name in Material.__dataclass_fields__
+    if name in Surface.__dataclass_fields__.keys() - {"color", "ior", "color_texture", "roughness_texture"}
 )
 
 
@@ -168,6 +194,50 @@ class Assigned:
 
 
 @dataclass(frozen=True)
+class Placed:
+    """Place of one object: scaled, then rotated about the middle of its box, then moved.
+
+    Attributes
+    ----------
+    object : int
+        Its number in the model.
+    location : tuple of 3 floats
+        Metres from where the model has it.
+    rotation : tuple of 3 floats
+        Degrees about X, then Y, then Z of the world.
+    scale : tuple of 3 floats
+        Along X, Y and Z of the world.
+    """
+
+    object: int = 0
+    location: Triple = ranged((0.0, 0.0, 0.0), -_LONGEST, _LONGEST)
+    rotation: Triple = ranged((0.0, 0.0, 0.0), -1e6, 1e6)
+    scale: Triple = ranged((1.0, 1.0, 1.0), 1e-6, 1e6)
+
+
+@dataclass(frozen=True)
+class AddedLight:
+    """Light that the user has added: a sphere that shines, or a point.
+
+    Attributes
+    ----------
+    position : tuple of 3 floats
+        In metres.
+    radius : float
+        Of the sphere in metres; 0: a point, whose shadows are sharp.
+    intensity : float
+        Radiant intensity in W/sr.
+    color : tuple of 3 floats
+        Linear Rec.709, which multiplies it.
+    """
+
+    position: Triple = ranged((0.0, 0.0, 0.0), -MAX_COORDINATE, MAX_COORDINATE)
+    radius: float = ranged(0.0, 0.0, _LONGEST)
+    intensity: float = ranged(1.0, 0.0, MAX_RADIANCE)
+    color: Triple = ranged((1.0, 1.0, 1.0), 0.0, 1.0)
+
+
+@dataclass(frozen=True)
 class Look:
     """Look: stage, lights, background, exposure and tone curve.
 
@@ -183,6 +253,9 @@ class Look:
         Stops.
     tone : {"auto", "none", "neutral", "agx"}
         By itself neutral on a stage, else none.
+    depth_of_field : bool
+        A still picture is through a lens of the diameter `aperture`, in metres, and in focus in the plane that is
+        `focus` metres before the target.
     light : bool
         A directional light besides, from `light_yaw` and `light_pitch` (degrees) with `light_irradiance` (W/m^2).
     """
@@ -193,6 +266,9 @@ class Look:
     rotation: float = ranged(0.0, -1e6, 1e6)
     exposure: float = ranged(0.0, -MAX_EXPOSURE, MAX_EXPOSURE)
     tone: str = one_of(AUTO, (AUTO, *TONES))
+    depth_of_field: bool = False
+    aperture: float = ranged(0.01, 0.0, _LONGEST, above=True)
+    focus: float = ranged(0.0, -_LONGEST, _LONGEST)
     light: bool = False
     light_yaw: float = ranged(45.0, -1e6, 1e6)
     light_pitch: float = ranged(45.0, -MAX_PITCH, MAX_PITCH)
@@ -210,8 +286,11 @@ class Display:
     scattering : str
         How light that is scattered many times is shown: ``auto``, or a name of `SCATTERINGS`.
     mode : {"picture", "thickness", "transmittance", "validity"}
-    compare : {"off", "method", "reference", "error"}
-        What is right of the split: nothing, `method_b`, the float64 reference, or the signed error against it.
+    compare : {"off", "method", "snapshot", "reference", "error"}
+        What is right of the split: nothing, `method_b`, `snapshot`, the float64 reference, or the signed error against
+        it.
+    snapshot : str
+        Name of the snapshot to compare with.
     split : float
         Position of the split, 0 to 1 from the left.
     inset : bool
@@ -220,6 +299,8 @@ class Display:
         Refine the edges while the view is still.
     converge : bool
         Path trace the picture while the view is still.
+    denoise : bool
+        Take the noise of these paths out of the picture.
     caustics : bool
         Add the light of photons from the lights to the picture while the view is still.
     ruler : bool
@@ -233,10 +314,12 @@ class Display:
     scattering: str = one_of(AUTO, (AUTO, *SCATTERINGS))
     mode: Mode = one_of("picture", get_args(Mode))
     compare: Compare = one_of("off", get_args(Compare))
+    snapshot: str = ""
     split: float = ranged(0.5, 0.0, 1.0)
     inset: bool = False
     antialias: bool = True
     converge: bool = False
+    denoise: bool = False
     caustics: bool = False
     ruler: bool = False
     unit: str = one_of("mm", SHOWN_UNITS)
@@ -254,7 +337,7 @@ class Display:
     @property
     def pictured(self) -> bool:
         """True if pictures are on show, and neither quantities nor the reference, which are of the model alone."""
-        return self.mode == "picture" and self.compare in ("off", "method")
+        return self.mode == "picture" and self.compare in ("off", "method", "snapshot")
 
 
 @dataclass(frozen=True)
@@ -284,6 +367,56 @@ class Orbit:
 
 
 @dataclass(frozen=True)
+class Export:
+    """Options of files with pictures.
+
+    Attributes
+    ----------
+    width, height : float, optional
+        In pixels; None: as the viewport, or after its shape.
+    samples : float
+        Of a pixel.
+    pictures : float
+        Of a turntable.
+    transparent : bool
+        Whether the bodies are alone, over nothing.
+    denoise : bool
+        Whether noise is taken out: of rough interfaces, and of paths.
+    """
+
+    width: float | None = ranged(None, 1.0, MOST_PIXELS)
+    height: float | None = ranged(None, 1.0, MOST_PIXELS)
+    samples: float = ranged(16.0, 1.0, 4096.0)
+    pictures: float = ranged(36.0, 2.0, 1000.0)
+    transparent: bool = False
+    denoise: bool = False
+
+    def size(self, viewport: tuple[int, int]) -> tuple[int, int]:
+        """Width and height in pixels; with one of them, the other follows the viewport's shape."""
+        across, down = viewport
+        if self.width is None and self.height is None:
+            return viewport
+        width = self.width or (self.height or 0.0) * across / down
+        height = self.height or (self.width or 0.0) * down / across
+        return max(round(width), 1), max(round(height), 1)
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Kept state of a document, to compare with and to go back to.
+
+    Attributes
+    ----------
+    name : str
+    document : Document
+        Without snapshots.
+    """
+
+    name: str
+    document: Document
+
+
+@dataclass(frozen=True)
 class Document:
     """Document: everything that a session holds. Without an orbit, the model is to be framed.
 
@@ -299,6 +432,10 @@ class Document:
     orbit: Orbit | None = None
     assigned: tuple[Assigned, ...] = ()
     hidden: tuple[int, ...] = ()
+    placed: tuple[Placed, ...] = ()
+    lights: tuple[AddedLight, ...] = ()
+    snapshots: tuple[Snapshot, ...] = ()
+    export: Export = field(default_factory=Export)
 
     def shown_among(self, count: int) -> tuple[int, ...]:
         """Numbers of the objects on show of a model with so many."""
@@ -308,11 +445,38 @@ class Document:
         """Material that is assigned to an object, if any."""
         return next((one.material for one in self.assigned if one.object == number), None)
 
+    def place_of(self, number: int) -> Placed:
+        """Place of an object."""
+        return next((one for one in self.placed if one.object == number), Placed(number))
+
+    def snapshot(self, name: str) -> Snapshot | None:
+        """Snapshot of a name, if there is one."""
+        return next((one for one in self.snapshots if one.name == name), None)
+
+    def seen_as(self, kept: Document) -> Document:
+        """Document with what another one shows, from the camera and in the display of this one."""
+        if kept.model.path != self.model.path:
+            return self
+        names = ("material", "look", "assigned", "hidden", "placed", "lights", "flags")
+        return dataclasses.replace(self, **{name: getattr(kept, name) for name in names})
+
+
+#: What has fields, by the names that those begin with.
+SECTIONS: dict[str, type[Any]] = {
+    "model": Model,
+    "material": Material,
+    "look": Look,
+    "display": Display,
+    "orbit": Orbit,
+    "export": Export,
+    "placed": Placed,
+    "light": AddedLight,
+}
 
 #: Ranges of fields that cannot hold every value of their type, by section and name.
 RANGES: dict[str, FieldRange] = {
-    f"{section.__name__.lower()}.{one.name}": one.metadata["range"]
-    for section in (Model, Material, Look, Display, Orbit)
+    f"{name}.{one.name}": one.metadata["range"]
+    for name, section in SECTIONS.items()
     for one in dataclasses.fields(section)
     if one.metadata
 }
@@ -327,6 +491,8 @@ def checked(name: str, value: Any, like: Any) -> Any:
         If it may not.
     """
     range_ = RANGES.get(name, FieldRange())
+    if like is None:
+        return None if value is None else _number(name, value, range_)
     if isinstance(like, bool) or isinstance(value, bool):
         if not (isinstance(like, bool) and isinstance(value, bool)):
             raise InputError(f"{name} = {value!r}", "of the wrong type", f"give for example {like!r}")
@@ -358,6 +524,13 @@ _STEP_BACK = 4.0
 
 #: Smallest and largest distance of zooming, in metres.
 _NEAREST, _FARTHEST = 1e-9, 1e12
+
+
+def lens_of(look: Look, orbit: Orbit) -> Lens | None:
+    """Lens of a picture, if there is one."""
+    if not look.depth_of_field or orbit.orthographic:
+        return None
+    return Lens(look.aperture, max(orbit.distance - look.focus, 1e-3 * orbit.distance))
 
 
 def camera_of(orbit: Orbit) -> Camera:
@@ -436,6 +609,30 @@ def orbit_of(camera: Camera, center: npt.ArrayLike) -> Orbit:
 #: Explanations of fields: their units, typical values, and names in glTF.
 _EXPLAINED = """
 model.unit = Unit of the file's coordinates. glTF is in metres; most .stl are in mm.
+model.up = Axis of the file's coordinates that points upwards. glTF has Y; CAD and printing have Z.
+model.time = Time of the file's animations in seconds: nodes, skins and morph targets move, and thickness is that of
+    the moved meshes.
+material.color_texture = baseColorTexture (glTF): a picture (.png, .jpg) over the texture coordinates of the mesh, which
+    tints what passes the surface.
+material.roughness_texture = metallicRoughnessTexture (glTF): a picture, the green of which multiplies the roughness.
+placed.location = How far the object is moved, in metres. Or drag its gizmo (W).
+placed.rotation = Degrees about X, then Y, then Z, around its middle. Or drag its gizmo (R).
+placed.scale = Factors along X, Y and Z. Media keep their lengths. Or drag its gizmo (S).
+light.position = Position of the light in metres. Or drag its gizmo.
+light.radius = Radius of the sphere that shines, in metres: larger ones throw softer shadows. 0: a point.
+light.intensity = Radiant intensity in W/sr (intensity of KHR_lights_punctual, cd there): at 1 m it lights as many W/m2.
+light.color = Color of the light, linear.
+export.width = Width of exported pictures in pixels; empty: as the viewport, or after its shape.
+export.height = Height of exported pictures in pixels; empty: as the viewport, or after its shape.
+export.samples = Samples of a pixel: more of them make edges and blurred parts smoother. Typical: 16.
+export.pictures = Pictures of a turntable.
+export.transparent = The bodies alone, over nothing.
+export.denoise = Open Image Denoise takes out noise: of rough interfaces, and of paths (the extra denoise).
+display.snapshot = Kept state that is seen right of the line. 1 to 9 show snapshots, Shift 1 to 9 keep them.
+display.denoise = Open Image Denoise takes the noise out of the paths of a still picture (the extra denoise).
+look.depth_of_field = What is before and behind the plane in focus is blurred, in a still picture.
+look.aperture = Diameter of the lens: larger ones blur more. Typical: a twentieth of the distance of the camera.
+look.focus = How far the plane in focus is before the middle of the view (below 0: behind it). Typical: 0.
 material.color = attenuationColor (glTF): linear color that is left of white light after attenuationDistance.
     Never black: what is left after the distance is more than nothing.
 material.distance = attenuationDistance (glTF): length after which attenuationColor is left. Typical: wine 1 cm,

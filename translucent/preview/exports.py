@@ -15,8 +15,10 @@ import numpy.typing as npt
 from translucent.assets import mesh_names
 from translucent.errors import InputError
 from translucent.formulas.color import srgb_to_linear
+from translucent.formulas.sampling import sample_shifts
 from translucent.frames.animation import check_animation, write_animation
 from translucent.frames.aovs import EMPTY, false_colors
+from translucent.frames.frame import Frame
 from translucent.frames.writing import SUFFIXES, check_output
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import keep_drawn_normals, made_normals
@@ -25,11 +27,22 @@ from translucent.media.presets import preset
 from translucent.planning.caustics import Caustics
 from translucent.planning.flags import Flags
 from translucent.planning.request import RenderRequest
-from translucent.preview.document import AUTO, Document, Material, Orbit, camera_of, length_text
+from translucent.preview.document import (
+    AUTO,
+    AddedLight,
+    Document,
+    Material,
+    Orbit,
+    Placed,
+    camera_of,
+    length_text,
+)
 from translucent.preview.scenes import (
     Loaded,
+    light_of,
     medium_of,
     own_material,
+    placement,
     request_of,
     stage_name,
     tone_of,
@@ -38,8 +51,10 @@ from translucent.preview.scenes import (
 from translucent.preview.tasks import Task
 from translucent.preview.worker import Pool, Urgency, report
 from translucent.renderer import Renderer
-from translucent.scene.camera import direction_from
+from translucent.scene.camera import Window, direction_from
 from translucent.scene.environment import Environment
+from translucent.scene.lens import Lens
+from translucent.scene.lights import SphereLight
 from translucent.scene.scene import Object, Scene
 from translucent.scene.showcase import SOLID_IOR
 from translucent.scene.stages import NO_STAGE
@@ -82,13 +97,42 @@ def write_picture(
     size: Size,
     look: Look = (0.0, "none"),
     request: RenderRequest | None = None,
+    samples: int = SAMPLES,
+    lens: Lens | None = None,
 ) -> None:
-    """Write a .png, or an .exr with all quantities; a transparent one has the bodies alone."""
+    """Write a .png, or an .exr with all quantities; a transparent one has the bodies alone.
+
+    Through a lens, each sample of a pixel is a picture of its own, and quantities are those of the pinhole.
+    """
     report(None, "drawing")
+    request = replace(request or RenderRequest(), samples=samples)
     with Renderer() as renderer:
-        frame = renderer.render_requested(scene, size, replace(request or RenderRequest(), samples=SAMPLES))
+        if lens is None:
+            frame = renderer.render_requested(scene, size, request)
+        else:
+            frame = _through_lens(renderer, scene, size, request, lens)
     report(None, "writing")
     frame.save(path, *look)
+
+
+def _through_lens(renderer: Renderer, scene: Scene, size: Size, request: RenderRequest, lens: Lens) -> Frame:
+    """Frame with the mean radiance through all parts of a lens."""
+    count, shifts = request.samples, sample_shifts(request.samples)
+    one = replace(request, samples=1)
+    frame = renderer.render_requested(scene, size, one)
+    parts = [name for name in ("radiance", "alpha", "passed") if getattr(frame, name) is not None]
+    sums = {name: np.zeros(getattr(frame, name).shape) for name in parts}
+    for number, (right, down) in enumerate(shifts):
+        report(number / count, f"part {number + 1} of {count} of the lens")
+        camera = lens.camera(scene.camera, size, number, count)
+        window = camera.window or Window(0, 0, size)
+        shifted = replace(window, left=window.left + float(right), top=window.top + float(down))
+        view = replace(scene, camera=replace(camera, window=shifted))
+        found = renderer.render_requested(view, size, one)
+        for name, values in sums.items():
+            values += getattr(found, name)
+    means: dict[str, Any] = {name: (values / count).astype(np.float32) for name, values in sums.items()}
+    return replace(frame, **means)
 
 
 def write_turntable(
@@ -246,6 +290,13 @@ def command_line(recipe: Recipe) -> tuple[str, list[str]]:
     words += ["--caustics", str(recipe.caustics.photons)] if recipe.caustics else []
     left_out += ["the orthographic camera"] if orbit.orthographic else []
     left_out += ["the directional light"] if look.light else []
+    left_out += ["added lights"] if document.lights else []
+    left_out += ["places of objects"] if document.placed else []
+    left_out += ["depth of field"] if look.depth_of_field else []
+    left_out += ["the Z axis upwards"] if model.up == "z" else []
+    words += ["--time", f"{model.time:.12g}"] if model.time is not None else []
+    words += ["--samples", f"{document.export.samples:.0f}"] if document.export.samples != SAMPLES else []
+    words += ["--denoise"] if document.export.denoise else []
     left_out += ["hidden objects"] if document.hidden else []
     return shlex.join(words), left_out
 
@@ -262,6 +313,7 @@ def _medium_options(material: Material) -> tuple[list[str], list[str]]:
         words += ["--ior", f"{material.ior:.12g}"]
     fields = {"scattering": "scattering", "emission": "emission"}
     left_out = [part for name, part in fields.items() if np.any(getattr(found, name) != getattr(requested, name))]
+    left_out += ["textures"] if material.color_texture or material.roughness_texture else []
     return [*words, "--roughness", f"{material.roughness:g}"], left_out + material.unsaid
 
 
@@ -269,7 +321,9 @@ def python_code(recipe: Recipe) -> str:
     """Python that renders the picture."""
     document, look = recipe.document, recipe.document.look
     model, orbit, camera = recipe.loaded.model, recipe.orbit, camera_of(recipe.orbit)
-    lines = ["import dataclasses", "", "import translucent as tl", "from translucent.assets import mesh_path"]
+    lines = ["import dataclasses", ""]
+    lines += ["import numpy as np", ""] if document.placed else []
+    lines += ["import translucent as tl", "from translucent.assets import mesh_path"]
     lines += ["from translucent.scene.showcase import filled, named_environment", ""]
     is_own = model.path in mesh_names() and not Path(model.path).exists()
     path = f"mesh_path({model.path!r})" if is_own else repr(model.path)
@@ -279,12 +333,18 @@ def python_code(recipe: Recipe) -> str:
     elif is_composed(model.path):
         lines += ["from translucent.scene_files import load_composed", "", f"scene = load_composed({path}{unit})"]
     else:
-        lines += [f"scene = tl.load_scene({path}{unit})"]
+        time = "" if model.time is None else f", time={model.time:.12g}"
+        lines += [f"scene = tl.load_scene({path}{unit}{time})"]
+    if model.up == "z":
+        lines += ["from translucent.preview.scenes import turned_up", "scene = turned_up(scene)"]
     count = len(recipe.loaded.scene.objects)
     if document.material.source != "file" or recipe.loaded.bare:
         lines += _filling_lines(document.material, None)
     for one in document.assigned:
         lines += _filling_lines(one.material, one.object) if one.object < count else []
+    for place in document.placed if any(place.object < count for place in document.placed) else ():
+        if place.object < count:
+            lines += _placing_lines(place, recipe.loaded.scene.objects[place.object])
     ends = f"({_numbers(camera.eye, ', ')}), ({_numbers(orbit.target, ', ')})"
     if camera.fov_y is None:
         made = f"tl.Camera.orthographic({ends}, height={camera.height:.12g})"
@@ -309,7 +369,12 @@ def python_code(recipe: Recipe) -> str:
         towards = _numbers(-direction_from(look.light_yaw, look.light_pitch), ", ")
         light = f"tl.DirectionalLight(({towards}), {look.light_irradiance:.12g})"
         lines += [f"scene = dataclasses.replace(scene, lights=[*scene.lights, {light}])"]
-    choices = [f"samples={SAMPLES}"]
+    for added in document.lights:
+        lines += [f"scene = dataclasses.replace(scene, lights=[*scene.lights, {_light_text(added)}])"]
+    if look.depth_of_field:
+        lines += ["# depth of field: translucent.scene.lens.Lens gives the cameras; this picture is through a pinhole"]
+    choices = [f"samples={document.export.samples:.0f}"]
+    choices += ["denoise=True"] if document.export.denoise else []
     request = request_of(document)
     if request.method is not None:
         choices += [f"method=tl.{request.method!r}"]
@@ -323,6 +388,26 @@ def python_code(recipe: Recipe) -> str:
     lines += [f"    frame = renderer.render(scene, {recipe.size}, {', '.join(choices)})"]
     lines += [f"frame.save({recipe.output!r}, exposure={look.exposure:.12g}, tone={tone_of(look, recipe.scene)!r})", ""]
     return "\n".join(lines)
+
+
+def _placing_lines(place: Placed, item: Object) -> list[str]:
+    """Lines of Python that put an object into its place."""
+    rows = ", ".join(f"({_numbers(row, ', ')})" for row in placement(place, item).tolist())
+    moved = f"[{place.object}]"
+    return [
+        f"moved, place = scene.objects{moved}, np.array([{rows}])",
+        "moved_to = dataclasses.replace(moved, transform=place @ moved.matrix)",
+        "scene = dataclasses.replace(scene, objects=[moved_to if one is moved else one for one in scene.objects])",
+    ]
+
+
+def _light_text(light: AddedLight) -> str:
+    """Python of an added light."""
+    made = light_of(light)
+    values = f"({_numbers(np.asarray(made.position), ', ')}), ({_numbers(np.asarray(made.intensity), ', ')})"
+    if isinstance(made, SphereLight):
+        return f"tl.SphereLight({values}, {made.radius:.12g})"
+    return f"tl.PointLight({values})"
 
 
 def _filling_lines(material: Material, number: int | None) -> list[str]:
@@ -340,6 +425,13 @@ def _filling_lines(material: Material, number: int | None) -> list[str]:
     if material.source == "file" and number is None:
         return lines
     values = ", ".join(f"{name}={value:.12g}" for name, value in material.surface_values.items())
+    values += "".join(
+        f", {slot}=picture_texture({path!r}, 0, encoded={slot == 'color_texture'})"
+        for slot, path in (("color_texture", material.color_texture), ("roughness_texture", material.roughness_texture))
+        if path
+    )
+    if "picture_texture" in values:
+        lines += ["from translucent.preview.scenes import picture_texture"]
     return [
         *lines,
         f"values = dict({values}, opacity=None)",

@@ -9,8 +9,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, TypeVar, cast
 
+from translucent.arrays import Floats
 from translucent.diffusion.keys import diffusion_key, media_lit_by_photons, place_of
 from translucent.errors import InputError
+from translucent.frames.denoising import denoised_radiance
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.refinement import Convergence, PhotonPicture
 from translucent.gpu.viewport import STRIDES, Viewport
@@ -56,6 +58,12 @@ COARSEST_TRACED = 3.0
 
 #: Samples of a pixel where steps are quick, or slow.
 SAMPLES, SLOW_SAMPLES = 16, 4
+
+#: Samples of a pixel through a lens, each through another point of it.
+LENS_SAMPLES = 64
+
+#: Paths of each pixel after which noise is first taken out of them, and the factor from one time to the next.
+FIRST_DENOISED, DENOISED_AGAIN = 4, 4
 
 #: Interfaces of a picture in which rays cannot be traced, or would take too long.
 SCREEN = ScreenInterfaces()
@@ -364,9 +372,17 @@ class PathRefinement:
         self.plan: RenderPlan | None = None
         self._scene: Scene | None = None
         self._held: Convergence | None = None
+        self._denoised = 0  # paths of the denoised picture on show
+        self._made: tuple[int, Floats] | None = None  # paths and radiance of the next one
 
-    def step(self, scene: Scene, renderer: Renderer, viewport: Viewport, seconds: float) -> tuple[bool, bool]:
-        """Follow paths of a still picture for about so many seconds; whether more are to come, and it has changed."""
+    def step(
+        self, scene: Scene, renderer: Renderer, viewport: Viewport, seconds: float, workspace: Workspace
+    ) -> tuple[bool, bool]:
+        """Follow paths of a still picture for about so many seconds; whether more are to come, and it has changed.
+
+        Where the document asks for it, noise is taken out of them now and then, in another process. Such a picture
+        stays on show until the next one.
+        """
         try:
             if self._scene is not scene:
                 self.stop()
@@ -380,14 +396,57 @@ class PathRefinement:
         except InputError as error:
             self.note = f"not converging: {error}"
             return False, False
-        held = self._held
-        if held.done:
-            return False, False
-        if changed := held.step(seconds):
+        held, wanted = self._held, workspace.document.display.denoise
+        if self._denoised and not wanted:
+            self._denoised = 0
             viewport.take(0, held.job)
-            state = "converged" if held.done else "converging"
-            self.note = f"{state}: {held.paths} paths, standard error {held.error:.2%}"
-        return not held.done, changed
+            self._count(held)
+            return True, True
+        fresh = self._made is not None and wanted
+        if self._made is not None and wanted:
+            self._denoised, radiance = self._made
+            viewport.put_radiance(0, radiance)
+            self._count(held)
+        self._made = None
+        if held.done:
+            return wanted and self._denoise(held, scene, viewport, workspace), fresh
+        if (stepped := held.step(seconds)) and not self._denoised:
+            viewport.take(0, held.job)
+        if stepped:
+            self._count(held)
+        if wanted:
+            self._denoise(held, scene, viewport, workspace)
+        return wanted or not held.done, fresh or (stepped and not self._denoised)
+
+    def _count(self, held: Convergence) -> None:
+        state = "converged" if held.done else "converging"
+        self.note = f"{state}: {held.paths} paths, standard error {held.error:.2%}"
+        if self._denoised:
+            self.note = (
+                f"{state}: denoised at {self._denoised} paths (what is on show has no known error), {held.paths} now"
+            )
+
+    def _denoise(self, held: Convergence, scene: Scene, viewport: Viewport, workspace: Workspace) -> bool:
+        """Have the noise taken out of what is there, if it is time; returns whether a picture is to come."""
+        lane, paths = workspace.lanes["denoise"], held.paths
+        key = scene, paths
+        if lane.task is not None:
+            return True
+        due = paths >= max(FIRST_DENOISED, self._denoised * DENOISED_AGAIN) or (held.done and paths > self._denoised)
+        if not due or lane.failed(key):
+            return False
+        viewport.take(0, held.job)
+        radiance = viewport.radiance(0)
+
+        def work(task: Task) -> Floats:
+            return workspace.pool.call(task, denoised_radiance, radiance, scene)
+
+        def take(found: Floats) -> None:
+            if self._held is held:
+                self._made = paths, found
+
+        lane.start("denoising", work, take).key = key
+        return True
 
     def stop(self) -> bool:
         """End it; returns whether its picture was on show."""
@@ -395,7 +454,7 @@ class PathRefinement:
         if self._held is not None:
             self._held.release()
         self._scene = self._held = self.plan = None
-        self.note = ""
+        self.note, self._denoised, self._made = "", 0, None
         return was
 
 

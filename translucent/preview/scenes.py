@@ -12,15 +12,18 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.assets import mesh_names, mesh_path
 from translucent.errors import InputError
 from translucent.formulas.bsdf import brdf_table
+from translucent.formulas.color import srgb_to_linear
 from translucent.formulas.phase import parse_phase
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals, keep_drawn_normals
 from translucent.geometry.solids import Box
 from translucent.geometry.support import Support
 from translucent.gltf.load import SUFFIXES, load_scene
+from translucent.media.colors import read_encoded
 from translucent.media.medium import Medium, color_at
 from translucent.planning.caustics import Caustics
 from translucent.planning.methods import Method, method_from_name
@@ -29,12 +32,15 @@ from translucent.planning.scattering import SCATTERINGS
 from translucent.preview.document import (
     AUTO,
     SURFACE_FIELDS,
+    AddedLight,
     Assigned,
     Document,
     Look,
     Material,
     Model,
     Orbit,
+    Placed,
+    Triple,
     camera_of,
     framed,
     medium_fields,
@@ -46,7 +52,7 @@ from translucent.preview.worker import Pool, Urgency
 from translucent.scene.camera import Camera, direction_from
 from translucent.scene.environment import Environment, filtered
 from translucent.scene.environment_files import READERS
-from translucent.scene.lights import DirectionalLight, PositionalLight, SphereLight
+from translucent.scene.lights import DirectionalLight, PointLight, PositionalLight, SphereLight, SpotLight
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.shadow_directions import shadow_directions
 from translucent.scene.showcase import (
@@ -54,6 +60,7 @@ from translucent.scene.showcase import (
     DEFAULT_REACH,
     LIGHT_TABLE,
     SOLID_IOR,
+    AnyScene,
     fillable,
     framing,
     named_environment,
@@ -70,6 +77,7 @@ from translucent.scene.stages import (
     view_axes,
 )
 from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
 from translucent.scene.turntable import on_stage
 from translucent.scene_files import ComposedScene, is_composed, load_composed
 from translucent.units import metres_per_unit
@@ -148,12 +156,14 @@ def load(model: Model, allow_outside: bool = False) -> Loaded:
         unit = None if model.unit == "m" else model.unit
         scene: Scene = load_composed(model.path, unit, allow_outside=allow_outside)
     elif Path(model.path).suffix.lower() in SUFFIXES:
-        scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
+        scene = load_scene(model.path, model.unit, allow_outside=allow_outside, time=model.time)
     elif model.path in mesh_names() and not Path(model.path).exists():
         scene = showcase(load_mesh(mesh_path(model.path), model.unit), stage="none")
     else:
         unit = None if model.unit == "m" else model.unit  # what is assumed is said
         scene = showcase(load_mesh(model.path, unit, allow_outside=allow_outside), stage="none")
+    if model.up == "z":
+        scene = turned_up(scene)
     for item in scene.objects:
         _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
         if item.has_interface or item.surface is not None:
@@ -182,6 +192,90 @@ def rescaled(loaded: Loaded, model: Model) -> Loaded:
     lights = [_farther(light, factor) for light in scene.lights]
     scene = dataclasses.replace(scene, objects=objects, camera=camera, lights=lights)
     return Loaded(model, scene, material_of(scene))
+
+
+#: Turns what is upwards in coordinates with Z up into what is upwards with Y up.
+_Z_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+
+def turned_up(scene: AnyScene) -> AnyScene:
+    """Scene of a model in which Z was upwards."""
+    turn = _Z_UP[:3, :3]
+
+    def turned(light: Light) -> Light:
+        if isinstance(light, PositionalLight):
+            light = dataclasses.replace(light, position=turn @ np.asarray(light.position))
+        if isinstance(light, SpotLight | DirectionalLight):
+            light = dataclasses.replace(light, direction=turn @ np.asarray(light.direction))
+        return light
+
+    objects = [dataclasses.replace(item, transform=_Z_UP @ item.matrix) for item in scene.objects]
+    camera = dataclasses.replace(scene.camera, pose=_Z_UP @ scene.camera.pose)
+    if not getattr(scene, "has_camera", False):
+        camera = framing(objects, (1, 1))
+    return dataclasses.replace(scene, objects=objects, camera=camera, lights=[turned(one) for one in scene.lights])
+
+
+def placement(place: Placed, item: Object) -> Array:
+    """(4, 4): what moves an object of the model, about the middle of its box, to its place."""
+    middle = item.bounds.mean(axis=0)
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation_matrix(place.rotation) * np.asarray(place.scale)
+    matrix[:3, 3] = middle + np.asarray(place.location) - matrix[:3, :3] @ middle
+    return matrix
+
+
+def rotation_matrix(degrees: Triple) -> Array:
+    """(3, 3): rotation by degrees about X, then Y, then Z of the world."""
+    (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
+    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
+    about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(about_z @ about_y @ about_x)
+
+
+def degrees_of(rotation: Array) -> Triple:
+    """Degrees about X, then Y, then Z of a rotation (3, 3), as `rotation_matrix` takes them."""
+    x = math.atan2(rotation[2, 1], rotation[2, 2])
+    y = math.atan2(-rotation[2, 0], math.hypot(rotation[2, 1], rotation[2, 2]))
+    z = math.atan2(rotation[1, 0], rotation[0, 0])
+    return math.degrees(x), math.degrees(y), math.degrees(z)
+
+
+@lru_cache(maxsize=4)
+def placed_objects(scene: Scene, placed: tuple[Placed, ...]) -> tuple[Object, ...]:
+    """Objects of a model where the user has put them; cached, so that the others stay as one moves."""
+    objects = list(scene.objects)
+    for place in placed:
+        if place.object < len(objects):
+            item = objects[place.object]
+            objects[place.object] = dataclasses.replace(item, transform=placement(place, item) @ item.matrix)
+    return tuple(objects)
+
+
+@lru_cache(maxsize=16)
+def light_of(light: AddedLight) -> PointLight | SphereLight:
+    """Light that the user has added; cached, as solutions for scattered light are cached by it."""
+    intensity = light.intensity * np.asarray(light.color)
+    if light.radius > 0:
+        return SphereLight(light.position, intensity, light.radius)
+    return PointLight(light.position, intensity)
+
+
+@lru_cache(maxsize=4)
+def picture_texture(path: str, written: int, *, encoded: bool) -> Texture:
+    """Texture of a picture file as it was `written`; `encoded`: its colors are sRGB."""
+    stored = read_encoded(path, f"texture {path!r}")
+    levels = stored / float(np.iinfo(stored.dtype).max)
+    return Texture((srgb_to_linear(levels) if encoded else levels).astype(np.float32))
+
+
+def _texture(path: str, item: Object, *, encoded: bool) -> Texture:
+    if item.mesh.uv is None:
+        found = f"{item.mesh.name or 'the mesh'} has no texture coordinates"
+        raise InputError(f"texture {path!r}", found, "unwrap it in a modeler, or choose no texture")
+    written = Path(path).stat().st_mtime_ns if Path(path).is_file() else 0
+    return picture_texture(path, written, encoded=encoded)
 
 
 def _farther(light: Light, factor: float) -> Light:
@@ -377,7 +471,7 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
     if document.orbit is None:
         raise InputError("a picture", "nobody has framed the model", "frame it first")
     look, scene = document.look, loaded.scene
-    objects = _objects(document.material, document.assigned, scene)
+    objects = _objects(document.material, document.assigned, scene, document.placed)
     objects = tuple(item for number, item in enumerate(objects) if number not in document.hidden)
     if (name := stage_name(look, loaded)) != NO_STAGE and document.display.pictured:
         scene = _standing(loaded, name, look.environment, look.background, look.rotation)
@@ -385,7 +479,8 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
         environment = scene.environment
     else:
         environment = _environment(look.environment, look.background, look.rotation, scene.environment)
-    lights = [_light(look.light_yaw, look.light_pitch, look.light_irradiance)] if look.light else []
+    lights: list[Light] = [light_of(one) for one in document.lights]
+    lights += [_light(look.light_yaw, look.light_pitch, look.light_irradiance)] if look.light else []
     return dataclasses.replace(
         scene,
         objects=objects,
@@ -395,17 +490,22 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
     )
 
 
-@lru_cache(maxsize=2)
-def _objects(material: Material, assigned: tuple[Assigned, ...], scene: Scene) -> tuple[Object, ...]:
-    """Objects of the scene with their materials; cached, so that the others stay as one is hidden."""
+@lru_cache(maxsize=4)
+def _objects(
+    material: Material, assigned: tuple[Assigned, ...], scene: Scene, placed: tuple[Placed, ...]
+) -> tuple[Object, ...]:
+    """Objects of the scene with their materials, in their places; cached, so that the others stay as one is hidden."""
     objects = list(_objects_alike(material, scene))
     for one in assigned:
         if one.object < len(objects):
             objects[one.object] = _filled(objects[one.object], one.material, medium_of(one.material))
+    for item, place in zip(placed_objects(scene, placed), range(len(objects)), strict=True):
+        if item is not scene.objects[place]:
+            objects[place] = dataclasses.replace(objects[place], transform=item.transform)
     return tuple(objects)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=4)
 def _objects_alike(material: Material, scene: Scene) -> tuple[Object, ...]:
     """Objects of the scene with one material in all bodies; a bare mesh with the model's own gets an ior alone."""
     if material.source != "file" or not scene.bodies:
@@ -423,6 +523,11 @@ def _objects_alike(material: Material, scene: Scene) -> tuple[Object, ...]:
 
 def _filled(item: Object, material: Material, medium: Medium) -> Object:
     surface = dataclasses.replace(item.surface or Surface(), **material.surface_values, opacity=None)  # type: ignore[arg-type]
+    if material.color_texture:
+        surface = dataclasses.replace(surface, color_texture=_texture(material.color_texture, item, encoded=True))
+    if material.roughness_texture:
+        found = _texture(material.roughness_texture, item, encoded=False)
+        surface = dataclasses.replace(surface, roughness_texture=found)
     return dataclasses.replace(item, medium=medium, surface=surface, sheet_thickness=None)
 
 

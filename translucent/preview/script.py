@@ -1,8 +1,12 @@
 """Scripts: user actions as a list in TOML; for tests, pictures of the window and demonstrations.
 
 Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, value), ``open`` (model, unit), ``resize``
-(height, as 12cm), ``preset`` (name), ``turn`` (right, up: degrees), ``pan`` (right, down: heights of the picture),
-``zoom`` (factor, right, down), ``undo``, ``redo``, ``frame``.
+(height, as 12cm), ``stand`` (up: y or z), ``time`` (seconds), ``play``, ``preset`` (name), ``scatter`` (color, radius),
+``texture`` (slot: color_texture or roughness_texture; file), ``turn`` (right, up: degrees), ``view`` (name), ``pan``
+(right, down: heights of the picture), ``zoom`` (factor, right, down), ``undo``, ``redo``, ``frame``, ``keep``,
+``recall`` and ``compare_with`` (name of a snapshot). Of lights: ``add_light``, ``light`` (field, value: of the selected
+one), ``remove_light`` (number). Of places: ``place`` (field, value: of the selected object), ``ground``, ``gizmo``
+(name: move, rotate, scale).
 Of the library: ``library`` (search), ``drop`` (preset, x, y: fractions of the
 viewport), ``save_preset`` (name), ``environments`` (folder). Of files: ``ask`` (kind: as of ``save``), in our own
 browser, and ``answer`` (file). Of the keyboard: ``key`` (name, such as escape or ctrl+z), ``type`` (text). Of
@@ -23,8 +27,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from translucent.errors import InputError
-from translucent.preview.actions import OrbitBy, Pan, Zoom
-from translucent.preview.document import Model
+from translucent.media.colors import parse_color
+from translucent.preview.actions import OrbitBy, Pan, SetTime, Stand, Zoom
+from translucent.preview.document import Model, triple_of
 from translucent.preview.session import read_toml
 from translucent.units import parse_length
 
@@ -50,6 +55,23 @@ VERBS: dict[str, Callable[..., object]] = {
     "turn": lambda state, right=0.0, up=0.0: state.work.do(OrbitBy(right, up)),
     "pan": lambda state, right=0.0, down=0.0: state.work.do(Pan(right, down)),
     "zoom": lambda state, factor=1.0, right=0.0, down=0.0: state.work.do(Zoom(factor, right, down)),
+    "view": lambda state, name=str: state.view_from(name),
+    "stand": lambda state, up=str: state.work.do(Stand(up)),
+    "gizmo": lambda state, name="": setattr(state, "gizmo", name),
+    "place": lambda state, field=str, value=object: state.change_place(field, value, step=True),
+    "ground": lambda state: state.drop_to_ground(),
+    "add_light": lambda state: state.add_light(),
+    "light": lambda state, field=str, value=object: state.change_light(field, value, step=True),
+    "remove_light": lambda state, number=int: state.remove_light(number),
+    "scatter": lambda state, color="", radius="": state.scatter(
+        triple_of(parse_color(color)) if color else None, parse_length(radius) if radius else None
+    ),
+    "texture": lambda state, slot=str, file="": state.use_texture(slot, file),
+    "keep": lambda state, name=str: state.snapshot(name, keep=True),
+    "recall": lambda state, name=str: state.snapshot(name, keep=False),
+    "compare_with": lambda state, name=str: state.compare_with(name),
+    "time": lambda state, seconds=0.0: state.work.do(SetTime(seconds)),
+    "play": lambda state: state.play(),
     "library": lambda state, search="": setattr(state.work.library, "search", search),
     "pick": lambda state, x=0.5, y=0.5: state.pick((x, y), state.select),
     "object": lambda state, number=-1: state.select(None if number < 0 else number),

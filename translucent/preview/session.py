@@ -15,7 +15,19 @@ from translucent.extras import require_package
 from translucent.files.paths import config_folder, write_atomically
 from translucent.files.reading import read_text, toml_value
 from translucent.planning.flags import Flags
-from translucent.preview.document import AUTO, STAGE_WORDS, Assigned, Document, Material, Orbit, checked
+from translucent.preview.document import (
+    AUTO,
+    SECTIONS,
+    STAGE_WORDS,
+    Assigned,
+    Document,
+    Export,
+    Material,
+    Orbit,
+    Placed,
+    Snapshot,
+    checked,
+)
 
 #: Version of the format, raised by changes that older readers cannot read.
 VERSION = 1
@@ -26,7 +38,10 @@ MAX_RECENT = 8
 #: Keys of older sessions without a meaning now: ``display.scattering`` replaces a switch of the material.
 _FORMER = {"material": ("multiple_scattering",)}
 
-_SECTIONS = ("model", "material", "look", "display", "flags", "orbit")
+_SECTIONS = ("model", "material", "look", "display", "flags", "orbit", "export")
+
+#: Names of the fields in lists.
+_LISTS = {"placed": "placed", "lights": "light"}
 
 
 def to_table(document: Document) -> dict[str, Any]:
@@ -34,12 +49,17 @@ def to_table(document: Document) -> dict[str, Any]:
     table: dict[str, Any] = {"version": VERSION}
     for section in _SECTIONS:
         value = getattr(document, section)
-        if value is not None and value != Flags():
-            table[section] = dataclasses.asdict(value)
+        if value is not None and value not in (Flags(), Export()):
+            table[section] = {k: v for k, v in dataclasses.asdict(value).items() if v is not None}
     if document.assigned:
         table["assigned"] = [dataclasses.asdict(one) for one in document.assigned]
     if document.hidden:
         table["hidden"] = list(document.hidden)
+    for name in _LISTS:
+        if entries := getattr(document, name):
+            table[name] = [dataclasses.asdict(one) for one in entries]
+    if document.snapshots:
+        table["snapshots"] = [{"name": one.name, **to_table(one.document)} for one in document.snapshots]
     return table
 
 
@@ -61,6 +81,10 @@ def from_table(table: dict[str, Any], where: str) -> Document:
             sections[section] = tuple(_assigned(entry, where) for entry in fields)
         elif section == "hidden":
             sections[section] = _hidden(fields, where)
+        elif section in _LISTS:
+            sections[section] = tuple(_listed(section, entry, where) for entry in _tables(section, fields, where))
+        elif section == "snapshots":
+            sections[section] = tuple(_snapshot(entry, where) for entry in _tables(section, fields, where))
         elif section in _SECTIONS and isinstance(fields, dict):
             default = Orbit() if section == "orbit" else getattr(Document(), section)
             sections[section] = dataclasses.replace(default, **_fields(section, default, fields, where))
@@ -75,6 +99,30 @@ def _assigned(entry: Any, where: str) -> Assigned:
     if type(number) is not int or number < 0 or not isinstance(fields, dict) or len(entry) != 2:
         raise InputError(f"{where}, [[assigned]]", "no object and material", "give object = 0, and [assigned.material]")
     return Assigned(number, dataclasses.replace(Material(), **_fields("material", Material(), fields, where)))
+
+
+def _tables(section: str, entries: Any, where: str) -> list[dict[str, Any]]:
+    if not isinstance(entries, list) or not all(isinstance(one, dict) for one in entries):
+        raise InputError(where, f"{section} is no list of tables", f"write [[{section}]]")
+    return entries
+
+
+def _listed(section: str, entry: dict[str, Any], where: str) -> Any:
+    kind = SECTIONS[_LISTS[section]]
+    fields = dict(entry)
+    number = fields.pop("object", 0) if kind is Placed else 0
+    if type(number) is not int or number < 0:
+        raise InputError(f"{where}, [[{section}]]", f"object = {number!r}", "give the number of an object, from 0")
+    found = dataclasses.replace(kind(), **_fields(_LISTS[section], kind(), fields, where))
+    return dataclasses.replace(found, object=number) if isinstance(found, Placed) else found
+
+
+def _snapshot(entry: dict[str, Any], where: str) -> Snapshot:
+    fields = dict(entry)
+    name = fields.pop("name", None)
+    if not isinstance(name, str) or not name or "snapshots" in fields:
+        raise InputError(f"{where}, [[snapshots]]", f"name = {name!r}, or snapshots in it", "give each a name")
+    return Snapshot(name, from_table(fields, f"{where}, snapshot {name}"))
 
 
 def _hidden(numbers: Any, where: str) -> tuple[int, ...]:

@@ -18,11 +18,13 @@ from translucent.media.presets import preset
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import ScatteringLayer
+from translucent.preview.document import lens_of
 from translucent.preview.measuring import ReferencePicture
 from translucent.preview.preparation import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.quality import (
     COARSEST_TRACED,
     FACTORS,
+    LENS_SAMPLES,
     PREPARING,
     SCREEN,
     SMALL,
@@ -39,6 +41,7 @@ from translucent.preview.scenes import method_of, request_of, tone_of
 from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
+from translucent.scene.lens import Lens
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import filled, with_roughness
 
@@ -72,7 +75,8 @@ class ViewportRenderer:
         Why the picture is not what it should be, or nothing.
     shader_problem : str
         The compiler's message, while the last good shaders go on.
-    quality : InteractiveQuality
+    quality, other_quality : InteractiveQuality
+        Of the picture, and of the snapshot right of the split.
     paths : PathRefinement
         Paths of the still picture.
     photons : PhotonRefinement
@@ -116,7 +120,8 @@ class ViewportRenderer:
         self._frame_budget, self._left = FrameBudget(), 0.0
         self.budget, self.preparing = BUDGET, PREPARING
         self._strides = Strides(self._times)
-        self.quality = InteractiveQuality(traced_at_once=compiler is None)
+        self.quality, self.other_quality = (InteractiveQuality(traced_at_once=compiler is None) for _ in range(2))
+        self._lens: Lens | None = None
         self.paths, self.photons = PathRefinement(), PhotonRefinement()
         self._watched, self._newest = time.monotonic(), newest_shader()
 
@@ -132,7 +137,8 @@ class ViewportRenderer:
     @property
     def notes(self) -> list[str]:
         """Lines on what is wrong with the picture, or simpler than requested, and on its refinement."""
-        simpler = self.problem, self.shader_problem, self.simpler, *self.quality.notes
+        others = (f"snapshot: {text}" for text in self.other_quality.notes if text)
+        simpler = self.problem, self.shader_problem, self.simpler, *self.quality.notes, *others
         return [text for text in (*simpler, self.paths.note, self.photons.note) if text]
 
     def draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
@@ -172,19 +178,26 @@ class ViewportRenderer:
         self.viewport.resize(size)
         if scene is None:
             return False
-        material, both = workspace.document.material, display.compare == "method"
-        requested = request_of(workspace.document)
-        second = method_of(display.method_b, material) if both else None
+        document, other = workspace.document, workspace.compared()
+        both = display.compare == "method" or other is not None
+        requested = request_of(document)
+        second = method_of(display.method_b, document.material) if display.compare == "method" else None
+        self._lens = None if document.orbit is None else lens_of(document.look, document.orbit)
         if held is None:
             begun = time.perf_counter()
             self.quality.choose(workspace, scene, requested, self.renderer)
+            if other is not None:
+                self.other_quality.choose(workspace, other, requested, self.renderer)
+            else:
+                self.other_quality.notes = ["", ""]
             spent = time.perf_counter() - begun
-            if self.quality.solved and spent > self.preparing * self._left:
+            if (self.quality.solved or self.other_quality.solved) and spent > self.preparing * self._left:
                 self._held = scene  # the next frame draws this one, or what moves all the time would not be drawn
                 return True
             self._left -= min(spent, self.preparing * self._left)
         request = self.quality.request
-        target = (scene, request, second, self.viewport.size, self.renderer)
+        other_request = replace(request, method=second) if other is None else self.other_quality.request
+        target = (scene, request, other, other_request, self.viewport.size, self.renderer, self._lens)
         if self._compiler is not None and self._compiler.lane.task is not None and target == self._postponed:
             self.idle = True
             return True
@@ -195,8 +208,8 @@ class ViewportRenderer:
             self._begin(workspace, scene)
             self.watch(workspace)
         else:  # or the interactive picture is drawn again
-            plan = partial(self.renderer.plan_requested, scene)
-            self.plans = [plan(request), plan(replace(request, method=second)) if both else None]
+            plan = self.renderer.plan_requested
+            self.plans = [plan(scene, request), plan(other or scene, other_request) if both else None]
             self._rendered = target
             self.viewport.restart()
             self.presenter.truth = None
@@ -218,7 +231,7 @@ class ViewportRenderer:
         more = drawn or alone or workspace.relights
         self.idle = more and not (drawn or alone or lit)
         if display.converges and still and not more:
-            more, drawn = self.paths.step(scene, self.renderer, self.viewport, self._left)
+            more, drawn = self.paths.step(scene, self.renderer, self.viewport, self._left, workspace)
         if lit:
             more, drawn = self._light_by_photons(scene, workspace)
             if self.photons.light is None and not more:  # there are no photons to follow
@@ -258,13 +271,13 @@ class ViewportRenderer:
     def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
         """Draw the next sample of a side, if there is one left to draw."""
         stride, plan = self._strides.of[side], self.plans[side]
-        samples = samples_of(stride, antialias)
+        samples = samples_of(stride, antialias) if self._lens is None else LENS_SAMPLES
         drawn, whole = self.viewport.steps(side), stride * stride
         self.state = "sharpening" if drawn + 1 < whole else f"full picture, {_samples(max(drawn // whole, 1))}"
         if plan is None or drawn >= whole * (1 + samples):
             return False
         self.simpler, begun = "", time.perf_counter()
-        self.viewport.step(side, plan, stride, max(samples, 1))
+        self.viewport.step(side, plan, stride, max(samples, 1), lens=self._lens)
         self._finish(side, plan, stride, begun)
         if self._strides.corrected(side, plan, drawn + 1, self._left):
             self.viewport.restart(side)
@@ -452,7 +465,7 @@ class Presenter:
     def begin(self, workspace: Workspace, scene: Scene, viewport: Viewport, key: tuple[object, ...]) -> bool:
         """Begin a frame that shows samples of a picture with a key; returns whether it is to do nothing else."""
         display, look, truth = workspace.document.display, workspace.document.look, workspace.truth
-        right = {"off": "same", "method": "second", "reference": "second", "error": "difference"}[display.compare]
+        right = {"off": "same", "error": "difference"}.get(display.compare, "second")
         if display.compare in ("reference", "error"):
             straight = display.compare == "error"
             if self.truth is not None and straight and not self.truth.straight:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,8 +17,24 @@ from imgui_bundle import hello_imgui, imgui
 from translucent.errors import InputError, TranslucentError
 from translucent.gltf.load import SUFFIXES
 from translucent.gltf.write import Filling, write_media
+from translucent.media.colors import read_encoded
 from translucent.planning.caustics import Caustics
-from translucent.preview.actions import Assign, ChoosePreset, Hide, SetField, changed_material, preset_material
+from translucent.preview.actions import (
+    Assign,
+    ChoosePreset,
+    Hide,
+    Keep,
+    Place,
+    Recall,
+    SetField,
+    SetLights,
+    SetMaterial,
+    SetOrbit,
+    SetTime,
+    changed_material,
+    preset_material,
+    scattered_material,
+)
 from translucent.preview.dialogs import (
     QUESTIONS,
     Browser,
@@ -26,16 +43,38 @@ from translucent.preview.dialogs import (
     move_pointer,
     open_dialog,
 )
-from translucent.preview.document import Material, Model
+from translucent.preview.document import (
+    AddedLight,
+    Look,
+    Material,
+    Model,
+    Placed,
+    Triple,
+    checked,
+    lens_of,
+    triple_of,
+)
 from translucent.preview.exports import Recipe, command_line, python_code, write_picture, write_turntable
 from translucent.preview.library import ENVIRONMENT_SUFFIXES, EnvironmentFolder, model_key, model_picture
 from translucent.preview.measuring import Crossing, first_object
-from translucent.preview.scenes import material_of, medium_of, request_of, tone_of
+from translucent.preview.scenes import material_of, medium_of, placed_objects, request_of, tone_of
 from translucent.preview.session import put_first, save_session
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
+from translucent.scene.camera import direction_from
 from translucent.scene.scene import Object, Scene
 from translucent.scene.showcase import fillable
+
+#: Yaw and pitch in degrees of views by name.
+VIEWS = {
+    "front": (0.0, 0.0),
+    "back": (180.0, 0.0),
+    "right": (90.0, 0.0),
+    "left": (-90.0, 0.0),
+    "top": (0.0, 89.9),
+    "bottom": (0.0, -89.9),
+    "three quarters": (24.0, 18.0),
+}
 
 #: Largest number of triangles among which a thread finds the one under the mouse; else a worker process does.
 PICKED_AT_ONCE = 200_000
@@ -80,11 +119,15 @@ class WindowState:
         Probed positions, of the mouse and of a script, in fractions of the viewport.
     pointer : (x, y), optional
         Position of the mouse that a script gives, in fractions of the window.
-    selected : int, optional
-        Number of the selected object.
+    selected, light : int, optional
+        Numbers of the selected object, and of the selected light that the user has added.
+    gizmo : str
+        What the gizmo of the selected object does: ``move``, ``rotate``, ``scale``, or nothing.
+    playing : bool
+        The animations of the model run.
     dialogs : list of (kind, dialog)
-    export, baking : dict
-        Options of exported pictures and of maps.
+    baking : dict
+        Options of maps.
     dragged : str
         Name of the preset that is dragged.
     browser : Browser, optional
@@ -109,8 +152,10 @@ class WindowState:
     pointer: tuple[float, float] | None = None
     pinned: tuple[float, float] | None = None
     selected: int | None = None
+    light: int | None = None
+    gizmo: str = ""
+    playing: bool = False
     dialogs: list[tuple[str, Any]] = field(default_factory=list)
-    export: dict[str, Any] = field(default_factory=lambda: {"transparent": False, "pictures": 36})
     baking: dict[str, Any] = field(default_factory=lambda: {"mode": "cone", "size": 512, "rays": 64})
     dragged: str = ""
     browser: Browser | None = None
@@ -118,11 +163,14 @@ class WindowState:
     environments: EnvironmentFolder = field(default_factory=EnvironmentFolder)
     keys_shown: bool = False
     _pictured: str = ""
+    _played: float = 0.0
+    _play_drag: int = 0
     _textures: dict[str, tuple[Any, Any]] = field(default_factory=dict)
 
     def draw(self, pixels: tuple[int, int]) -> bool:
         """Draw a step, and start measurements of a still view; returns whether more steps are to come."""
         self.work.size = pixels
+        self._play()
         self.work.update()
         more = self.view.draw(self.work, pixels)
         self.drawn, self.idle = not more, self.view.idle or not more
@@ -133,6 +181,30 @@ class WindowState:
         if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:
             self._keep_picture()
         return self.work.compare(self.view.viewport.size) or more or bool(self.work.busy)
+
+    @property
+    def duration(self) -> float | None:
+        """Seconds of the model's animations, if it has any."""
+        return None if self.work.loaded is None else getattr(self.work.loaded.scene, "duration", None)
+
+    def play(self) -> None:
+        """Run the animations, as one step of undo, or stop them."""
+        self.playing = not self.playing and self.duration is not None
+        self._played = time.monotonic()
+        self.drag += 1
+        self._play_drag = self.drag
+
+    def _play(self) -> None:
+        """Go on to the time that it is, once the last one is on show."""
+        now, work = time.monotonic(), self.work
+        if not self.playing or work.loaded is None or work.loaded.model != work.document.model:
+            return
+        passed, self._played = now - self._played, now
+        if (duration := self.duration) is None:
+            self.playing = False
+        else:
+            moment = ((work.document.model.time or 0.0) + passed) % max(duration, 1e-6)
+            work.do(SetTime(moment, self._play_drag))
 
     def _keep_picture(self) -> None:
         """Keep a small picture of a model's first resting view, for the list of recent files."""
@@ -175,8 +247,9 @@ class WindowState:
 
     @property
     def objects(self) -> Sequence[Object]:
-        """Objects of the model."""
-        return () if self.work.loaded is None else self.work.loaded.scene.objects
+        """Objects of the model, in their places."""
+        loaded = self.work.loaded
+        return () if loaded is None else placed_objects(loaded.scene, self.work.document.placed)
 
     @property
     def target(self) -> int | None:
@@ -185,7 +258,85 @@ class WindowState:
 
     def select(self, number: int | None) -> None:
         """Select an object, or none."""
-        self.selected = number
+        self.selected, self.light = number, None
+
+    @property
+    def moved(self) -> int | None:
+        """Number of the object that can be moved: the selected one, or the only one."""
+        return 0 if len(self.objects) == 1 else self.target
+
+    def place(self, place: Placed, drag: int | None = None) -> None:
+        """Put an object into a place."""
+        self.work.do(Place(place, drag))
+
+    def change_place(self, name: str, value: Any, *, step: bool = False) -> None:
+        """Give a field of the place of the moved object, such as ``location``, a value."""
+        if (number := self.moved) is None:
+            return self.work.refuse(InputError(f"placed.{name}", "no object is selected", "click one first"))
+        try:
+            value = checked(f"placed.{name}", value, getattr(Placed(), name))
+        except InputError as error:
+            return self.work.refuse(error)
+        before = self.work.document.place_of(number)
+        return self.place(replace(before, **{name: value}), None if step else self.drag)
+
+    def drop_to_ground(self) -> None:
+        """Move the object down, or up, until it stands where the model as loaded does."""
+        loaded, number = self.work.loaded, self.moved
+        if loaded is not None and number is not None:
+            place = self.work.document.place_of(number)
+            x, y, z = place.location
+            lift = float(loaded.scene.shown_bounds[0, 1] - self.objects[number].bounds[0, 1])
+            self.place(replace(place, location=(x, y + lift, z)))
+
+    def add_light(self) -> None:
+        """Add a light above and before the model, as bright there as the directional light, and select it."""
+        if (loaded := self.work.loaded) is None:
+            return
+        low, high = loaded.scene.shown_bounds
+        middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low)) or 1.0
+        yaw = 0.0 if self.work.document.orbit is None else self.work.document.orbit.yaw
+        position = middle + 1.5 * size * direction_from(yaw + 30.0, 45.0)
+        added = AddedLight(triple_of(position), 0.1 * size, Look().light_irradiance * (1.5 * size) ** 2)
+        self.work.do(SetLights((*self.work.document.lights, added)))
+        self.light = len(self.work.document.lights) - 1
+
+    def remove_light(self, number: int) -> None:
+        """Remove a light."""
+        lights = self.work.document.lights
+        self.light = None
+        self.work.do(SetLights((*lights[:number], *lights[number + 1 :])))
+
+    def change_light(self, name: str, value: Any, *, step: bool = False) -> None:
+        """Give a field of the selected light a value."""
+        lights = list(self.work.document.lights)
+        if self.light is None or self.light >= len(lights):
+            return self.work.refuse(InputError(f"light.{name}", "no light is selected", "add or choose one first"))
+        try:
+            value = checked(f"light.{name}", value, getattr(AddedLight(), name))
+        except InputError as error:
+            return self.work.refuse(error)
+        lights[self.light] = replace(lights[self.light], **{name: value})
+        return self.work.do(SetLights(tuple(lights), None if step else self.drag))
+
+    def snapshot(self, name: str, *, keep: bool) -> None:
+        """Keep what is on show as a snapshot, or show one again."""
+        self.work.do(Keep(name) if keep else Recall(name))
+
+    def compare_with(self, name: str) -> None:
+        """Show a snapshot right of the split, beside the present state."""
+        self.change("display.snapshot", name, step=True)
+        self.change("display.compare", "snapshot", step=True)
+
+    def view_from(self, name: str) -> None:
+        """See the model from a side of `VIEWS`."""
+        if name not in VIEWS:
+            return self.work.refuse(InputError(f"view {name!r}", "there is none", f"use {', '.join(VIEWS)}"))
+        if (orbit := self.work.document.orbit) is not None:
+            yaw, pitch = VIEWS[name]
+            self.work.do(SetOrbit(replace(orbit, yaw=yaw, pitch=pitch)))
+            self.work.frame(self.selected)
+        return None
 
     def name_of(self, number: int) -> str:
         """Name of an object."""
@@ -260,6 +411,37 @@ class WindowState:
             self.work.lanes["ray"].start("", lambda _: first_object(scene, size, pixel), take)
         else:
             self.work.cross(scene, size, pixel, lambda found: take(found.body))
+
+    def use_texture(self, slot: str, path: str) -> None:
+        """Put a picture, or none, into a slot of the material: ``color_texture`` or ``roughness_texture``."""
+        if path and any(item.mesh.uv is None for item in self._textured()):
+            found = "the mesh has no texture coordinates"
+            return self.work.refuse(InputError(f"texture {path!r}", found, "unwrap it in a modeler first"))
+        if path:
+            try:
+                read_encoded(path, f"texture {path!r}")
+            except TranslucentError as error:
+                return self.work.refuse(error)
+        return self.change(f"material.{slot}", path, step=True)
+
+    def _textured(self) -> Sequence[Object]:
+        """Objects with the material of the panels."""
+        if self.work.loaded is None:
+            return ()
+        return fillable(self.work.loaded.scene) if self.target is None else (self.objects[self.target],)
+
+    def scatter(self, color: Triple | None = None, radius: float | None = None) -> None:
+        """Give the material another diffuse color, or another radius of its scattered light in metres."""
+
+        def change(material: Material) -> Material:
+            return scattered_material(material, color, radius)
+
+        if self.target is not None:
+            return self._assign(self.target, change, self.drag)
+        try:
+            return self.work.do(SetMaterial(change(self.material), self.drag))
+        except TranslucentError as error:
+            return self.work.refuse(error)
 
     def hide(self, number: int) -> None:
         """Hide an object, or show it again; the last one on show stays."""
@@ -369,6 +551,8 @@ class WindowState:
             case "map":
                 if (bake := work.bake) is not None:
                     work.write(path, lambda _: bake.map.save(path))
+            case "color texture" | "roughness texture":
+                self.use_texture(kind.replace(" ", "_"), path)
             case "png" | "exr" | "turntable":
                 self._export(kind, path)
             case _:
@@ -390,13 +574,16 @@ class WindowState:
         scene, document = self.work.picture(), self.work.document
         if scene is None:
             return
+        assert document.orbit is not None
+        options, request = document.export, request_of(document, self._caustics(scene))
         look = document.look.exposure, tone_of(document.look, scene)
-        view, request = (scene, self.view.viewport.size, look), request_of(document, self._caustics(scene))
+        view = scene, options.size(self.view.viewport.size), look
         if kind == "turntable":
-            self.work.export(path, write_turntable, *view, request, self.export["pictures"])
+            self.work.export(path, write_turntable, *view, request, round(options.pictures))
         else:
-            request = replace(request, transparent=bool(self.export["transparent"]))
-            self.work.export(path, write_picture, *view, request)
+            request = replace(request, transparent=options.transparent, denoise=options.denoise)
+            lens = lens_of(document.look, document.orbit)
+            self.work.export(path, write_picture, *view, request, round(options.samples), lens)
 
     def copy_recipe(self, kind: str) -> str | None:
         """Copy a ``command``, or ``python``, that makes the picture from here; None before there is one."""

@@ -39,6 +39,7 @@ from translucent.preview.scenes import (
     medium_of,
     method_of,
     own_material,
+    placed_objects,
     prepare,
     rescaled,
     scene_of,
@@ -61,7 +62,20 @@ KEPT_MODELS = 2
 STILL = 0.25
 
 #: Names of background threads; each does one thing at a time.
-LANES = ("load", "draw", "diffuse", "trace", "truth", "bake", "ray", "light", "write", "thumbnails")
+LANES = (
+    "load",
+    "draw",
+    "diffuse",
+    "trace",
+    "truth",
+    "bake",
+    "ray",
+    "light",
+    "write",
+    "thumbnails",
+    "compared light",
+    "denoise",
+)
 
 #: Seconds for which a closed window waits for work, so that files are complete and no processes are left behind.
 PATIENCE = {"write": 60.0, "bake": 12.0}
@@ -127,8 +141,10 @@ class Workspace:
         self.thumbnails = ThumbnailCache(self.lanes["thumbnails"], partial(self.pool.call, urgency=Urgency.LATER))
         self.library = Library(self.refuse)
         self._lighting = Lighting(self.lanes["light"])
+        self._other_lighting = Lighting(self.lanes["compared light"], begun=True)
         self._models: list[Loaded] = []
         self._scene: tuple[Document, Loaded, Scene] | None = None
+        self._other: tuple[Document, Loaded, Scene] | None = None
         self._view: object = None
         self._still_since, self._compared = 0.0, False
         self._want(self.document.model)
@@ -190,7 +206,7 @@ class Workspace:
     def frame(self, number: int | None = None) -> None:
         """Frame the whole model, or one of its objects, from the side of the camera."""
         if self.loaded is not None:
-            objects = self.loaded.scene.objects
+            objects = placed_objects(self.loaded.scene, self.document.placed)
             visible = [objects[i] for i in self.document.shown_among(len(objects))]
             chosen = [objects[number]] if number is not None and number < len(objects) else visible
             self.do(SetOrbit(framed(self.document.orbit, chosen, self.size)))
@@ -220,6 +236,17 @@ class Workspace:
         assert self.loaded is not None
         document = self._lighting.lit(self.document, self.loaded)
         return scene_of(dataclasses.replace(document, display=Display()), self.loaded)
+
+    def compared(self) -> Scene | None:
+        """Scene of the snapshot that is compared with, from this camera; None if there is none."""
+        document, loaded = self.document, self.loaded
+        kept = document.snapshot(document.display.snapshot)
+        if document.display.compare != "snapshot" or kept is None or loaded is None or document.orbit is None:
+            return None
+        seen = self._other_lighting.lit(document.seen_as(kept.document), loaded)
+        if self._other is None or self._other[1] is not loaded or not _shows_alike(self._other[0], seen):
+            self._other = seen, loaded, scene_of(seen, loaded)
+        return self._other[2]
 
     @property
     def shown_bake(self) -> Bake | None:
@@ -387,7 +414,7 @@ class Workspace:
             if loaded.model == model:
                 self._keep(loaded)
                 return self._complete()
-        if (last := self.loaded) is not None and last.model.path == model.path:
+        if (last := self.loaded) is not None and last.model == dataclasses.replace(model, unit=last.model.unit):
             factor = metres_per_unit(model.unit) / metres_per_unit(last.model.unit)
             self._keep(rescaled(last, model))
             self.measured = self.measured and self.measured.scaled(factor)
@@ -404,10 +431,12 @@ class Workspace:
             return load_with(task, self.pool, model, self.allow_outside, pictured=self.loaded is not None)
 
         def take(loaded: Loaded) -> None:
+            known = self.loaded is not None and self.loaded.model.path == model.path
             self._keep(loaded)
-            for note in filter(None, dict.fromkeys(size_note(item.mesh, way="field") for item in loaded.scene.objects)):
+            notes = dict.fromkeys(size_note(item.mesh, way="field") for item in loaded.scene.objects)
+            for note in filter(None, () if known else notes):
                 self.tell("info", f"{Path(model.path).name}: {note}")
-            for remark in getattr(loaded.scene, "remarks", ()):
+            for remark in () if known else getattr(loaded.scene, "remarks", ()):
                 self.tell("info", remark)
             self._set(self.history if action is None else self.history.done(action))
             if action is not None and os.path.exists(model.path):
@@ -439,6 +468,8 @@ class Workspace:
 
 def _shows_alike(first: Document, second: Document) -> bool:
     """True if two documents show the same scene, except for exposure and tone curve."""
-    developed = dataclasses.replace(first.look, exposure=second.look.exposure, tone=second.look.tone)
-    same = all(getattr(first, name) == getattr(second, name) for name in ("material", "assigned", "hidden", "orbit"))
+    names = ("exposure", "tone", "depth_of_field", "aperture", "focus")
+    developed = dataclasses.replace(first.look, **{name: getattr(second.look, name) for name in names})
+    others = ("material", "assigned", "hidden", "orbit", "placed", "lights")
+    same = all(getattr(first, name) == getattr(second, name) for name in others)
     return same and developed == second.look and first.display.pictured == second.display.pictured

@@ -32,14 +32,14 @@ class Window:
 
     Attributes
     ----------
-    left, top : int
-        Of its first pixel, from that of the whole picture.
+    left, top : float
+        Of its first pixel, from that of the whole picture; fractions shift it by less than a pixel.
     whole : (int, int)
         Width and height of the whole picture.
     """
 
-    left: int
-    top: int
+    left: float
+    top: float
     whole: tuple[int, int]
 
 
@@ -192,7 +192,7 @@ class Camera(Frozen):
         width, height = window.whole
         return (2 * window.left + size[0] - width) / size[0], (height - 2 * window.top - size[1]) / size[1]
 
-    def beyond(self, size: tuple[int, int]) -> tuple[int, int, int, int]:
+    def beyond(self, size: tuple[int, int]) -> tuple[float, float, int, int]:
         """Pixels of the whole picture to the left of and above the view, and how many more it has across and down."""
         if (window := self.window) is None:
             return 0, 0, 0, 0

@@ -26,9 +26,14 @@ POPUP = "##browser"
 def files_panel(state: WindowState) -> None:
     """Draw the files panel: pictures and turntables, the session, export of the medium, and baking."""
     imgui.separator_text("Picture of this view")
-    changed, value = imgui.checkbox("transparent background", state.export["transparent"])
-    if changed:
-        state.export["transparent"] = value
+    if ui.begin_rows("export"):
+        ui.whole(state, "width", "export.width", "as the viewport")
+        ui.whole(state, "height", "export.height", "as the viewport")
+        ui.whole(state, "samples", "export.samples")
+        ui.check(state, "transparent", "export.transparent")
+        ui.check(state, "denoise", "export.denoise")
+        ui.whole(state, "turntable of", "export.pictures")
+        imgui.end_table()
     for label, kind in (("PNG ...", "png"), ("EXR ...", "exr")):
         if imgui.button(label):
             state.ask_file(kind)

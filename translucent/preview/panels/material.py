@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,17 @@ from translucent.media.conversion import summary
 from translucent.media.medium import color_at
 from translucent.media.preset import Preset
 from translucent.media.presets import grouped, presets
-from translucent.preview.actions import Assign, Hide, SetField
-from translucent.preview.document import SHOWN_UNITS, TIPS, Material, Triple, length_text, triple_of, triple_text
+from translucent.preview.actions import Assign, Hide, SetField, scattering_of
+from translucent.preview.document import (
+    SHOWN_UNITS,
+    TIPS,
+    Material,
+    Placed,
+    Triple,
+    length_text,
+    triple_of,
+    triple_text,
+)
 from translucent.preview.library import ball_key, draw_ball
 from translucent.preview.measuring import ThicknessStatistics
 from translucent.preview.panels import widgets as ui
@@ -37,6 +47,16 @@ CARD = 5.0
 #: Colors of curves: red, green and blue that are easily distinguished on a dark background; and of bars.
 CURVES = ((0.95, 0.36, 0.33, 1.0), (0.38, 0.80, 0.42, 1.0), (0.36, 0.58, 1.0, 1.0))
 BARS = (0.55, 0.58, 0.65, 0.35)
+
+SCATTER_TIP = (
+    "Diffuse color of the medium where it is thick (--scattering-color of translucent render): what is absorbed "
+    "follows from it. Typical: wax #f2e0b8, milk #fdfbf5."
+)
+
+RADIUS_TIP = (
+    "Mean free path: length after which light in the medium is scattered or absorbed, on average (--mean-free-path). "
+    "Larger ones let more light through, smaller ones look like plaster. Typical: skin 0.3 mm, wax 2 mm, jade 4 mm."
+)
 
 SAVE_TIP = "Saves the medium, ior and roughness as a .toml file to be shared: others put it into this folder of theirs."
 
@@ -64,6 +84,8 @@ def material_panel(state: WindowState) -> None:
         ui.slider(state, "roughness", "material.roughness", 0.0, 1.0)
         ui.slider(state, "transmission", "material.transmission", 0.0, 1.0)
         ui.slider(state, "dispersion", "material.dispersion", 0.0, 10.0)
+        for slot in ("color_texture", "roughness_texture"):
+            _texture(state, slot)
         imgui.end_table()
     imgui.separator_text("Thin film and clear coat")
     if ui.begin_rows("film"):
@@ -73,13 +95,16 @@ def material_panel(state: WindowState) -> None:
         ui.slider(state, "clearcoat", "material.clearcoat", 0.0, 1.0)
         ui.slider(state, "coat roughness", "material.clearcoat_roughness", 0.0, 1.0)
         imgui.end_table()
-    imgui.separator_text("Scattering and emission")
-    ui.triple(state, "absorption, 1/m", "material.absorption", 0.5)
-    ui.triple(state, "scattering, 1/m", "material.scattering", 0.5)
-    ui.triple(state, "emission, radiance per m", "material.emission", 0.05)
-    if ui.begin_rows("scattering"):
-        ui.slider(state, "anisotropy g", "material.anisotropy", -0.99, 0.99)
-        imgui.end_table()
+    imgui.separator_text("Scattering")
+    _scattering(state, material)
+    if imgui.tree_node("advanced: coefficients"):
+        ui.triple(state, "absorption, 1/m", "material.absorption", 0.5)
+        ui.triple(state, "scattering, 1/m", "material.scattering", 0.5)
+        ui.triple(state, "emission, radiance per m", "material.emission", 0.05)
+        if ui.begin_rows("anisotropy"):
+            ui.slider(state, "anisotropy g", "material.anisotropy", -0.99, 0.99)
+            imgui.end_table()
+        imgui.tree_pop()
     imgui.separator_text("Numbers")
     if ui.begin_rows("numbers"):
         for label, text in extinction_lines(material):
@@ -89,6 +114,48 @@ def material_panel(state: WindowState) -> None:
         ui.wrapped(text, ui.WARNING)
     imgui.separator_text("Copy")
     _copies(state, material)
+
+
+def _texture(state: WindowState, slot: str) -> None:
+    """Draw a slot for a picture of the surface."""
+    label, path = slot.replace("_", " "), str(state.get(f"material.{slot}"))
+    ui.row(label, TIPS[f"material.{slot}"])
+    if imgui.button(f"{Path(path).name or 'choose ...'}##{slot}"):
+        state.ask_file(label)
+    ui.tooltip(path)
+    if path:
+        imgui.same_line()
+        if imgui.small_button(f"none##{slot}"):
+            state.use_texture(slot, "")
+
+
+def _scattering(state: WindowState, material: Material) -> None:
+    """Draw the color of a medium where it is thick, and the radius over which it spreads light."""
+    known = scattering_of(material)
+    if known is None:
+        if imgui.button("Make it scatter"):
+            state.drag += 1
+            state.scatter()
+        return ui.tooltip(SCATTER_TIP)
+    color, radius = known
+    scale, unit = metres_per_unit(state.get("display.unit")), state.get("display.unit")
+    if not ui.begin_rows("scatter"):
+        return None
+    ui.row("scatter color", SCATTER_TIP)
+    flags = imgui.ColorEditFlags_.display_hex | imgui.ColorEditFlags_.picker_hue_wheel
+    changed, encoded = imgui.color_edit3("##scatter color", list(to_display(color)), flags)
+    ui.begin_drag(state)
+    if changed:
+        state.scatter(color=from_display(np.asarray(list(encoded)[:3])))
+    ui.row("scatter radius", RADIUS_TIP)
+    logarithmic = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
+    ends = 1e-6 / scale, 1.0 / scale
+    changed, value = imgui.slider_float("##scatter radius", radius / scale, *ends, f"%.4g {unit}", logarithmic)
+    ui.begin_drag(state)
+    if changed and value > 0:
+        state.scatter(radius=value * scale)
+    imgui.end_table()
+    return None
 
 
 def _source(state: WindowState, material: Material) -> None:
@@ -345,6 +412,7 @@ def scene_panel(state: WindowState) -> None:
         state.isolate(state.target)
     imgui.end_disabled()
     ui.tooltip("The selected object alone; once more: all (I).")
+    _place(state)
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y
     if not imgui.begin_table("objects", 3, flags):
         return
@@ -359,6 +427,33 @@ def scene_panel(state: WindowState) -> None:
             _row(state, number)
             imgui.pop_id()
     imgui.end_table()
+
+
+def _place(state: WindowState) -> None:
+    """Draw the place of the selected object, or of the only one, and the choice of its gizmo."""
+    if (number := state.moved) is None:
+        return ui.wrapped("Select an object to move, rotate or scale it.", ui.FAINT)
+    place = state.work.document.place_of(number)
+    for word, key in (("move", "W"), ("rotate", "R"), ("scale", "S")):
+        if imgui.radio_button(f"{word} ({key})", state.gizmo == word):
+            state.gizmo = "" if state.gizmo == word else word
+        imgui.same_line()
+    imgui.new_line()
+    far = 1.0 if state.work.document.orbit is None else state.work.document.orbit.distance
+    if ui.begin_rows("place"):
+        ui.vector(state, "moved by, m", "placed.location", place.location, 2e-3 * far, state.change_place)
+        ui.vector(state, "rotated, deg", "placed.rotation", place.rotation, 0.5, state.change_place)
+        ui.vector(state, "scaled by", "placed.scale", place.scale, 0.005, state.change_place)
+        imgui.end_table()
+    if imgui.button("On the ground"):
+        state.drop_to_ground()
+    ui.tooltip("Moves it until it stands where the model stood.")
+    imgui.same_line()
+    imgui.begin_disabled(place == Placed(number))
+    if imgui.button("Back in its place"):
+        state.place(Placed(number))
+    imgui.end_disabled()
+    return None
 
 
 def _row(state: WindowState, number: int) -> None:

@@ -10,7 +10,7 @@ from imgui_bundle import ImVec2, hello_imgui, imgui
 from translucent.assets import mesh_names, scene_names
 from translucent.errors import shortened
 from translucent.preview.actions import Hide, Resize
-from translucent.preview.document import Model
+from translucent.preview.document import SNAPSHOTS, Model
 from translucent.preview.library import model_key
 from translucent.preview.panels import widgets as ui
 from translucent.preview.window_state import WindowState
@@ -28,6 +28,10 @@ KEYS = (
     ("H, Alt H", "hide the selected object; show all"),
     ("I", "isolate the selected object; all again"),
     ("O", "orthographic or perspective"),
+    ("keypad 1, 3, 7", "view from the front, the right, the top; with Ctrl from behind them"),
+    ("W, R, S", "gizmo that moves, rotates, scales the selected object"),
+    ("1 to 9, Shift 1 to 9", "show a snapshot; keep one"),
+    ("Space", "play the animations, or stop them"),
     ("C", "converge: path trace the still picture"),
     ("P", "photons: caustics in the still picture"),
     ("L drag", "move the light"),
@@ -116,6 +120,26 @@ def status(state: WindowState) -> None:
             task.cancel()
 
 
+def _handle_tools(state: WindowState) -> None:
+    """Act on keys of gizmos, views, snapshots and animations."""
+    io, key = imgui.get_io(), imgui.Key
+    for word, each in (("move", key.w), ("rotate", key.r), ("scale", key.s)):
+        if imgui.is_key_pressed(each, False) and not io.key_ctrl:
+            state.gizmo = "" if state.gizmo == word else word
+    for each, view, opposite in (
+        (key.keypad1, "front", "back"),
+        (key.keypad3, "right", "left"),
+        (key.keypad7, "top", "bottom"),
+    ):
+        if imgui.is_key_pressed(each, False):
+            state.view_from(opposite if io.key_ctrl else view)
+    for name in SNAPSHOTS:
+        if imgui.is_key_pressed(getattr(key, f"_{name}"), False):
+            state.snapshot(name, keep=io.key_shift)
+    if imgui.is_key_pressed(key.space, False):
+        state.play()
+
+
 def keys_page(state: WindowState) -> None:
     """Draw the page of keys, if it is open."""
     if not state.keys_shown:
@@ -173,6 +197,7 @@ def handle_keys(state: WindowState) -> None:
         state.hide(state.target)
     if pressed(key.i) and state.target is not None:
         state.isolate(state.target)
+    _handle_tools(state)
     if pressed(key.c) and not io.key_ctrl:
         switch("display.converge")
     if pressed(key.p):

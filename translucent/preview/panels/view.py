@@ -6,18 +6,31 @@ import dataclasses
 from functools import partial
 from typing import get_args
 
+import numpy as np
 from imgui_bundle import imgui
 
 from translucent.errors import InputError
+from translucent.formulas.color import linear_to_srgb, srgb_to_linear
 from translucent.formulas.tone import TONES
 from translucent.planning.flags import Flags
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import SCATTERINGS
-from translucent.preview.actions import SetField, SetOrbit
-from translucent.preview.document import AUTO, METHOD_NAMES, STAGE_WORDS, TIPS, Compare, Mode, length_text
+from translucent.preview.actions import Keep, Recall, SetField, SetOrbit, SetTime, Stand
+from translucent.preview.document import (
+    AUTO,
+    METHOD_NAMES,
+    SNAPSHOTS,
+    STAGE_WORDS,
+    TIPS,
+    Compare,
+    Mode,
+    length_text,
+    triple_of,
+)
 from translucent.preview.library import BUILT_IN, draw_panorama, panorama_key, title
 from translucent.preview.measuring import MOST_TRIANGLES, measurable
 from translucent.preview.panels import widgets as ui
+from translucent.preview.panels.gizmos import view_buttons
 from translucent.preview.quality import StepTiming
 from translucent.preview.window_state import WindowState
 from translucent.units import parse_length, short_length
@@ -37,6 +50,11 @@ def look_panel(state: WindowState) -> None:
     imgui.separator_text("Size")
     if ui.begin_rows("size"):
         _height(state)
+        ui.row("upwards", TIPS["model.up"])
+        up = state.get("model.up")
+        ui.combo(
+            "up", f"{up.upper()} axis", [("Y axis", "y"), ("Z axis", "z")], up, lambda one: state.work.do(Stand(one))
+        )
         ui.check(state, "ruler on the ground", "display.ruler")
         imgui.end_table()
     imgui.separator_text("Camera")
@@ -50,6 +68,15 @@ def look_panel(state: WindowState) -> None:
     imgui.same_line()
     if imgui.button("Reset") and orbit is not None:
         state.work.do(SetOrbit(None))
+    view_buttons(state)
+    if ui.begin_rows("lens"):
+        ui.check(state, "depth of field", "look.depth_of_field")
+        if state.get("look.depth_of_field"):
+            far = 1.0 if orbit is None else orbit.distance
+            ui.slider(state, "lens", "look.aperture", 1e-3 * far, 0.5 * far, "%.4f m", log=True)
+            ui.slider(state, "in focus", "look.focus", -0.5 * far, 0.5 * far, "%.4f m")
+        imgui.end_table()
+    _animation(state)
     imgui.separator_text("Stage and environment")
     if ui.begin_rows("environment"):
         ui.choice(state, "stage", "look.stage", STAGE_WORDS)
@@ -57,7 +84,7 @@ def look_panel(state: WindowState) -> None:
         _environment(state, "background", "background", "the same")
         ui.slider(state, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg")
         imgui.end_table()
-    imgui.separator_text("Light")
+    imgui.separator_text("Lights")
     if ui.begin_rows("light"):
         ui.check(state, "directional light", "look.light")
         if state.get("look.light"):
@@ -65,11 +92,64 @@ def look_panel(state: WindowState) -> None:
             ui.slider(state, "from above", "look.light_pitch", -89.0, 89.0, "%.0f deg")
             ui.slider(state, "irradiance", "look.light_irradiance", 0.0, 50.0, "%.2f W/m2")
         imgui.end_table()
+    _lights(state)
     imgui.separator_text("Picture")
     if ui.begin_rows("picture"):
         ui.slider(state, "exposure", "look.exposure", -6.0, 6.0, "%.2f stops")
         ui.choice(state, "tone curve", "look.tone", (AUTO, *TONES))
         imgui.end_table()
+
+
+def _animation(state: WindowState) -> None:
+    """Draw the timeline of the model's animations, if it has any."""
+    if (duration := state.duration) is None:
+        return
+    imgui.separator_text("Animation")
+    if imgui.button("Stop" if state.playing else "Play"):
+        state.play()
+    imgui.same_line()
+    if imgui.button("As written"):
+        state.playing = False
+        state.work.do(SetTime(None))
+    ui.tooltip("Nodes, skins and morph targets as the file has them, as translucent render without --time.")
+    imgui.set_next_item_width(-1.0)
+    now = state.get("model.time")
+    form = "as written" if now is None else f"%.3f of {duration:.3g} s"
+    changed, value = imgui.slider_float("##time", now or 0.0, 0.0, duration, form, imgui.SliderFlags_.always_clamp)
+    ui.tooltip(TIPS["model.time"])
+    ui.begin_drag(state)
+    if changed:
+        state.playing = False
+        state.work.do(SetTime(value, state.drag))
+
+
+def _lights(state: WindowState) -> None:
+    """Draw the lights that the user has added, and the fields of the selected one."""
+    lights = state.work.document.lights
+    for number in range(len(lights)):
+        if imgui.selectable(f"light {number + 1}", state.light == number)[0]:
+            state.light = None if state.light == number else number
+    if imgui.button("Add a light"):
+        state.add_light()
+    if state.light is None or state.light >= len(lights):
+        return None
+    imgui.same_line()
+    if imgui.button("Remove"):
+        return state.remove_light(state.light)
+    light = lights[state.light]
+    far = 1.0 if state.work.document.orbit is None else state.work.document.orbit.distance
+    if ui.begin_rows("added"):
+        ui.vector(state, "position, m", "light.position", light.position, 2e-3 * far, state.change_light)
+        ui.number(state, "radius", "light.radius", light.radius, (0.0, far), "%.4f m", state.change_light)
+        most = 100.0 * far**2
+        ui.number(state, "intensity", "light.intensity", light.intensity, (0.0, most), "%.4g W/sr", state.change_light)
+        ui.row("color", TIPS["light.color"])
+        changed, color = imgui.color_edit3("##light color", np.clip(linear_to_srgb(light.color), 0.0, 1.0).tolist())
+        ui.begin_drag(state)
+        if changed:
+            state.change_light("color", triple_of(srgb_to_linear(np.asarray(list(color)[:3]))))
+        imgui.end_table()
+    return None
 
 
 def _height(state: WindowState) -> None:
@@ -145,15 +225,20 @@ def method_panel(state: WindowState) -> None:
         ui.choice(state, "compare with", "display.compare", get_args(Compare))
         if display.compare == "method":
             ui.choice(state, "other method", "display.method_b", METHOD_NAMES)
+        if display.compare == "snapshot":
+            names = tuple(one.name for one in state.work.document.snapshots)
+            ui.choice(state, "snapshot", "display.snapshot", names)
         if display.compare != "off":
             ui.slider(state, "split", "display.split", 0.0, 1.0, "%.2f")
         ui.check(state, "reference inset", "display.inset")
         ui.check(state, "smooth edges", "display.antialias")
         ui.check(state, "caustics (P)", "display.caustics")
         ui.check(state, "converge (C)", "display.converge")
+        ui.check(state, "denoise it", "display.denoise")
         for flag in dataclasses.fields(Flags):
             ui.check(state, flag.name.replace("_", " "), f"flags.{flag.name}")
         imgui.end_table()
+    _snapshots(state)
     for side, (plan, timing) in enumerate(zip(state.view.plans, state.view.timings, strict=True)):
         if plan is not None:
             imgui.separator_text("Plan" if side == 0 else "Plan of the other method")
@@ -162,6 +247,22 @@ def method_panel(state: WindowState) -> None:
     _errors(state)
     imgui.separator_text("Validity")
     _validity(state)
+
+
+def _snapshots(state: WindowState) -> None:
+    """Draw the kept states: a click shows one, and another one compares with it."""
+    imgui.separator_text("Snapshots")
+    document = state.work.document
+    if imgui.button("Keep"):
+        state.work.do(Keep(next(name for name in SNAPSHOTS if document.snapshot(name) is None)))
+    ui.tooltip("Materials, lights, places and look, to go back to. Shift 1 to 9 keeps one; 1 to 9 shows it.")
+    for one in document.snapshots:
+        imgui.same_line()
+        if imgui.button(f"{one.name}##snapshot"):
+            state.work.do(Recall(one.name))
+        ui.tooltip("Show it. Right click: compare with it.")
+        if imgui.is_item_clicked(1):
+            state.compare_with(one.name)
 
 
 def _plan(plan: RenderPlan, timing: StepTiming) -> None:

@@ -13,6 +13,7 @@ from translucent.arrays import Array
 from translucent.frames.aovs import false_colors, marks
 from translucent.preview.actions import OrbitBy, Pan, Zoom
 from translucent.preview.document import camera_of, length_text, triple_text
+from translucent.preview.panels.gizmos import gizmos
 from translucent.preview.panels.widgets import accepts_preset, begin_drag, em, packed
 from translucent.preview.viewport_renderer import thickest, worst
 from translucent.preview.window_state import ProbedPixel, WindowState, pixel_at
@@ -57,16 +58,23 @@ def viewport_panel(state: WindowState) -> None:
         texture = state.view.viewport.texture
         imgui.image(imgui.ImTextureRef(texture.glo), room, ImVec2(0, 1), ImVec2(1, 0))
         imgui.set_cursor_screen_pos(corner)
+    taken = gizmos(state, corner, room)
     buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
-    imgui.invisible_button("##viewport", room, buttons | imgui.ButtonFlags_.mouse_button_middle)
+    if taken:
+        imgui.dummy(room)  # a gizmo takes no click on an item
+    else:
+        imgui.invisible_button("##viewport", room, buttons | imgui.ButtonFlags_.mouse_button_middle)
     mouse = imgui.get_io().mouse_pos
     position = (mouse.x - corner.x) / room.x, (mouse.y - corner.y) / room.y
     if accepts_preset():
         state.drop_preset(state.dragged, position)
-    _mouse(state, position, room)
+    state.hovered = None
+    if not taken:
+        _mouse(state, position, room)
     over = imgui.get_window_draw_list()
     over.push_clip_rect(corner, ImVec2(corner.x + room.x, corner.y + room.y), True)
     _selected(state, over, corner, room)
+    _lights(state, over, corner, room)
     _split(state, over, corner, room)
     _scale(state, over, corner, room)
     _ruler(state, over, corner, room)
@@ -130,6 +138,23 @@ def _selected(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: 
     _label(over, ImVec2(corner.x + low[0], corner.y + low[1] - em(1.4)), state.name_of(state.target))
 
 
+def _lights(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    """Draw the places of the lights that the user has added, with the sizes of their spheres."""
+    orbit = state.work.document.orbit
+    if orbit is None:
+        return
+    camera = camera_of(orbit)
+    for number, light in enumerate(state.work.document.lights):
+        points = np.array([light.position, np.asarray(light.position) + max(light.radius, 1e-9) * camera.up])
+        if (places := places_on_screen(camera, points, (room.x, room.y))) is None:
+            continue
+        at = ImVec2(corner.x + places[0, 0], corner.y + places[0, 1])
+        radius = max(float(np.hypot(*(places[1] - places[0]))), em(0.3))
+        for color, wide in ((BLACK, 0.25), (WHITE, 0.1)):
+            over.add_circle(at, radius, color, 0, em(wide))
+        _label(over, ImVec2(at.x + radius + em(0.4), at.y - em(0.5)), f"light {number + 1}")
+
+
 def on_screen(camera: Camera, bounds: Array, size: tuple[float, float]) -> Array | None:
     """Places (8, 2) of a box's corners in a picture, right and down in pixels; None if one is behind the camera."""
     corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
@@ -157,8 +182,13 @@ def _split(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
         over.add_circle_filled(ImVec2(x, corner.y + 0.5 * room.y), em(0.45 + 0.5 * wide), color)
     plans = state.view.plans
     left = type(plans[0].method).__name__ if plans[0] is not None else display.method
-    right = {"method": display.method_b, "reference": "float64 reference", "error": "thickness less the reference"}
+    right = {"reference": "float64 reference", "error": "thickness less the reference"}
+    right |= {"method": display.method_b, "snapshot": f"snapshot {display.snapshot}"}
     name = right[display.compare]
+    if display.compare == "snapshot":
+        left = "now"
+        if state.work.document.snapshot(display.snapshot) is None:
+            name = "no snapshot: keep one with Shift 1"
     if display.compare == "method" and plans[1] is not None:
         name = type(plans[1].method).__name__
     if display.compare in ("reference", "error"):

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from imgui_bundle import ImVec2, hello_imgui, imgui
 
+from translucent.errors import InputError
 from translucent.preview.document import RANGES, TIPS, Triple
 from translucent.preview.library import Picture
 from translucent.preview.window_state import WindowState
@@ -134,6 +135,52 @@ def triple(state: WindowState, label: str, name: str, speed: float) -> None:
     begin_drag(state)
     if changed and all(math.isfinite(v) for v in values):
         state.change(name, [max(v, 0.0) for v in values])
+
+
+def number(
+    state: WindowState,
+    label: str,
+    name: str,
+    now: float,
+    ends: tuple[float, float],
+    form: str,
+    change: Callable[[str, float], None],
+) -> None:
+    """Slider for a field, such as ``light.radius``, of what `change` takes the name of the field and its value."""
+    row(label, TIPS[name])
+    flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
+    changed, value = imgui.slider_float(f"##{name}", now, *ends, form, flags)
+    begin_drag(state)
+    if changed and math.isfinite(value):
+        change(name.partition(".")[2], value)
+
+
+def vector(
+    state: WindowState, label: str, name: str, now: Triple, speed: float, change: Callable[[str, Triple], None]
+) -> None:
+    """Fields for three numbers, as `number`."""
+    row(label, TIPS[name])
+    changed, values = imgui.drag_float3(f"##{name}", list(now), speed, 0.0, 0.0, "%.4g")
+    begin_drag(state)
+    if changed and all(math.isfinite(v) for v in values):
+        red, green, blue = values
+        change(name.partition(".")[2], (red, green, blue))
+
+
+def whole(state: WindowState, label: str, name: str, empty: str = "") -> None:
+    """Field for a whole number of the document, or for none, which is shown as `empty`."""
+    row(label, TIPS[name])
+    now = state.get(name)
+    shown = "" if now is None else f"{now:.0f}"
+    if (text := text_field(state, name, empty, shown)) is not None:
+        if not text.strip() and empty:
+            return state.change(name, None, step=True)
+        try:
+            state.change(name, float(round(float(text))), step=True)
+        except (ValueError, OverflowError):
+            error = InputError(f"{label} {text!r}", "not a number", "write for example 1920")
+            state.work.refuse(error)
+    return None
 
 
 def check(state: WindowState, label: str, name: str) -> None:
