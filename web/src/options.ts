@@ -51,7 +51,7 @@ const SIZE: Rule = [
 ];
 
 /** Refuse options that are unknown, or of a wrong kind; `of` names whose they are. */
-export function checkOptions(options: ThicknessOptions, of: string, precisions: string[]): void {
+export function checkOptions(options: ThicknessOptions, of: string, precisions: string[], refinements: number[] = []): void {
   if (typeof options !== "object" || options === null) {
     throw new TranslucentError(`options of ${of}`, `they are ${textOf(options)}`, "give an object, as { exits: true }");
   }
@@ -62,6 +62,7 @@ export function checkOptions(options: ThicknessOptions, of: string, precisions: 
     precision: choice(...precisions),
     opticalDepth: choice("auto", true, false),
     exits: choice("auto", true, false),
+    ...(refinements.length ? { refine: choice(...refinements) } : {}),
   };
   for (const [name, value] of Object.entries(options)) {
     const rule = rules[name];

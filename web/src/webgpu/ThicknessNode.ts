@@ -39,12 +39,19 @@ export type NodePrecision = "float32" | "fixed28";
 export interface ThicknessNodeOptions extends ThicknessOptions {
   /** Precision of the sums. Default: float32 where the graphics card can add it up (`float32-blendable`), fixed28 elsewhere. */
   precision?: NodePrecision;
+  /**
+   * Pixels along each side of a pixel that faces are drawn into, of which the middle one counts: 1 (the default), 3 or 5. Rasterizers
+   * put vertices down on a grid of a part of a pixel (drawn in software: 1/16, graphics cards mostly 1/256), and by edges of faces
+   * the grid decides which one is shown: it is so many times as fine. Costs up to the square of it.
+   */
+  refine?: 1 | 3 | 5;
 }
 
 /** Revision of three from which on it was tried. */
 const OLDEST = 185;
 
 const PRECISIONS: NodePrecision[] = ["float32", "fixed28"];
+const REFINEMENTS = [1, 3, 5];
 
 /**
  * Exact thickness of meshes along every view ray, as a node (TSL): metres (r), signed count (g), 1 if the number can be
@@ -72,6 +79,7 @@ export class ThicknessNode extends Node {
     low: target(HalfFloatType, RGBAFormat),
     spectral: target(FloatType, RGBAFormat),
     ends: target(FloatType, RGFormat, true),
+    fineEnds: target(FloatType, RGFormat, true),
     last: target(FloatType, RGBAFormat, true),
     thickness: target(FloatType, RGBAFormat),
     opticalDepth: target(FloatType, RGBAFormat),
@@ -95,7 +103,7 @@ export class ThicknessNode extends Node {
 
   constructor(options: ThicknessNodeOptions = {}) {
     super("vec4");
-    checkOptions(options, "ThicknessNode", PRECISIONS);
+    checkOptions(options, "ThicknessNode", PRECISIONS, REFINEMENTS);
     if (parseInt(REVISION) < OLDEST) {
       throw new TranslucentError("ThicknessNode", `this is three r${REVISION}, whose nodes make other WGSL of it`, `use three 0.${OLDEST} or newer`);
     }
@@ -180,11 +188,17 @@ export class ThicknessNode extends Node {
   }
 
   private run(renderer: WebGPURenderer, scene: Object3D, camera: Camera): void {
-    checkOptions(this.options, "ThicknessNode", PRECISIONS);
+    checkOptions(this.options, "ThicknessNode", PRECISIONS, REFINEMENTS);
     const precision = this.choose(renderer);
     const [bodies, opaque] = this.standIns.sort(scene, camera, this.options);
     checkView({}, camera, [...bodies, ...opaque].map((one) => one.mesh));
     const [width, height] = this.size(renderer);
+    const refine = this.options.refine ?? 1;
+    const fine = [width * refine, height * refine];
+    const most = (renderer.backend as { device?: { limits: { maxTextureDimension2D: number } } }).device?.limits.maxTextureDimension2D ?? Infinity;
+    if (Math.max(...fine) > most) {
+      throw new TranslucentError(`ThicknessNode with refine: ${refine}`, `${fine.join(" x ")} pixels are more than the ${most} of this graphics card`, "refine less, or set a smaller size");
+    }
     const view = seesFrom(camera, width, height, 0);
     const media = new Box3();
     for (const one of bodies) {
@@ -196,9 +210,13 @@ export class ThicknessNode extends Node {
     const bending = this.options.exits ?? "auto";
     const spectral = several === "auto" ? areSpectral(bodies) : several;
     const exits = bending === "auto" ? bodies.some((one) => bends(one.mesh)) : bending;
-    const uses = { sums: true, thickness: true, low: precision === "fixed28", spectral, opticalDepth: spectral, ends: opaque.length > 0, last: exits };
+    const low = precision === "fixed28";
+    const fineEnds = opaque.length > 0 && refine > 1;
+    const uses = { sums: true, thickness: true, low, spectral, opticalDepth: spectral, ends: opaque.length > 0, fineEnds, last: exits };
+    const refined = new Set(["sums", "low", "spectral", "fineEnds"]);
     for (const [name, used] of Object.entries(uses)) {
-      this.targets[name as keyof typeof uses].setSize(used ? width : 1, used ? height : 1);
+      const [w, h] = !used ? [1, 1] : refined.has(name) ? fine : [width, height];
+      this.targets[name as keyof typeof uses].setSize(w, h);
     }
     this.pixels.value.set(width, height);
     this.has.opticalDepth.value = Number(spectral);
@@ -207,32 +225,44 @@ export class ThicknessNode extends Node {
     const state = RendererUtils.resetRendererState(renderer, undefined as never);
     renderer.setClearColor(0, 0);
     try {
-      this.draw(renderer, view, media, bodies, opaque, precision);
+      this.draw(renderer, view, refine === 1 ? view : seesFrom(camera, fine[0], fine[1], 0), media, bodies, opaque, precision);
     } finally {
       RendererUtils.restoreRendererState(renderer, state);
     }
   }
 
   /** Draw all passes; the state of the renderer is that of a picture of its own. */
-  private draw(renderer: WebGPURenderer, view: View, media: Box3, bodies: StandIn[], opaque: StandIn[], precision: NodePrecision): void {
+  private draw(
+    renderer: WebGPURenderer,
+    view: View,
+    fine: View,
+    media: Box3,
+    bodies: StandIn[],
+    opaque: StandIn[],
+    precision: NodePrecision,
+  ): void {
     const { targets, resolve } = this;
     const diagonal = media.isEmpty() ? 1 : Math.max(media.getSize(new Vector3()).length(), Number.MIN_VALUE);
     this.diagonal.value = diagonal;
     const range = view.range(media);
     const reversed = (renderer as { reversedDepthBuffer?: boolean }).reversedDepthBuffer === true;
-    for (const one of opaque) place(one, view, range);
+    const refine = targets.sums.width / targets.thickness.width;
     const ending = (one: StandIn): Mesh => {
       const { material } = one.mesh;
       const { side } = Array.isArray(material) ? material[0] : material;
       return one.use(`end ${side} ${reversed} ${keyOf(one)}`, () => Object.assign(nearest(one, reversed), { side }));
     };
-    if (opaque.length) this.fill(renderer, targets.ends, opaque.map(ending));
+    const fill = (into: RenderTarget, ones: StandIn[], from: View, made: (one: StandIn) => Mesh): void => {
+      for (const one of ones) place(one, from, range);
+      this.fill(renderer, into, ones.map(made));
+    };
+    if (opaque.length) fill(targets.ends, opaque, view, ending);
+    if (opaque.length && refine > 1) fill(targets.fineEnds, opaque, fine, ending);
     const expected = [0, 0];
     const sound = bodies.every((one) => isClosed(one.mesh.geometry));
     let open = 0;
     let longest = Number.MIN_VALUE;
     for (const one of bodies) {
-      place(one, view, range);
       const closed = isClosed(one.mesh.geometry);
       const weight = closed || precision === "fixed28" ? 1 : OPEN_WEIGHTS[Math.min(open++, OPEN_WEIGHTS.length - 1)];
       const [least, most] = expectedCount(one, view);
@@ -245,16 +275,16 @@ export class ThicknessNode extends Node {
       longest = Math.max(longest, one.worldBox.getSize(new Vector3()).length() + (isCut(one, view) ? view.start : 0));
     }
     resolve.range.value = longest;
-    const ends = opaque.length ? this.ends : null;
+    const ends = opaque.length ? (refine > 1 ? targets.fineEnds : targets.ends).texture : null;
     const sum = (what: Summed) => (one: StandIn): Mesh =>
-      one.use(`${what} ${ends !== null} ${keyOf(one)}`, () => summing(one, what, ends, resolve.range));
+      one.use(`${what} ${ends !== null} ${refine > 1} ${keyOf(one)}`, () => summing(one, what, ends, resolve.range));
     const high = precision === "fixed28" ? "high" : "path";
-    this.fill(renderer, targets.sums, bodies.map(sum(high)));
-    if (high === "high") this.fill(renderer, targets.low, bodies.map(sum("low")));
+    fill(targets.sums, bodies, fine, sum(high));
+    if (high === "high") fill(targets.low, bodies, fine, sum("low"));
     const spectral = this.has.opticalDepth.value > 0;
-    if (spectral) this.fill(renderer, targets.spectral, bodies.map(sum("spectral")));
+    if (spectral) fill(targets.spectral, bodies, fine, sum("spectral"));
     const leaving = (one: StandIn): Mesh => one.use(`exit ${reversed} ${keyOf(one)}`, () => last(one, reversed));
-    if (this.has.exits.value > 0) this.fill(renderer, targets.last, bodies.map(leaving));
+    if (this.has.exits.value > 0) fill(targets.last, bodies, view, leaving);
 
     resolve.frame_size.value.set(targets.thickness.width, targets.thickness.height, 0, 0);
     view.setRays(resolve.ray_right.value, resolve.ray_up.value, resolve.ray_forward.value);
@@ -263,8 +293,11 @@ export class ThicknessNode extends Node {
     resolve.rounding.value = ROUNDING * diagonal;
     resolve.count_share.value = diagonal;
     const low = high === "high" ? targets.low.texture : null;
-    this.finish(renderer, targets.thickness, high, () => thicknessOf(resolve, targets.sums.texture, low));
-    if (spectral) this.finish(renderer, targets.opticalDepth, "spectral", () => opticalDepthOf(resolve, targets.spectral.texture, this.texture));
+    this.finish(renderer, targets.thickness, `${high} ${refine}`, () => thicknessOf(resolve, targets.sums.texture, low, refine));
+    if (spectral) {
+      const depth = (): Material => opticalDepthOf(resolve, targets.spectral.texture, this.texture, refine);
+      this.finish(renderer, targets.opticalDepth, `spectral ${refine}`, depth);
+    }
   }
 
   private choose(renderer: WebGPURenderer): NodePrecision {

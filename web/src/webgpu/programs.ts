@@ -31,8 +31,9 @@ export function bodyNodes(): BodyUniforms {
   return Object.fromEntries(values.map(([name, { value }]) => [name, uniform(value)])) as unknown as BodyUniforms;
 }
 
-/** Texel of a picture at this pixel. */
-export const here = (texture: Texture): Nodes => (tsl as Nodes).textureLoad(texture, ivec2(screenCoordinate), int(0));
+/** Texel of a picture at this pixel; the middle one of those that it is refined to. */
+export const here = (texture: Texture, refine = 1): Nodes =>
+  (tsl as Nodes).textureLoad(texture, ivec2(screenCoordinate).mul(int(refine)).add(int((refine - 1) / 2)), int(0));
 
 /** Signs of mirrored instances, each of which shows its other side; null where none is mirrored. */
 function mirrored(mesh: InstancedMesh): Nodes | null {
@@ -192,12 +193,12 @@ function resolving(output: Nodes): NodeMaterial {
 }
 
 /** From sums to metres, count, validity and coverage; `low` holds the other half of sums in digits. */
-export function thicknessOf(u: Resolving, sums: Texture, low: Texture | null): NodeMaterial {
+export function thicknessOf(u: Resolving, sums: Texture, low: Texture | null, refine: number): NodeMaterial {
   const advance = advanceOf(u);
-  const sum = here(sums);
+  const sum = here(sums, refine);
   let [path, count, misplaced, exact] = [sum.r, sum.g, generated.misplaced_length(sum.g, advance, u.count_share), bool(true)];
   if (low) {
-    const rest = here(low);
+    const rest = here(low, refine);
     const whole = [sum.b, sum.a, rest.r, rest.g].map((digit) => int(digit)).reduce((all, digit) => all.mul(int(BASE)).add(digit));
     path = float(whole).mul(u.range).div(STEPS);
     count = sum.r;
@@ -216,7 +217,7 @@ export function thicknessOf(u: Resolving, sums: Texture, low: Texture | null): N
 }
 
 /** From sums to optical depth per channel, where `thickness` is valid. */
-export function opticalDepthOf(u: Resolving, sums: Texture, thickness: Texture): NodeMaterial {
-  const depth = max(here(sums).rgb.mul(advanceOf(u)), 0);
+export function opticalDepthOf(u: Resolving, sums: Texture, thickness: Texture, refine: number): NodeMaterial {
+  const depth = max(here(sums, refine).rgb.mul(advanceOf(u)), 0);
   return resolving(select(here(thickness).b.greaterThan(0), vec4(depth, 1), vec4(0, 0, 0, 1)));
 }
