@@ -425,7 +425,7 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
         (["none.png@1,2", "1cm"], "pixel 1,2 of 'none.png'; no such file"),
         (["linear(-.1,1,1)", "1cm", "--clamp"], "red = -0.1 is not in 0 < t <= 1"),
         (["--fit", "few.csv"], "no column 'distance'"),
-        (["--fit", "good.csv", "--clamp"], "--clamp; a sample made up would bend --fit"),
+        (["--fit", "good.csv", "--clamp"], "--clamp; an invented sample would falsify --fit"),
         ([], "Missing argument 'COLOR'"),
         (["gray"], "Missing argument 'DISTANCE'. A color has a meaning only at a distance"),
         (["jade"], "For the preset of this name write --preset jade"),

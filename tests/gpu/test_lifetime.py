@@ -161,7 +161,7 @@ def test_unknown_backend_and_size_are_refused(renderer: tl.Renderer) -> None:
             renderer.render(scene, size)  # type: ignore[arg-type]
     with pytest.raises(tl.InputError, match="samples 0; not a whole number"):
         renderer.render(scene, (8, 8), samples=0)
-    with pytest.raises(tl.RenderError, match=r"frame size 1000000x2; this OpenGL ends at \d+"):
+    with pytest.raises(tl.RenderError, match=r"frame size 1000000x2; this OpenGL allows at most \d+"):
         renderer.render(scene, (1_000_000, 2))
 
 

@@ -273,7 +273,7 @@ def test_views_shrink_until_they_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Storage, "largest", property(lambda _: 50_000))
     with (
         tl.Renderer() as none,
-        pytest.raises(tl.RenderError, match="1 lights on media that scatter; what they see does"),
+        pytest.raises(tl.RenderError, match="1 lights on media that scatter; their lists do"),
     ):
         none.render(scene, SIZE, scattering=ONCE)
 

@@ -195,7 +195,7 @@ def test_nothing_is_left_behind(pyrender: ModuleType, studio: Any) -> None:
 @pytest.mark.parametrize("shared", [True, False])
 def test_frames_that_are_too_large_are_refused(renderer: tl.Renderer, studio: Any, shared: bool) -> None:
     alone = _thickness(renderer, studio)
-    with pytest.raises(tl.RenderError, match=r"frame size 1000000x2; this OpenGL ends at \d+; render in parts"):
+    with pytest.raises(tl.RenderError, match=r"frame size 1000000x2; this OpenGL allows at most \d+; render in parts"):
         render(studio.scene(), MEDIA, (1_000_000, 2), renderer=renderer, shared=shared)
     np.testing.assert_array_equal(_thickness(renderer, studio), alone)
 

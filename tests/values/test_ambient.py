@@ -52,7 +52,7 @@ def test_the_planner_adds_it_and_says_so() -> None:
     assert found.method == tl.SignedDepth()
     assert found.exact
     assert "closed form, q / sigma_t (1 - T); of the ambient radiance A" in found.passes[-1].reason
-    assert found.unmodelled == ("what dims ambient light on its way to a place in the media",)
+    assert found.unmodelled == ("shadows in ambient light: it reaches each point of the media unchanged",)
     several = plan(scene(MILK, tl.Medium(absorption=1.0)))
     assert several.ordered
     assert "emission among several media" in several.passes[0].reason

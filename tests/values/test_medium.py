@@ -40,7 +40,7 @@ def test_color_distance_and_extinction_agree(color: tuple[float, ...], distance:
 @pytest.mark.parametrize(
     ("distance", "told"),
     [
-        (-1, "what passes -1 m; below 0; give lengths of ways through the medium, 0 and above"),
+        (-1, "what passes -1 m; below 0; give lengths of paths through the medium, 0 or more"),
         ([0.0, -0.5, np.nan, -2.0], "what passes -0.5 m; below 0 at 2 of 4 places; give"),
         (-np.inf, "what passes -inf m; below 0;"),
     ],

@@ -77,7 +77,7 @@ def test_fog_that_light_crosses_is_not_to_be_seen(times: float, said: bool) -> N
     found = _remarks(0.5 * times, tl.Medium(scattering=1.0))
     assert [note.kind for note in found] == [NoteKind.UNSEEN_BODIES] * said
     if said:
-        assert "light goes 1 m through this medium before it meets anything" in found[0]
+        assert "light goes 1 m through this medium before it is scattered or absorbed" in found[0]
         assert "5 m tall (--height 5m) it shows" in found[0]
 
 

@@ -96,7 +96,7 @@ def _places(points: Array, used: Integers, mesh: Mesh) -> tuple[Integers, int]:
 
 def _strange(name: str, missing: int, count: int, what: str) -> InputError:
     found = f"{missing} of its {count} vertices are not those of {what}"
-    return InputError(f"attach to {name!r}", found, "attach to the mesh as it was then, and give its unit=")
+    return InputError(f"attach to {name!r}", found, "attach to the unchanged mesh, and give its unit=")
 
 
 def _of_frame(points: Array, used: Integers, frame: Frame, quantity: str, name: str) -> Array:

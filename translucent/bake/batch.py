@@ -167,7 +167,7 @@ def bake_many(
         other = outputs.setdefault(str(job.get("output")).casefold(), job)
         if other is not job:
             both = f"{other.get('model')!r} and {job.get('model')!r}"
-            raise InputError(f"output {job.get('output')!r}", f"it is that of {both}", "rename one of them")
+            raise InputError(f"output {job.get('output')!r}", f"it is the output of {both}", "rename one of them")
     if workers is not None and workers < 1:
         raise InputError(f"{workers} processes", "below 1", "give 1 or more")
     for job in given:

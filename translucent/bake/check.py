@@ -397,7 +397,7 @@ def check_output(job: Job, record: Record, results: Results) -> Checks:
     inside_file = path.suffix.lower() == ".glb"
     found = (_check_glb if inside_file else _check_maps)(job, record, results, medium)
     if not any(found.values()):
-        raise InputError(f"check of {str(path)!r}", "it has no map that is seen", "give a model with an inside")
+        raise InputError(f"check of {str(path)!r}", "no visible surface has a map", "give a model with an inside")
     return found
 
 

@@ -103,7 +103,7 @@ def check_job(job: Job) -> None:
         raise InputError("bake job", f"no {missing[0]}", "give a path as text")
     metres_per_unit(job.get("unit", "m"))
     if not 0 <= (fraction := job.get("max_escaped", 0)) <= 1:
-        raise InputError(f"max_escaped {fraction!r}", "not in 0..1", "give a share of the rays, for example 0.05")
+        raise InputError(f"max_escaped {fraction!r}", "not in 0..1", "give a fraction of the rays, for example 0.05")
     suffixes = VERTEX_SUFFIXES if job.get("vertices") else MAP_SUFFIXES
     output = Path(job["output"])
     storing = _storing(job)

@@ -167,7 +167,9 @@ def _passed(medium: Medium, least: float, largest: float) -> tuple[Array, Array]
     """Luminance of white light after tabled thicknesses, and these."""
     if medium.scatters:
         do = "give a filament's --td, or the color of a sample held before a light at its thickness"
-        raise InputError("lithophane", "the medium scatters, and more light than goes straight arrives", do)
+        raise InputError(
+            "lithophane", "the medium scatters, so more light arrives than the straight path lets through", do
+        )
     tabled = np.linspace(least, largest, _TABLED)
     with np.errstate(under="ignore"):
         passed = np.asarray(luminance(medium.transmittance(tabled)))

@@ -106,12 +106,12 @@ class BakeOptions:
     rays: int = option(64, metavar="N", help="Rays per point of the surface.")
     spread: float = option(180.0, metavar="DEG", help="Full angle of the cone.")
     weighting: str = option(
-        "cosine", type=click.Choice(["cosine", "uniform"]), help="How directions of the cone count."
+        "cosine", type=click.Choice(["cosine", "uniform"]), help="Weights of the directions in the cone."
     )
     gaps: str = option(
         "first-exit",
         type=click.Choice(["first-exit", "total"]),
-        help="Where a ray leaves and enters again: up to the first exit, or all that is inside.",
+        help="Length of a ray that leaves and enters again: up to the first exit, or all of it that is inside.",
     )
     max_distance: str | None = _length("No ray goes farther. Default: no limit.")
     ignore_back_faces: bool = option(False, help="Rays end only at faces that they leave through.")
@@ -127,7 +127,7 @@ class BakeOptions:
     medium: AnyMediumOptions = group(AnyMediumOptions)
     unwrap: bool = option(False, help="Make new UVs, even if MODEL has some.")
     vertices: bool = option(False, help="Thickness per vertex, into a .ply, .glb or .npy file.")
-    normalize: bool = option(False, help="Store shares of the largest value instead of metres.")
+    normalize: bool = option(False, help="Store fractions of the largest value instead of metres.")
     invert: bool = option(False, help="Store 1 - t / max, the translucency that some engines want.")
     max_escaped: str | None = option(metavar="%", help="Of --out-dir: more rays without an exit are suspect. [5%]")
     resume: bool = option(False, help="Keep finished parts beside the output, and go on from there.")
@@ -557,7 +557,7 @@ class LithophaneOptions:
     thickness: str = option("0.6mm..3mm", metavar="A..B", help="Least and largest.")
     width: str = option("100mm", metavar="W", help="Of the plate.")
     pitch: str = option("0.25mm", metavar="P", help="Distance of the relief's points.")
-    check: bool = option(False, help="Write OUTPUT.check.png: what is asked for, and what the relief shows.")
+    check: bool = option(False, help="Write OUTPUT.check.png: the requested picture, and the rendered relief.")
     overwrite: bool = overwrite_option()
 
 

@@ -80,7 +80,7 @@ class ExtinctionOptions:
         "and --patch, repeated for other exposures; or to a .toml of such photographs.",
     )
     white: str | None = option(
-        metavar="X,Y,W,H", help="Of --fit PHOTO: where the light is seen with nothing before it, in pixels."
+        metavar="X,Y,W,H", help="Of --fit PHOTO: a place where nothing is in front of the light, in pixels."
     )
     patch: tuple[str, ...] = option(
         (),
@@ -95,14 +95,12 @@ class ExtinctionOptions:
     td: str | None = option(metavar="D", help="Transmission distance of a filament for 3D printers instead: 4mm, or 4.")
     td_transmittance: float | None = option(
         metavar="T",
-        help="Share of light left after --td, and after the TD that is printed. Default: 0.1, T = 10^(-d/TD).",
+        help="Fraction of light that is left after --td, and after the printed TD. Default: 0.1, T = 10^(-d/TD).",
     )
     model: str | None = option(
         names=("--on",), metavar="MODEL", help="A file, or a mesh of the toolkit: its color, see above."
     )
-    eye: str | None = option(
-        metavar="X,Y,Z", help="Of --on: where it is seen from, in metres. Default: as render shows it."
-    )
+    eye: str | None = option(metavar="X,Y,Z", help="Of --on: position of the eye, in metres. Default: that of render.")
     overwrite: bool = overwrite_option()
     allow_outside: bool = outside_option()
 
@@ -191,7 +189,7 @@ def _check_usage(given: ExtinctionOptions, color: str | None, as_json: bool) -> 
     if given.eye is not None and given.model is None:
         raise InputError(f"--eye {given.eye}", "only --on looks at a model", "leave it out")
     if given.batch is not None and given.td_transmittance is not None:
-        raise InputError(f"--td-transmittance {given.td_transmittance:g}", "--batch tells no TD", "leave it out")
+        raise InputError(f"--td-transmittance {given.td_transmittance:g}", "--batch prints no TD", "leave it out")
     if given.batch is not None and given.target is not None:
         raise InputError(f"--as {given.target}", "it takes one color, not --batch", "leave one of them out")
     if not given.fit and (given.white is not None or given.patch):
@@ -199,7 +197,7 @@ def _check_usage(given: ExtinctionOptions, color: str | None, as_json: bool) -> 
             "--white" if given.white is not None else "--patch", "only --fit PHOTO takes it", "add --fit PHOTO"
         )
     if given.fit and given.clamp:
-        raise InputError("--clamp", "a sample made up would bend --fit", "leave rows with a channel of 0 out")
+        raise InputError("--clamp", "an invented sample would falsify --fit", "leave out rows with a channel of 0")
 
 
 def _distance_hint(color: str) -> str:

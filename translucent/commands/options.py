@@ -491,8 +491,8 @@ class LookOptions:
 
     environment: str | None = option(
         metavar="E",
-        help="Lights the model and is mirrored: light-table, studio, checkerboard, a color, or a .hdr, .exr or .png of "
-        "all directions; studio,90 turns it by degrees. Default: the stage's, or else light-table.",
+        help="Lights the model, and is visible in reflections: light-table, studio, checkerboard, a color, or a .hdr, "
+        ".exr or .png of all directions; studio,90 turns it by degrees. Default: the stage's, or else light-table.",
     )
     background: str | None = option(
         metavar="E", help="Seen behind the model instead of the environment, and through it; as above."
@@ -588,7 +588,7 @@ class ChoiceOptions:
     )
     shadow_size: int | None = option(
         metavar="N",
-        help="Texels along a side of each light's map of shadows, 64 to 8192. Default: 1024. More make edges sharper.",
+        help="Texels along a side of each light's shadow map, 64 to 8192. Default: 1024. More make edges sharper.",
     )
     environment_shadows: int | None = option(
         metavar="N",

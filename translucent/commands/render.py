@@ -122,8 +122,7 @@ class RenderOptions:
     )
     time: float | None = option(
         metavar="S",
-        help="Nodes, skins and morph targets of a glTF file as its animations have them after S seconds. "
-        "Default: as the file has them.",
+        help="Animate nodes, skins and morph targets of a glTF file to S seconds. Default: as the file has them.",
     )
     file: FileOptions = group(FileOptions)
     size: str = option("1280x720", metavar="WxH", help="Size of the picture in pixels.")
@@ -136,7 +135,7 @@ class RenderOptions:
     denoise: bool = option(
         False,
         help="Take noise out of the picture, where rough surfaces or random paths leave some: by Open Image Denoise, "
-        "whose error nobody knows. Then 4 samples of frosted glass look like 64.",
+        "whose error is unknown. Then 4 samples of frosted glass look like 64.",
     )
     opaque_with: str | None = option(
         type=click.Choice(["pyrender"]), help="Let another renderer draw the opaque objects of a glTF file."

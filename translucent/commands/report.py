@@ -47,9 +47,11 @@ class ReportOptions:
         help="Measure nothing: take the report of this file; with --only, measure these parts of it anew.",
     )
     limit: float | None = option(
-        metavar="SECONDS", help="End measuring after so long; the report names what was not measured."
+        metavar="SECONDS", help="Stop measuring after this time; the report names the scenes that are missing."
     )
-    compare: Path | None = option(metavar="JSON", help="Tell what got worse since this; exit code 1 if so.")
+    compare: Path | None = option(
+        metavar="JSON", help="Print what got worse since this report; exit code 1 if anything did."
+    )
     medium: MediumOptions = group(MediumOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
     backend: str | None = option(metavar="B", help="egl, window or osmesa. Default: what works here.")

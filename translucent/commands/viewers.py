@@ -147,7 +147,7 @@ class PageOptions:
     output: Path = option(names=("-o", "--output"), required=True, help="An .html file.")
     medium: BodyOptions = group(BodyOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
-    size: str = option("1280x800", metavar="WxH", help="Of the poster, and of what the view frames.")
+    size: str = option("1280x800", metavar="WxH", help="Of the poster, and of the framed view.")
     camera: CameraOptions = group(CameraOptions)
     stage: str | None = stage_option()
     ground: str | None = ground_option()
@@ -158,7 +158,7 @@ class PageOptions:
     poster: str = option(
         RENDERED,
         metavar="PICTURE",
-        help="Shown until the scene is, and where there is no WebGL2: a .png, .jpg or .webp, rendered, or none.",
+        help="Shown until the scene is loaded, and without WebGL2: a .png, .jpg or .webp, rendered, or none.",
     )
     simplify: int | None = option(metavar="N", help="Show a copy of the model with about N triangles.")
     overwrite: bool = overwrite_option()

@@ -120,7 +120,7 @@ def thickness_samples(seen: Frame | npt.ArrayLike) -> Array:
     if thickness.size == 0:
         if isinstance(seen, Frame) and seen.coverage.any():
             found = f"all {int(seen.coverage.sum())} pixels that the mesh covers are marked invalid"
-            raise InputError("thickness of what is seen", found, "close its holes: translucent explain tells of them")
+            raise InputError("thickness of what is seen", found, "close its holes: translucent explain lists them")
         raise InputError("thickness of what is seen", "no covered, valid pixel", "frame the mesh in the picture")
     if isinstance(seen, Frame):
         return np.maximum(thickness, 0.0)  # a difference of float32 sums, a rounding below 0 at a silhouette

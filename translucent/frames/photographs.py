@@ -243,7 +243,7 @@ def _steps(photograph: Photograph, number: int, left_out: list[str]) -> PatchTra
         percent = 100 * white.saturated.max()
         raise InputError(f"white of {name}", f"{percent:.0f} % of its pixels are saturated", "expose it shorter")
     if (white.black > MOST_LIMITED).any():
-        raise InputError(f"white of {name}", "it is black", "mark where the light is seen with nothing before it")
+        raise InputError(f"white of {name}", "it is black", "mark a place where nothing is in front of the light")
     if not photograph.patches:
         raise InputError(name, "no patches", "give at least one, with its thickness")
     rows = []
@@ -263,7 +263,7 @@ def _depth(patch: _Mean, white: _Mean, what: str, left_out: list[str]) -> tuple[
     if (bright & (patch.saturated <= MOST_LIMITED)).any():
         channel = int(np.flatnonzero(bright)[0])
         found = f"{CHANNELS[channel]} {patch.mean[channel]:.3g} is above the white's {white.mean[channel]:.3g}"
-        raise InputError(what, found, "mark as white where the same light is seen with nothing before it")
+        raise InputError(what, found, "mark as white a place where nothing is in front of the same light")
     noisy = patch.variance > (MOST_ERROR * patch.mean) ** 2
     for limited, why in (
         (patch.saturated > MOST_LIMITED, "saturated"),

@@ -169,7 +169,7 @@ class Targets:
         limit = int(gl.info["GL_MAX_TEXTURE_SIZE"])
         if max(size) > limit:
             raise RenderError(
-                f"frame size {size[0]}x{size[1]}", f"this OpenGL ends at {limit}", "render in parts, or smaller"
+                f"frame size {size[0]}x{size[1]}", f"this OpenGL allows at most {limit}", "render in parts, or smaller"
             )
         self._gl = gl
         self.size = size

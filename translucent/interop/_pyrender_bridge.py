@@ -209,7 +209,7 @@ def camera_of(scene: Any, size: tuple[int, int]) -> Camera:
         raise InputError(
             "camera of the pyrender scene",
             f"aspectRatio {camera.aspectRatio:g} for a picture of {size[0]}x{size[1]}, which it stretches",
-            "leave aspectRatio out: it is that of the picture then",
+            "leave aspectRatio out: it is the output of the picture then",
         )
     return Camera(pose, fov_y=math.degrees(camera.yfov))
 
@@ -507,7 +507,7 @@ def _require_room(size: tuple[int, int]) -> None:
     limit = int(GL.glGetIntegerv(GL.GL_MAX_RENDERBUFFER_SIZE))
     if max(size) > limit:
         raise RenderError(
-            f"frame size {size[0]}x{size[1]}", f"this OpenGL ends at {limit}", "render in parts, or smaller"
+            f"frame size {size[0]}x{size[1]}", f"this OpenGL allows at most {limit}", "render in parts, or smaller"
         )
 
 

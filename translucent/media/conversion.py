@@ -120,7 +120,7 @@ def lengths(metres: npt.ArrayLike) -> Array:
         raise InputError(
             f"what passes {float(found[below].flat[0]):g} m",
             f"below 0{'' if found.ndim == 0 else f' at {int(below.sum())} of {found.size} places'}",
-            "give lengths of ways through the medium, 0 and above",
+            "give lengths of paths through the medium, 0 or more",
         )
     return found
 

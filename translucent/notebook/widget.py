@@ -214,7 +214,11 @@ class SceneView(Widget):  # type: ignore[misc]
         found = named_preset(name)
         if found.medium.scatters or found.medium.emits:
             do = "render it: dataclasses.replace an object's medium, or tl.showcase(mesh, tl.preset(...).medium)"
-            raise InputError(f"preset {name!r} in a view", "it scatters or glows, which is worked out before", do)
+            raise InputError(
+                f"preset {name!r} in a view",
+                "it scatters or emits, and such light is solved for before the view opens",
+                do,
+            )
         self._check_editable()
         return name
 

@@ -189,7 +189,7 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: InterfaceM
 
 def with_ambient(notes: Iterable[Note]) -> tuple[Note, ...]:
     """Notes of a plan in which media emit the ambient radiance that they would scatter."""
-    dimmed = Note(NoteKind.DIMMED_AMBIENT, "what dims ambient light on its way to a place in the media")
+    dimmed = Note(NoteKind.DIMMED_AMBIENT, "shadows in ambient light: it reaches each point of the media unchanged")
     return (*(note for note in notes if note.kind is not NoteKind.ONLY_REMOVES), dimmed)
 
 

@@ -112,9 +112,10 @@ def _unseen_bodies(scene: Scene) -> tuple[Note, ...]:
     return (
         Note(
             NoteKind.UNSEEN_BODIES,
-            f"{object_names(body for _, body in bodies)}: nothing is to be seen: light goes "
-            f"{short_length(_size(first) / times)} through this medium before it meets anything (the mean free path), "
-            f"and the body is {short_length(_size(first))}; {other_size(scene.shown_bounds, CLOUDY / times)} it shows",
+            f"{object_names(body for _, body in bodies)}: invisible: light goes "
+            f"{short_length(_size(first) / times)} through this medium before it is scattered or absorbed (the "
+            f"mean free path), and the body is {short_length(_size(first))}; "
+            f"{other_size(scene.shown_bounds, CLOUDY / times)} it shows",
         ),
     )
 

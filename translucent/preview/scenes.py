@@ -469,7 +469,7 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
         If the environment cannot be read.
     """
     if document.orbit is None:
-        raise InputError("a picture", "nobody has framed the model", "frame it first")
+        raise InputError("a picture", "no view is framed yet", "frame the model first")
     look, scene = document.look, loaded.scene
     objects = _objects(document.material, document.assigned, scene, document.placed)
     objects = tuple(item for number, item in enumerate(objects) if number not in document.hidden)

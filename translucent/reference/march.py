@@ -123,7 +123,7 @@ class _Scheme:
         if self.termination > 0 and self.compositing != "front-to-back":
             raise InputError(
                 f"termination {self.termination} from back to front",
-                "what is hidden is known only from the front",
+                "hidden parts are known only from the front",
                 "use front-to-back",
             )
 

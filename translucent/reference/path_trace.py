@@ -390,7 +390,7 @@ def path_trace(
         depth = 2.0 * light.tracer.radius * float(light.volume.extinction.max())
     if max_events is None and depth > MAX_DEPTH:
         raise InputError(
-            "path tracing", f"media up to {depth:.0e} deep, in which light is lost for ages", "give max_events"
+            "path tracing", f"media up to {depth:.0e} deep, in which a path has very many events", "give max_events"
         )
     rays = pixel_rays(scene.camera, (width, height))
     surface = SurfaceLight(light)
@@ -426,7 +426,7 @@ def _check(scene: Scene, paths: int, max_events: int | None) -> None:
     if scene.scatters_ambient:
         raise InputError(
             "path tracing with ambient radiance",
-            "it stands for what paths find by themselves: light of the environment, and light scattered often",
+            "it replaces light that paths find by themselves: that of the environment, scattered once or often",
             "leave ambient out",
         )
     if paths < 2:

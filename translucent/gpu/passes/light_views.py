@@ -136,7 +136,7 @@ class LightViewsPass:
         megabytes = job.resources.light_lists.largest / 1e6
         raise RenderError(
             f"{len(job.scene.lights)} lights on media that scatter",
-            f"what they see does not fit into the {megabytes:.0f} MB that a shader of this OpenGL reaches",
+            f"their lists do not fit into the {megabytes:.0f} MB that a shader of this OpenGL reaches",
             "use fewer lights, or simpler bodies",
         )
 
