@@ -1,14 +1,17 @@
-"""USD stages: geometry with transforms, OpenPBR materials, and thickness per vertex as ``primvars:thickness``.
+"""USD stages: geometry, OpenPBR materials, camera and lights, and thickness per vertex as ``primvars:thickness``.
 
 A mesh has its triangles, normals for shading at the corners of its faces, texture coordinates ``primvars:st``, and
 thickness in metres, in its own space: a transform that scales an object scales it, too, as in glTF. Lengths are in
-metres (``metersPerUnit = 1``), +Y is up. A material is a MaterialX network of one node,
+metres (``metersPerUnit = 1``), +Y is up. A material is a MaterialX network around the node
 ``ND_open_pbr_surface_surfaceshader``, with the inputs of `translucent.materials.materialx`, since UsdPreviewSurface has
-neither transmission nor volume.
+neither transmission nor volume. Textures of base colors lie beside the stage, in linear values (``name.0.exr``).
 
-Not written: camera, lights, environment, textures, coats, films, dispersion, and media that emit or vary in density;
-a warning names the objects that have one of them.
-Source: OpenUSD, UsdGeom (stage metrics, primvars), UsdShade.
+Lights have the units of UsdLux with ``normalize``: a sphere, or a point, of an intensity I in W/sr has 4 I there, since
+of its surface 4 pi r^2 one side shows pi r^2; a distant light of the angle 0 has its irradiance.
+
+Not written: other environments than constants and gradients, other textures, coats, films, dispersion, and media that
+emit or vary in density; a warning names the objects that have one of them.
+Source: OpenUSD, UsdGeom (stage metrics, primvars, cameras), UsdLux (normalize), UsdShade.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from __future__ import annotations
 import tempfile
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -23,15 +27,21 @@ from typing import Any
 import numpy as np
 
 from translucent.arguments import checked
-from translucent.arrays import Floats
+from translucent.arrays import Array, Floats
 from translucent.bake.thickness_map import VertexThickness
 from translucent.errors import InputError, TranslucentWarning
 from translucent.extras import require_package
+from translucent.files.images import write_exr
 from translucent.files.paths import require_output, write_atomically
 from translucent.geometry.normals import corner_normals
 from translucent.materials.materialx import OPENPBR, transmission_inputs
+from translucent.scene.lights import DirectionalLight, SphereLight, SpotLight
 from translucent.scene.scene import Object, Scene, object_names
 from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
+
+#: Rows of the picture of a gradient.
+_SKY_ROWS = 64
 
 #: Files that it writes.
 USD_SUFFIXES = (".usda", ".usdc", ".usd")
@@ -44,7 +54,7 @@ def write_usd(scene: Scene, path: str | Path, thickness: Sequence[VertexThicknes
     Parameters
     ----------
     scene : Scene
-        Its objects are written, and not its camera, lights and environment.
+        Its objects, camera, lights, and an environment that is constant or a gradient.
     path : path
         A .usda (text), .usdc or .usd file.
     thickness : sequence of VertexThickness
@@ -85,7 +95,7 @@ def write_usd(scene: Scene, path: str | Path, thickness: Sequence[VertexThicknes
         root = geom.Xform.Define(stage, "/World")
         stage.SetDefaultPrim(root.GetPrim())
         geom.Scope.Define(stage, "/World/Looks")
-        taken = {"Looks"}
+        taken, pictures = {"Looks", "Camera", "Lights"}, dict[Path, Array]()
         for item in scene.objects:
             name = tf.MakeValidIdentifier(Path(item.mesh.name).stem or "object")
             while name in taken:
@@ -93,13 +103,32 @@ def write_usd(scene: Scene, path: str | Path, thickness: Sequence[VertexThicknes
             taken.add(name)
             values = next((baked.values for baked in thickness if baked.mesh is item.mesh), None)
             mesh = _add_mesh(stage, f"/World/{name}", item, values)
-            _add_material(stage, f"/World/Looks/{name}", item, mesh)
+            material = _add_material(stage, f"/World/Looks/{name}", item, mesh)
+            if (texture := _base_texture(item)) is not None:
+                file = path.with_name(f"{path.stem}.{len(pictures)}.exr")
+                pictures[file] = np.asarray(texture.pixels, np.float64)[..., :3]
+                _add_texture(stage, material, item, mesh, f"./{file.name}")
+        _add_camera(stage, scene)
+        _add_lights(stage, scene)
+        if scene.environment.kind == "gradient":
+            # All columns are alike, so that nothing depends on where the middle of a picture is.
+            height = np.cos((np.arange(_SKY_ROWS) + 0.5) * np.pi / _SKY_ROWS)
+            directions = np.stack([np.sqrt(1.0 - height**2), height, np.zeros(_SKY_ROWS)], axis=1)
+            rows = scene.environment.lighting(directions)
+            file = path.with_name(f"{path.stem}.environment.exr")
+            pictures[file] = np.broadcast_to(rows[:, None], (_SKY_ROWS, 2 * _SKY_ROWS, 3))
+            dome = _pxr("UsdLux")[0].DomeLight.Define(stage, "/World/Lights/environment")
+            dome.CreateTextureFileAttr(f"./{file.name}")
+            dome.CreateTextureFormatAttr("latlong")
         stage.GetRootLayer().Save()
         content = made.read_bytes()
 
     def fill(place: Path) -> None:
         place.write_bytes(content)
 
+    for file, pixels in pictures.items():
+        channels = dict(zip("RGB", np.moveaxis(pixels.astype(np.float32), 2, 0), strict=True))
+        write_atomically(file, partial(write_exr, channels=channels, header={}))
     write_atomically(path, fill)
     return path
 
@@ -151,7 +180,7 @@ def _add_mesh(stage: Any, path: str, item: Object, thickness: Floats | None) -> 
     return found
 
 
-def _add_material(stage: Any, path: str, item: Object, mesh: Any) -> None:
+def _add_material(stage: Any, path: str, item: Object, mesh: Any) -> Any:
     """OpenPBR surface of an object, bound to its mesh."""
     shade, sdf = _pxr("UsdShade", "Sdf")
     types, surface = sdf.ValueTypeNames, item.surface
@@ -177,15 +206,116 @@ def _add_material(stage: Any, path: str, item: Object, mesh: Any) -> None:
         shader.CreateInput("geometry_thin_walled", types.Bool).Set(True)
     material.CreateSurfaceOutput("mtlx").ConnectToSource(shader.CreateOutput("out", types.Token))
     shade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+    return material
+
+
+def _base_texture(item: Object) -> Texture | None:
+    """Texture of the base color of what is opaque."""
+    known = item.medium is None and item.surface is not None and item.mesh.uv is not None
+    return item.surface.color_texture if known and item.surface is not None else None
+
+
+def _add_texture(stage: Any, material: Any, item: Object, mesh: Any, file: str) -> None:
+    """Base color times a picture, looked up at coordinates that the mesh has for it."""
+    geom, shade, sdf, vt = _pxr("UsdGeom", "UsdShade", "Sdf", "Vt")
+    types, texture, path = sdf.ValueTypeNames, _base_texture(item), material.GetPath()
+    assert texture is not None
+    assert item.mesh.uv is not None
+    placed = item.mesh.uv @ texture.rows[:, :2].T + texture.rows[:, 2]
+    held = geom.PrimvarsAPI(mesh).CreatePrimvar("st_color", types.TexCoord2fArray, geom.Tokens.vertex)
+    held.Set(vt.Vec2fArray.FromNumpy(placed.astype(np.float32)))
+    place = shade.Shader.Define(stage, f"{path}/place")
+    place.CreateIdAttr("ND_geompropvalue_vector2")
+    place.CreateInput("geomprop", types.String).Set("st_color")
+    picture = shade.Shader.Define(stage, f"{path}/picture")
+    picture.CreateIdAttr("ND_image_color3")
+    picture.CreateInput("file", types.Asset).Set(file)
+    for axis, wrap in zip("uv", texture.wrap, strict=True):
+        picture.CreateInput(f"{axis}addressmode", types.String).Set("periodic" if wrap == "repeat" else "clamp")
+    picture.CreateInput("texcoord", types.Float2).ConnectToSource(place.CreateOutput("out", types.Float2))
+    product = shade.Shader.Define(stage, f"{path}/color")
+    product.CreateIdAttr("ND_multiply_color3")
+    product.CreateInput("in1", types.Color3f).ConnectToSource(picture.CreateOutput("out", types.Color3f))
+    color = shade.Shader.Get(stage, f"{path}/surface").GetInput("base_color")
+    product.CreateInput("in2", types.Color3f).Set(color.Get())
+    color.GetAttr().Clear()
+    color.ConnectToSource(product.CreateOutput("out", types.Color3f))
+
+
+def _frame(position: Array, direction: Array) -> Array:
+    """(4, 4): pose at a position whose -Z is a direction."""
+    back = -direction / np.linalg.norm(direction)
+    right = np.cross((0.0, 1.0, 0.0) if abs(back[1]) < 0.9 else (1.0, 0.0, 0.0), back)
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3] = np.column_stack([right, np.cross(back, right), back, position])
+    return pose
+
+
+def _add_camera(stage: Any, scene: Scene) -> None:
+    """Camera with a picture of 3:2: renderers keep its height, or its width, for others."""
+    geom, gf = _pxr("UsdGeom", "Gf")
+    camera, found = scene.camera, geom.Camera.Define(stage, "/World/Camera")
+    found.AddTransformOp().Set(gf.Matrix4d(np.asarray(camera.pose, np.float64).T.tolist()))
+    # Apertures and focal lengths are in tenths of a unit.
+    high = 0.24 if camera.height is None else 10.0 * camera.height
+    found.CreateVerticalApertureAttr(high)
+    found.CreateHorizontalApertureAttr(1.5 * high)
+    if camera.fov_y is None:
+        found.CreateProjectionAttr(geom.Tokens.orthographic)
+    else:
+        found.CreateFocalLengthAttr(0.5 * high / float(np.tan(np.radians(0.5 * camera.fov_y))))
+    far = float(np.linalg.norm(scene.bounds - camera.eye, axis=1).max()) + scene.diagonal
+    found.CreateClippingRangeAttr(gf.Vec2f(1e-4 * far, 2.0 * far))
+
+
+def _add_lights(stage: Any, scene: Scene) -> None:
+    """Lights, and a dome for an environment that is the same everywhere."""
+    geom, lux, gf = _pxr("UsdGeom", "UsdLux", "Gf")
+    geom.Scope.Define(stage, "/World/Lights")
+    for i, light in enumerate(scene.lights):
+        path = f"/World/Lights/light_{i}"
+        if isinstance(light, DirectionalLight):
+            found, power = lux.DistantLight.Define(stage, path), np.asarray(light.irradiance)
+            found.CreateAngleAttr(0.0)
+            pose = _frame(np.zeros(3), np.asarray(light.direction, np.float64))
+        else:
+            found, power = lux.SphereLight.Define(stage, path), 4.0 * np.asarray(light.intensity)
+            direction = np.asarray(getattr(light, "direction", (0.0, 0.0, -1.0)), np.float64)
+            pose = _frame(np.asarray(light.position, np.float64), direction)
+            found.CreateRadiusAttr(light.radius if isinstance(light, SphereLight) else 1e-4 * scene.diagonal)
+            if not isinstance(light, SphereLight):
+                found.CreateTreatAsPointAttr(True)
+            if isinstance(light, SpotLight):
+                shaping = lux.ShapingAPI.Apply(found.GetPrim())
+                shaping.CreateShapingConeAngleAttr(light.outer_cone)
+                shaping.CreateShapingConeSoftnessAttr(1.0 - light.inner_cone / light.outer_cone)
+        found.CreateNormalizeAttr(True)
+        _shine(found, power)
+        found.AddTransformOp().Set(gf.Matrix4d(pose.T.tolist()))
+    radiance = scene.environment.first * 2.0**scene.environment.exposure
+    if scene.environment.kind == "constant" and radiance.any():
+        _shine(lux.DomeLight.Define(stage, "/World/Lights/environment"), radiance)
+
+
+def _shine(light: Any, power: Array) -> None:
+    """Intensity, and color below 1, of a light."""
+    (gf,) = _pxr("Gf")
+    most = float(power.max()) or 1.0
+    light.CreateIntensityAttr(most)
+    light.CreateColorAttr(gf.Vec3f(*(power / most).tolist()))
 
 
 def _left_out(scene: Scene) -> list[tuple[list[Object], str]]:
     """Objects with what a stage here does not hold."""
     default = Surface()
+    if scene.environment.kind not in ("constant", "gradient"):
+        found = f"an environment of type {scene.environment.kind!r}: stages here have domes of one color, and gradients"
+        warnings.warn(f"{found}; it is not written", TranslucentWarning, stacklevel=4)
     groups = [
         ([item for item in scene.objects if item.density is not None], "densities that vary"),
         ([item for item in scene.objects if item.medium is not None and item.medium.emits], "media that emit"),
-        ([item for item in scene.objects if item.surface is not None and any(item.surface.textures)], "textures"),
+        ([item for item in scene.objects if _other_textures(item)], "textures but those of base colors"),
         ([item for item in scene.objects if item.mesh.colors is not None], "colors of vertices"),
     ]
     for name in ("clearcoat", "iridescence", "dispersion"):
@@ -194,3 +324,9 @@ def _left_out(scene: Scene) -> list[tuple[list[Object], str]]:
         ]
         groups.append((some, f"{name} of surfaces"))
     return [(items, found) for items, found in groups if items]
+
+
+def _other_textures(item: Object) -> bool:
+    if item.surface is None:
+        return False
+    return any(one is not None and one is not _base_texture(item) for one in item.surface.textures)
