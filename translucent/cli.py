@@ -13,6 +13,7 @@ from itertools import pairwise
 import click
 
 from translucent.commands.bake import bake, lithophane
+from translucent.commands.benchmark import benchmark
 from translucent.commands.console import echo
 from translucent.commands.explain import doctor, explain
 from translucent.commands.extinction import extinction
@@ -142,6 +143,7 @@ for command in (
     presets,
     material,
     report,
+    benchmark,
     shader,
     doctor,
 ):

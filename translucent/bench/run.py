@@ -238,7 +238,7 @@ def provenance(renderer: Renderer, command: str, *, quick: bool) -> Provenance:
         command=command,
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         platform=platform.platform(),
-        processor=_processor(),
+        processor=processor_name(),
         processors=os.cpu_count() or 1,
         backend=found["backend"],
         renderer=found["renderer"],
@@ -262,7 +262,7 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _processor() -> str:
+def processor_name() -> str:
     """Name of the CPU, from Linux, or from Python elsewhere."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")

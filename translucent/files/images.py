@@ -53,7 +53,7 @@ def write_png(file: Path | BinaryIO, pixels: npt.NDArray[Any], text: Mapping[str
 
 
 def write_exr(path: Path, channels: Mapping[str, npt.NDArray[Any]], header: Mapping[str, Any]) -> None:
-    """Write float32 channels with the OpenEXR package, which has to be installed.
+    """Write float32 channels, or float16 ones as they are, with the OpenEXR package, which has to be installed.
 
     Parameters
     ----------
@@ -70,7 +70,10 @@ def write_exr(path: Path, channels: Mapping[str, npt.NDArray[Any]], header: Mapp
     """
     import OpenEXR
 
-    kept = {name: np.ascontiguousarray(values, dtype=np.float32) for name, values in channels.items()}
+    kept = {
+        name: np.ascontiguousarray(values, dtype=np.float16 if values.dtype == np.float16 else np.float32)
+        for name, values in channels.items()
+    }
     how = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
         with OpenEXR.File({**how, **header}, kept) as file:

@@ -38,7 +38,7 @@ from translucent.reference.surfaces import (
     sheet_thicknesses,
 )
 from translucent.reference.volume import Segments, Volume, multiplicities, points_on, volume_segments
-from translucent.scene.camera import check_size
+from translucent.scene.camera import Camera, check_size
 from translucent.scene.scene import Scene
 
 #: Fraction of light below which paths end by Russian roulette, or go on with this fraction.
@@ -338,7 +338,13 @@ MAX_DEPTH = 1e4
 
 
 def path_trace(
-    scene: Scene, size: tuple[int, int], paths: int = 64, seed: int = 0, max_events: int | None = None
+    scene: Scene,
+    size: tuple[int, int],
+    paths: int = 64,
+    seed: int = 0,
+    max_events: int | None = None,
+    *,
+    spread: bool = False,
 ) -> tuple[Frame, Array]:
     """Path trace a scene, with multiple scattering of all lights, of the environment and of emission.
 
@@ -368,6 +374,8 @@ def path_trace(
         Of the random numbers.
     max_events : int, optional
         Light scattered more often is left out; 1 is single scattering. Default: no limit.
+    spread : bool
+        Paths begin all over each pixel, as a camera with a box filter takes it; else along the centers of pixels.
 
     Returns
     -------
@@ -401,7 +409,11 @@ def path_trace(
     ends = RayEnds(surface, width / height)
     for channels in _alike(np.concatenate([light.volume.scattering, np.stack([own.iors for own in optics], axis=1)])):
         tracer = InterfacePaths(surface, ends, optics[channels[0]], channels, max_events, rng)
-        radiance[:, channels], error[:, channels] = _estimate(tracer, rays, paths)
+        radiance[:, channels], error[:, channels] = (
+            _estimate_over_pixels(tracer, scene.camera, (width, height), paths)
+            if spread
+            else _estimate(tracer, rays, paths)
+        )
     arrays["radiance"] = radiance
     reason = (
         f"asked for: {paths} paths for each pixel, scattered {'without limit' if max_events is None else max_events}"
@@ -474,3 +486,20 @@ def _estimate(tracer: InterfacePaths, rays: Rays, paths: int) -> tuple[Array, Ar
         with np.errstate(under="ignore"):
             spread[some] = found.std(axis=1, ddof=1)
     return mean, spread / np.sqrt(paths)
+
+
+def _estimate_over_pixels(
+    tracer: InterfacePaths, camera: Camera, size: tuple[int, int], paths: int
+) -> tuple[Array, Array]:
+    """Mean (n, c) over paths that begin at random places of each pixel, and its standard error."""
+    mean, squares = np.zeros((2, size[0] * size[1], len(tracer.channels)))
+    for count in range(1, paths + 1):
+        right, down = tracer.rng.random((2, size[1], size[0])) - 0.5
+        rays = pixel_rays(camera, size, (right, down))
+        each = (np.arange(i, min(i + BENT_BATCH, len(rays))) for i in range(0, len(rays), BENT_BATCH))
+        found = np.concatenate([tracer.radiance(rays.where(some)) for some in each])
+        off = found - mean
+        mean += off / count
+        with np.errstate(under="ignore"):
+            squares += off * (found - mean)  # Welford 1962
+    return mean, np.sqrt(squares / (paths - 1) / paths)

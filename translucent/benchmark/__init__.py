@@ -1,0 +1,1 @@
+"""Benchmark of translucency that anybody can run against a renderer of theirs."""

@@ -1,0 +1,260 @@
+"""Scenes of the benchmark as files that any renderer can read: a .glb, a .json with every number, and the surroundings.
+
+All vertices are in the world, in metres; y is up. What glTF has words for is in the .glb: absorption, index of
+refraction, roughness, the camera, lights. Nested bodies, scattering, emission and the surroundings are in the .json.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array
+from translucent.benchmark.scenes import FEATURES, SCENES, BenchmarkScene
+from translucent.files.images import write_exr
+from translucent.files.paths import OutputFiles, make_folder, write_text_atomically
+from translucent.geometry.normals import corner_normals
+from translucent.gltf.write import volume_extensions
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Object, Scene
+
+#: Version of the layout of what is written.
+FORMAT = "translucent benchmark scene 1"
+
+#: Rows of a picture of all directions.
+ROWS = 64
+
+Json = dict[str, Any]
+
+#: What a stranger reads first.
+README = """The scenes of `translucent benchmark`. One folder for each:
+
+scene.glb        triangles (world, metres, y up), materials as far as glTF has words for them, camera, lights
+scene.json       every number: camera, size, lights, media (1/m), interfaces, priorities, and what the scene needs
+environment.exr  radiance from all directions, linear: row 0 is up (+y), the middle is -z, +x is to the right of it
+environment.hdr  the same
+
+Render each scene at its size and write linear Rec.709 radiance, without tone mapping, exposure or gamma, into one
+folder as NAME.exr (or NAME.npy: float32, height x width x 3, row 0 on top). The background is the environment.
+If you have thickness (metres in media along the view ray), write NAME.thickness.exr or .npy, NaN where you do not know.
+Leave out scenes that your renderer cannot do. Then: translucent benchmark score FOLDER --name "My renderer"
+"""
+
+
+def export_scenes(folder: Path, scenes: Sequence[BenchmarkScene] = SCENES) -> list[Path]:
+    """Write scenes, each into a folder of its name, and a README; returns the folders."""
+    make_folder(folder)
+    found = [export_scene(scene, folder / scene.name) for scene in scenes]
+    listed = [{"name": one.name, "title": one.title, "tests": one.tests, "needs": one.needs} for one in scenes]
+    write_text_atomically(
+        folder / "scenes.json", json.dumps({"format": FORMAT, "features": FEATURES, "scenes": listed}, indent=1)
+    )
+    write_text_atomically(folder / "README.txt", README)
+    return found
+
+
+def export_scene(scene: BenchmarkScene, folder: Path) -> Path:
+    """Write one scene into a folder."""
+    make_folder(folder)
+    made = scene.make()
+    pixels = environment_pixels(made.environment)
+    with OutputFiles() as written:
+        written.write(folder / "scene.glb", partial(_fill, glb_of(made)))
+        written.write(folder / "environment.exr", partial(_write_environment, pixels))
+        written.write(folder / "environment.hdr", partial(_fill, hdr_of(pixels)))
+        text = json.dumps(described_scene(scene, made), indent=1)
+        written.write(folder / "scene.json", partial(_fill, text.encode()))
+    return folder
+
+
+def _fill(data: bytes, path: Path) -> None:
+    path.write_bytes(data)
+
+
+def _write_environment(pixels: Array, path: Path) -> None:
+    write_exr(path, {"RGB": pixels}, {})
+
+
+def environment_pixels(environment: Environment) -> Array:
+    """(h, 2 h, 3) float32: radiance from all directions."""
+    if environment.kind == "image":
+        return np.asarray(environment.light_map.pixels, np.float32)
+    up = np.pi * (0.5 - (np.arange(ROWS) + 0.5) / ROWS)
+    around = 2 * np.pi * ((np.arange(2 * ROWS) + 0.5) / (2 * ROWS) - 0.5)
+    elevation, azimuth = (part.ravel() for part in np.meshgrid(up, around, indexing="ij"))
+    flat = np.cos(elevation)
+    directions = np.stack([flat * np.sin(azimuth), np.sin(elevation), -flat * np.cos(azimuth)], axis=-1)
+    radiance = environment.radiance(directions, np.zeros((len(directions), 2)))
+    return radiance.reshape(ROWS, 2 * ROWS, 3).astype(np.float32)
+
+
+def hdr_of(pixels: Array) -> bytes:
+    """Radiance .hdr file of linear pixels (h, w, 3), not compressed (Ward 1991)."""
+    brightest = np.maximum(pixels.max(axis=-1), 1e-32)
+    _, exponent = np.frexp(brightest)
+    scaled = pixels / np.exp2(exponent.astype(np.float64))[..., None] * 256
+    coded = np.concatenate([np.clip(scaled, 0, 255), exponent[..., None] + 128.0], axis=-1).astype(np.uint8)
+    height, width = pixels.shape[:2]
+    return f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n".encode() + coded.tobytes()
+
+
+def mean_chord(item: Object) -> float:
+    """Mean length of random straight paths through a body, 4 V / S (Cauchy), in metres: a thicknessFactor for glTF."""
+    corners = item.mesh.vertices[item.mesh.faces] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    volume = abs(float((corners[:, 0] * crosses).sum())) / 6
+    return 4 * volume / float(np.linalg.norm(crosses, axis=1).sum() / 2)
+
+
+def described_scene(scene: BenchmarkScene, made: Scene) -> Json:
+    """Contents of a scene.json."""
+    camera = made.camera
+    return {
+        "format": FORMAT,
+        "name": scene.name,
+        "title": scene.title,
+        "tests": scene.tests,
+        "needs": list(scene.needs),
+        "size": list(scene.size),
+        "thickness": scene.thickness,
+        "camera": {
+            "eye": camera.eye.tolist(),
+            "forward": camera.forward.tolist(),
+            "right": camera.right.tolist(),
+            "up": camera.up.tolist(),
+            "fov_y_degrees": camera.fov_y,
+        },
+        "environment": {
+            "image": "environment.exr",
+            "constant": np.asarray(made.environment.first).tolist() if made.environment.kind == "constant" else None,
+        },
+        "lights": [_light(light) for light in made.lights],
+        "overlap": made.overlap,
+        "objects": [_object(i, item) for i, item in enumerate(made.objects)],
+    }
+
+
+def _light(light: Any) -> Json:
+    if isinstance(light, DirectionalLight):
+        direction, irradiance = np.asarray(light.direction).tolist(), np.asarray(light.irradiance).tolist()
+        return {"type": "directional", "direction": direction, "irradiance": irradiance}
+    assert isinstance(light, PointLight)
+    position, intensity = np.asarray(light.position).tolist(), np.asarray(light.intensity).tolist()
+    return {"type": "point", "position": position, "intensity": intensity}
+
+
+def _object(number: int, item: Object) -> Json:
+    told: Json = {"node": number, "name": item.mesh.name or f"object {number}"}
+    if item.medium is None:
+        return told | {"type": "opaque", "diffuse_reflectance": np.asarray(item.base_color)[:3].tolist()}
+    medium = item.medium
+    return told | {
+        "type": "body" if item.sheet_thickness is None else "sheet",
+        "sheet_thickness": item.sheet_thickness,
+        "ior": medium.ior,
+        "roughness": 0.0 if item.surface is None else item.surface.roughness,
+        "absorption": np.asarray(medium.absorption).tolist(),
+        "scattering": np.asarray(medium.scattering).tolist(),
+        "emission": np.asarray(medium.emission).tolist(),
+        "anisotropy": float(medium.anisotropy),
+        "priority": item.priority,
+        "mean_chord": None if item.sheet_thickness is not None else mean_chord(item),
+    }
+
+
+def glb_of(made: Scene) -> bytes:
+    """Binary glTF 2.0 of a scene: each object a node of its number, with its own corners and their normals."""
+    parts: list[bytes] = []
+    views: list[Json] = []
+    accessors: list[Json] = []
+    meshes: list[Json] = []
+    materials: list[Json] = []
+
+    def add(values: npt.NDArray[np.float32], bounded: bool) -> int:
+        data = values.astype("<f4").tobytes()
+        views.append({"buffer": 0, "byteOffset": sum(map(len, parts)), "byteLength": len(data), "target": 34962})
+        parts.append(data)
+        told: Json = {"bufferView": len(views) - 1, "componentType": 5126, "count": len(values), "type": "VEC3"}
+        if bounded:
+            told |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        accessors.append(told)
+        return len(accessors) - 1
+
+    for item in made.objects:
+        corners = (item.mesh.vertices[item.mesh.faces] @ item.matrix[:3, :3].T + item.matrix[:3, 3]).astype(np.float32)
+        normals = corner_normals(item.mesh) @ np.linalg.inv(item.matrix[:3, :3])
+        normals = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-30)
+        if item.faces_inwards:
+            corners, normals = corners[:, ::-1], normals[:, ::-1]
+        attributes = {"POSITION": add(corners.reshape(-1, 3), True)}
+        attributes["NORMAL"] = add(normals.reshape(-1, 3).astype(np.float32), False)
+        meshes.append({"primitives": [{"attributes": attributes, "material": len(materials)}], "name": item.mesh.name})
+        materials.append(_gltf_material(item))
+    nodes: list[Json] = [{"mesh": i, "name": f"object_{i}"} for i in range(len(meshes))]
+    camera = made.camera
+    far = 10 * float(np.linalg.norm(made.boxes.reshape(-1, 3) - camera.eye, axis=1).max())
+    lens = {"yfov": float(np.radians(camera.fov_y or 45.0)), "aspectRatio": 1.0, "znear": far * 1e-4, "zfar": far}
+    nodes.append({"camera": 0, "name": "camera", "matrix": camera.pose.T.ravel().tolist()})
+    content: Json = {
+        "asset": {"version": "2.0", "generator": "translucent benchmark"},
+        "scene": 0,
+        "cameras": [{"type": "perspective", "perspective": lens}],
+        "meshes": meshes,
+        "materials": materials,
+        "accessors": accessors,
+        "bufferViews": views,
+    }
+    used = {name for material in materials for name in material.get("extensions", {})}
+    if made.lights:
+        lights, places = zip(*(_gltf_light(light) for light in made.lights), strict=True)
+        content["extensions"] = {"KHR_lights_punctual": {"lights": list(lights)}}
+        for i, place in enumerate(places):
+            nodes.append({"matrix": place, "extensions": {"KHR_lights_punctual": {"light": i}}})
+        used.add("KHR_lights_punctual")
+    content |= {"nodes": nodes, "scenes": [{"nodes": list(range(len(nodes)))}]}
+    if used:
+        content["extensionsUsed"] = sorted(used)
+    binary = b"".join(parts)
+    content["buffers"] = [{"byteLength": len(binary)}]
+    text = json.dumps(content, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+def _gltf_material(item: Object) -> Json:
+    if item.medium is None:
+        color = [*np.asarray(item.base_color)[:3].tolist(), 1.0]
+        return {"pbrMetallicRoughness": {"baseColorFactor": color, "metallicFactor": 0.0, "roughnessFactor": 1.0}}
+    roughness = 0.0 if item.surface is None else float(item.surface.roughness)
+    thickness = 0.0 if item.sheet_thickness is not None else mean_chord(item)
+    extensions = volume_extensions(item.medium, None, max(thickness, 1e-9), item.medium.ior)
+    return {
+        "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": roughness},
+        "extensions": extensions,
+    }
+
+
+def _gltf_light(light: Any) -> tuple[Json, list[float]]:
+    """Light of KHR_lights_punctual, and its matrix by columns: it shines along -z."""
+    strength = np.asarray(light.irradiance if isinstance(light, DirectionalLight) else light.intensity)
+    brightest = float(strength.max()) or 1.0
+    told = {"color": (strength / brightest).tolist(), "intensity": brightest}
+    if isinstance(light, PointLight):
+        place = np.eye(4)
+        place[:3, 3] = light.position
+        return {"type": "point", **told}, place.T.ravel().tolist()
+    back = -np.asarray(light.direction)
+    side = np.cross((0.0, 1.0, 0.0) if abs(back[1]) < 0.9 else (1.0, 0.0, 0.0), back)
+    side /= np.linalg.norm(side)
+    place = np.eye(4)
+    place[:3, :3] = np.stack([side, np.cross(back, side), back], axis=1)
+    return {"type": "directional", **told}, place.T.ravel().tolist()

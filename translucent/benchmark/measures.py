@@ -1,0 +1,253 @@
+"""Measures of a picture against the truth of its scene, and signs that the picture is not what it should be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.ndimage import affine_transform, uniform_filter
+
+from translucent.arrays import Array, Mask
+from translucent.bench.judgement import JUST_NOTICEABLE, lab
+from translucent.bench.truth import noise_free_square
+from translucent.benchmark.truth import TruthPicture
+from translucent.extras import require_package
+
+#: Width and height of the blocks over whose means errors are taken, in pixels.
+BLOCK = 4
+
+#: nRMSE below which a picture is near enough, so that nothing is suspected.
+NEAR = 0.06
+
+#: A picture is suspected where a change makes its error less than this part of what it was.
+SUSPICIOUS = 0.5
+
+#: Fraction of the scenes that must be suspected of one thing before it is said of all.
+MOST = 0.5
+
+#: Factors by which a picture may be zoomed, and stops by which the exposure must be off, to be suspected.
+ZOOMS = (0.5, 0.67, 0.75, 0.8, 0.9, 1.1, 1.25, 1.33, 1.5, 2.0)
+STOPS = 0.25
+
+#: Pixels of sub-pixel position that a shift must exceed: half a pixel is a matter of where centers are.
+SHIFTED = 1.5
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors of one picture.
+
+    Attributes
+    ----------
+    nrmse : float
+        Root mean square error of the radiance, freed of the truth's noise, as a fraction of the truth's mean.
+    block : float
+        The same, of means over blocks of 4 x 4 pixels: noise and edges count less, wrong light as much.
+    bias : (float, float, float)
+        Mean of each channel by the truth's, less 1.
+    flip : float
+        Mean FLIP (HDR), 0 to 1: how visible the differences are when one flips between the two pictures.
+    visible : float
+        Fraction of pixels whose color is off by more than is just noticed (2.3 in CIELAB), in means over 3 x 3.
+    own_flip, own_visible : float
+        What a perfect picture would get of both, for the truth's own noise.
+    thickness : ThicknessScore, optional
+    suspicions : tuple of str
+        What the picture seems to be instead.
+    """
+
+    nrmse: float
+    block: float
+    bias: tuple[float, float, float]
+    flip: float
+    visible: float
+    own_flip: float
+    own_visible: float
+    thickness: ThicknessScore | None = None
+    suspicions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ThicknessScore:
+    """Errors of thickness, as fractions of the largest thickness of the scene.
+
+    Attributes
+    ----------
+    median, p99, p999 : float
+        Of the absolute error, over pixels that both cover and the renderer does not mark (NaN).
+    missed : float
+        Fraction of the covered pixels where only one of the two finds a body.
+    marked : float
+        Fraction of the covered pixels that the renderer marks as not known.
+    """
+
+    median: float
+    p99: float
+    p999: float
+    missed: float
+    marked: float
+
+
+def score_picture(picture: Array, truth: TruthPicture, thickness: Array | None = None) -> Score:
+    """Errors of linear radiance (h, w, 3), and of thickness (h, w) in metres, of the size of the truth."""
+    picture = np.nan_to_num(picture.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
+    used = truth.mask
+    one, other = (half.astype(np.float64) for half in truth.halves)
+    right = truth.radiance
+    mean = max(float(right[used].mean()), 1e-12)
+    whole = _blocks(used.astype(np.float64)[..., None])[..., 0] == 1.0
+    block = math.nan
+    if whole.any():
+        parts = (_blocks(each)[whole] for each in (picture, one, other))
+        block = math.sqrt(max(noise_free_square(*parts)[0], 0.0)) / mean
+    channels = np.maximum(right[used].mean(axis=0), 1e-12)
+    red, green, blue = (picture[used].mean(axis=0) / channels - 1.0).tolist()
+    return Score(
+        nrmse=_nrmse(picture, truth),
+        block=block,
+        bias=(red, green, blue),
+        flip=flip(picture, right, used),
+        visible=_visible(picture, right, used),
+        own_flip=flip(right + 0.5 * (one - other), right, used),
+        own_visible=_visible(right + 0.5 * (one - other), right, used),
+        thickness=None if thickness is None or truth.thickness is None else score_thickness(thickness, truth.thickness),
+        suspicions=tuple(suspicions(picture, truth)),
+    )
+
+
+def _nrmse(picture: Array, truth: TruthPicture) -> float:
+    one, other = (half.astype(np.float64)[truth.mask] for half in truth.halves)
+    square, _ = noise_free_square(picture[truth.mask], one, other)
+    return math.sqrt(max(square, 0.0)) / max(0.5 * float((one + other).mean()), 1e-12)
+
+
+def _blocks(picture: Array) -> Array:
+    h, w = (side // BLOCK for side in picture.shape[:2])
+    return np.asarray(picture[: h * BLOCK, : w * BLOCK].reshape(h, BLOCK, w, BLOCK, -1).mean(axis=(1, 3)))
+
+
+def flip(picture: Array, right: Array, used: Mask) -> float:
+    """Mean FLIP of HDR pictures (Andersson et al. 2021) over some pixels; NaN where the package is not installed."""
+    try:
+        package = require_package("flip_evaluator", "FLIP")
+    except Exception:  # noqa: BLE001 - without the extra there is a page all the same, which says so
+        return math.nan
+    pair = [np.ascontiguousarray(np.clip(each, 0.0, 1e4), np.float32) for each in (right, picture)]
+    found, _, _ = package.evaluate(*pair, "HDR", inputsRGB=False, applyMagma=False, computeMeanError=False)
+    return float(np.asarray(found)[..., 0][used].mean())
+
+
+def _visible(one: Array, other: Array, used: Mask) -> float:
+    smooth = [uniform_filter(each, size=(3, 3, 0), mode="nearest") for each in (one, other)]
+    off = np.linalg.norm(lab(smooth[0]) - lab(smooth[1]), axis=-1)
+    return float((off[used] > JUST_NOTICEABLE).mean())
+
+
+def score_thickness(thickness: Array, right: Array) -> ThicknessScore:
+    """Errors of thickness (h, w) in metres; NaN marks what is not known, on either side."""
+    known = np.isfinite(right)
+    covered = known & (right > 0)
+    marked = ~np.isfinite(thickness)
+    found = np.where(marked, 0.0, thickness) > 0
+    both = covered & found
+    largest = max(float(right[covered].max()), 1e-12) if covered.any() else 1.0
+    count = max(int(covered.sum()), 1)
+    off = np.abs(thickness[both].astype(np.float64) - right[both]) / largest if both.any() else np.array([math.nan])
+    median, p99, p999 = np.quantile(off, (0.5, 0.99, 0.999)).tolist()
+    missed = float((known & ~marked & (found != covered)).sum()) / count
+    return ThicknessScore(median, p99, p999, missed, float((covered & marked).sum()) / count)
+
+
+# --- pictures that are wrong -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Suspect:
+    """A mistake that people make, and how to undo it."""
+
+    said: str
+    undo: Callable[[Array], Array]
+    within: tuple[float, float] = field(default=(-math.inf, math.inf))
+
+
+def _to_linear(picture: Array) -> Array:
+    value = np.clip(picture, 0.0, None)
+    with np.errstate(over="ignore"):
+        return np.asarray(np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4))
+
+
+def _to_srgb(picture: Array) -> Array:
+    value = np.clip(picture, 0.0, None)
+    return np.asarray(np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055))
+
+
+def _zoomed(picture: Array, factor: float) -> Array:
+    """The picture, enlarged about its center; what lies outside repeats the edge."""
+    h, w = picture.shape[:2]
+    center = np.array([(h - 1) / 2, (w - 1) / 2])
+    planes = [
+        affine_transform(picture[..., i], [1 / factor] * 2, center - center / factor, order=1, mode="nearest")
+        for i in range(picture.shape[-1])
+    ]
+    return np.stack(planes, axis=-1)
+
+
+def _moved(picture: Array, down: int, right: int) -> Array:
+    return np.roll(picture, (down, right), axis=(0, 1))
+
+
+def _best_shift(picture: Array, right: Array) -> tuple[int, int]:
+    """Shift (down, right) in whole pixels of the best correlation with the truth."""
+    one, two = (each.mean(axis=-1) - each.mean() for each in (picture, right))
+    together = np.fft.ifft2(np.fft.fft2(two) * np.conj(np.fft.fft2(one))).real
+    down, across = np.unravel_index(int(together.argmax()), together.shape)
+    h, w = together.shape
+    return int((down + h // 2) % h - h // 2), int((across + w // 2) % w - w // 2)
+
+
+_SUSPECTS = (
+    _Suspect("flipped upside down: row 0 is the top row", lambda p: p[::-1]),
+    _Suspect("mirrored left to right", lambda p: p[:, ::-1]),
+    _Suspect("turned by half a turn", lambda p: p[::-1, ::-1]),
+    _Suspect("red and blue are exchanged", lambda p: p[..., ::-1]),
+    _Suspect("sRGB-encoded, not linear: save radiance without a transfer function", _to_linear),
+    _Suspect("linearized once too often: the values were taken for sRGB and decoded", _to_srgb),
+)
+
+
+def suspicions(picture: Array, truth: TruthPicture) -> list[str]:
+    """What a picture seems to be, if undoing a usual mistake halves its error; the strongest sign alone.
+
+    Undone are flips, exchanged channels, transfer functions, a wrong exposure, a shift and a zoom (a crop).
+    """
+    before = _nrmse(picture, truth)
+    if before < NEAR:
+        return []
+    if picture.max() <= 0.0:
+        return ["black"]
+    found = [(_nrmse(one.undo(picture), truth), one.said) for one in _SUSPECTS]
+    used, right = truth.mask, truth.radiance
+    product, square = float((picture[used] * right[used]).sum()), float((picture[used] ** 2).sum())
+    if product > 0 and abs(math.log2(factor := product / square)) > STOPS:
+        how = "dark" if factor > 1 else "bright"
+        stops = abs(math.log2(factor))
+        found.append((_nrmse(factor * picture, truth), f"exposure is off: {stops:.2g} stops too {how}"))
+    down, across = _best_shift(picture, right)
+    if math.hypot(down, across) > SHIFTED:
+        said = f"shifted by {across} pixels to the right and {down} down"
+        found.append((_nrmse(_moved(picture, down, across), truth), said.replace(f"{across} ", f"{-across} ", 1)))
+    for zoom in ZOOMS:
+        how = "smaller: more is seen" if zoom > 1 else "larger: a part is seen"
+        said = f"cropped or another field of view: things are {1 / zoom:.2g} times as large, {how}"
+        found.append((_nrmse(_zoomed(picture, zoom), truth), said))
+    after, said = min(found, key=lambda one: one[0])
+    return [said] if after < SUSPICIOUS * before else []
+
+
+def common_suspicions(scores: Sequence[Score]) -> list[str]:
+    """Suspicions that hold for most scenes of a renderer, without the numbers that differ from scene to scene."""
+    suspected = [said.split(":")[0] for score in scores for said in score.suspicions]
+    wrong = sum(score.nrmse >= NEAR for score in scores)
+    return sorted({said for said in suspected if suspected.count(said) > MOST * max(wrong, 1)})
