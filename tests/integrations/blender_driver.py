@@ -370,6 +370,14 @@ def checked() -> list[Any]:
     return [sorted(empty), nothing, sorted(done), bpy.data.texts["Material check"].as_string()]
 
 
+@step
+def nodes_that_an_export_leaves_out() -> list[Any]:
+    added("cube")
+    bpy.ops.translucent.material(source="COLOR", color=(0.5, 0.25, 0.125), distance=0.02, ior=1.4)
+    done = bpy.ops.translucent.check_materials()
+    return [sorted(done), bpy.data.texts["Material check"].as_string()]
+
+
 class Layout:
     """Recorder of a panel: its settings, and its buttons with their properties."""
 
