@@ -40,7 +40,7 @@ from translucent.gpu.passes.caustics import CausticsPass
 from translucent.gpu.passes.path_trace import PathTracePass, PathTracer
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.placement import COVERAGE_FLOOR
-from translucent.gpu.resources import Resources
+from translucent.gpu.resources import MeshCache, Resources
 from translucent.gpu.shaders import before_drawing, before_making, set_uniform
 from translucent.gpu.shadow_atlas import ShadowAtlas
 from translucent.gpu.targets import SHADER_STORAGE, Targets, read_floats
@@ -207,6 +207,11 @@ class GpuRenderer:
     def diffusion(self) -> DiffusionCache:
         """Cache of solutions for the light that diffuses in bodies."""
         return self._resources.diffusion
+
+    @property
+    def meshes(self) -> MeshCache:
+        """Buffers of meshes."""
+        return self._resources.meshes
 
     @property
     def shadows(self) -> ShadowAtlas:

@@ -6,10 +6,10 @@ step takes long on a slow machine, and that after `stride`^2 of them each pixel 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import moderngl
 import numpy as np
@@ -23,8 +23,10 @@ from translucent.frames.frame import Frame
 from translucent.gpu.job import FrameJob
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import before_drawing, before_making, build_program, set_uniform
+from translucent.gpu.stand_in import StandIn
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.lens import Lens
+from translucent.scene.scene import Scene
 
 #: Strides of steps; the sides of pictures are multiples of the largest.
 STRIDES = (1, 2, 4, 8, 16)
@@ -173,6 +175,8 @@ class Viewport:
         self._screen: moderngl.Framebuffer | None = None
         self._coarse: moderngl.Framebuffer | None = None
         self._at_once = False
+        self._stand_in, self._standing = StandIn(gl, engine.meshes), False
+        self._instead: moderngl.Framebuffer | None = None
         self.size: Size = (0, 0)
 
     @property
@@ -183,6 +187,8 @@ class Viewport:
     @property
     def framebuffer(self) -> moderngl.Framebuffer:
         """Framebuffer of `texture`."""
+        if self._standing and self._instead is not None:
+            return self._instead
         chosen = self._coarse if self._at_once and self._coarse is not None else self._screen
         assert chosen is not None
         return chosen
@@ -204,7 +210,34 @@ class Viewport:
             raise
         if known is not None and known is not made:
             self._release(known)
-        self._coarse, self._at_once = made, True
+        self._coarse, self._at_once, self._standing = made, True, False
+
+    def prepare_stand_in(self, scene: Scene, tones: Iterable[str]) -> None:
+        """Have the driver compile what `stand_in` needs, by the bodies of a scene."""
+        standing = self._standing
+        for tone in tones:
+            self.stand_in(scene, (0.0, tone), whole=False)
+        self._standing = standing
+
+    def stand_in(self, scene: Scene, look: tuple[float, str], *, whole: bool) -> None:
+        """Show a picture that stands in for one of a scene until there is one; needs no program that takes long.
+
+        Parameters
+        ----------
+        scene : Scene
+        look : (float, str)
+            Exposure in stops, and the name of the tone curve.
+        whole : bool
+            The picture on show has another camera: what is around the bodies is drawn, too.
+        """
+        if self._instead is None:
+            self._rest.use()
+            picture, depth = self._gl.texture(self.size, 4), self._gl.depth_renderbuffer(self.size)
+            self._instead = self._gl.framebuffer([picture], depth)
+        self._standing, into = False, self._instead
+        under = None if whole else partial(self.draw_into, into, (0, 0, *self.size))
+        self._stand_in.draw(into, scene, look, under)
+        self._standing = True
 
     def draw_into(self, window: moderngl.Framebuffer, part: tuple[int, int, int, int]) -> None:
         """Draw the picture into a part of a window: its left and bottom, width and height in pixels."""
@@ -359,7 +392,7 @@ class Viewport:
         for name, value in values.items():
             if name in program:  # each variant uses some of them
                 set_uniform(program, name, value)
-        self._at_once = False
+        self._at_once = self._standing = False
         self.framebuffer.use()
         self._gl.enable_only(moderngl.NOTHING)
         fullscreen.render(moderngl.TRIANGLES, vertices=3)
@@ -414,6 +447,7 @@ class Viewport:
         ):
             resource.release()
         self._variants.clear()
+        self._stand_in.release()
         self._gl.detect_framebuffer(0).use()
         self._rest.color_attachments[0].release()
         self._rest.release()
@@ -424,11 +458,11 @@ class Viewport:
             if side is not None:
                 side.release()
         self._sides = [None, None]
-        for picture in (self._coarse, self._screen):
+        for picture in (self._coarse, self._screen, self._instead):
             if picture is not None:
                 self._release(picture)
-        self._coarse = self._screen = None
-        self._at_once = False
+        self._coarse = self._screen = self._instead = None
+        self._at_once = self._standing = False
         self.size = (0, 0)
 
     def _make_coarse(self, size: Size, factor: float) -> moderngl.Framebuffer:
@@ -441,6 +475,8 @@ class Viewport:
     def _release(self, picture: moderngl.Framebuffer) -> None:
         self._rest.use()
         picture.color_attachments[0].release()
+        if picture.depth_attachment is not None:
+            picture.depth_attachment.release()
         picture.release()
 
     def _side(self, number: int, size: Size) -> Side:

@@ -8,6 +8,9 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
+from translucent.arrays import Array
 from translucent.assets import newest_shader
 from translucent.errors import InputError, TranslucentError
 from translucent.geometry.normals import drawn_normals
@@ -44,6 +47,7 @@ from translucent.renderer import Renderer
 from translucent.scene.lens import Lens
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import filled, with_roughness
+from translucent.scene.stages import STAGED_TONE
 
 #: Largest time of a step in seconds, where the rest of the window takes little.
 BUDGET = 0.045
@@ -122,6 +126,7 @@ class ViewportRenderer:
         self._strides = Strides(self._times)
         self.quality, self.other_quality = (InteractiveQuality(traced_at_once=compiler is None) for _ in range(2))
         self._lens: Lens | None = None
+        self._seen_from: Array | None = None  # pose of the camera of the picture on show
         self.paths, self.photons = PathRefinement(), PhotonRefinement()
         self._watched, self._newest = time.monotonic(), newest_shader()
 
@@ -260,6 +265,7 @@ class ViewportRenderer:
                 self._rendered = ()  # the same again: what has been made is for pictures of this size
             raise
         self._finish(0, plan, factor, begun)
+        self._seen_from = scene.camera.pose
         self.state = "moving" if factor == 1.0 else f"moving, {1 / factor:.0%} of the resolution"
         if request.interfaces is not self.quality.request.interfaces:
             self.simpler = "Rough reflections while the picture moves"
@@ -334,6 +340,7 @@ class ViewportRenderer:
             self._begun = True
             workspace.prepare()
             if self._compiler is not None:
+                self.viewport.prepare_stand_in(scene, {STAGED_TONE, tone_of(workspace.document.look, scene)})
                 self._compiler.begin(self._drawn_plans, partial(self._take_compiled, workspace))
 
     def foresee(self, workspace: Workspace) -> None:
@@ -362,7 +369,7 @@ class ViewportRenderer:
         assert compiler is not None
         assert isinstance(scene, Scene)
         self._postponed, self._rendered = target, ()
-        self.state = "preparing the new picture: this is the last one"
+        self._stand_in(workspace, scene)
         if self._requested is not None and self._requested.cancelled:
             # The user does not wait, so that the window does the work.
             self._requested = None
@@ -372,6 +379,18 @@ class ViewportRenderer:
         elif compiler.lane.task is None or not compiler.lane.task.name:  # work that nobody waits for is replaced
             then = partial(self._take_compiled, workspace, missing=program)
             self._requested = compiler.request("preparing the picture", self._drawn_plans, then)
+
+    def _stand_in(self, workspace: Workspace, scene: Scene) -> None:
+        """Show what looks like the materials of a scene meanwhile, or where no picture is on show, the last one."""
+        display, look = workspace.document.display, workspace.document.look
+        self.state = "preparing the new picture: this is the last one"
+        if display.mode != "picture" or display.compare != "off" or workspace.shown_bake is not None:
+            return
+        with self.current():
+            moved = self._seen_from is not None and not np.array_equal(self._seen_from, scene.camera.pose)
+            self.viewport.stand_in(scene, (look.exposure, tone_of(look, scene)), whole=moved)
+        self.presenter.shown = ()
+        self.state = "preparing the new picture: a stand-in"
 
     def _take_compiled(self, workspace: Workspace, found: Compiled, missing: ProgramName | None = None) -> None:
         """Let the context build the programs found, and the one that was `missing`, even if it was not."""
