@@ -225,7 +225,7 @@ def test_the_camera_is_one_in_both_directions(view: Any, scene: tl.Scene) -> Non
         ("distance", 0, "distance 0; not above 0 and finite"),
         ("color", "#12", "color '#12'"),
         ("color", (2, 0, 0), "a channel is not in 0..1"),
-        ("preset", "wax", "preset 'wax' in a view; it scatters or glows"),
+        ("preset", "wax", "preset 'wax' in a view; it scatters or emits"),
         ("preset", "vine", "vine"),
         ("medium", 1, "medium 1; the scene has 1"),
     ],

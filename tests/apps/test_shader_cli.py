@@ -108,7 +108,19 @@ def test_bad_usage_is_one_line(run: Run, arguments: list[str], message: str) -> 
 
 
 def test_values_that_a_shader_refuses_are_told_in_its_words(run: Run) -> None:
-    given = ["INTERFACES", "EMISSION", "MARCH", "PRIORITY", "SCATTER", "SLOTS", "UNION", "VARIES", "GRADIENT", "OPAQUE"]
+    given = [
+        "INTERFACES",
+        "EMISSION",
+        "MARCH",
+        "PRIORITY",
+        "SCATTER",
+        "SLOTS",
+        "UNION",
+        "VARIES",
+        "GRADIENT",
+        "OPAQUE",
+        "SCATTERS_AGAIN",
+    ]
     options = [word for key in given for word in ("--define", f"{key}=0")]
     assert "a walk needs a slot; give other values" in one_error_line(run("fragment_lists_resolve", *options))
     options[options.index("SLOTS=0")] = "SLOTS=2"
