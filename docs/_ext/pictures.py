@@ -22,7 +22,7 @@ LINK = """
 
 .. raw:: html
 
-   <p><a class="turn" href="{folder}/{name}.html">Turn it around</a> (1 MB; runs in the browser)</p>
+   <p><a class="turn" href="{folder}/{name}.html">Turn it around</a> ({megabytes:.1f} MB; runs in the browser)</p>
 
 """
 
@@ -44,8 +44,9 @@ def new_pictures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str,
         return figure
     folder = Path(block_vars["target_file"]).parent / LIVE
     folder.mkdir(exist_ok=True)
-    tl.write_page(scene, folder / f"{example.stem}.html", size=(960, 720), name=example.stem)
-    return figure + LINK.format(folder=LIVE, name=example.stem)
+    page = folder / f"{example.stem}.html"
+    tl.write_page(scene, page, size=(960, 720), name=example.stem)
+    return figure + LINK.format(folder=LIVE, name=example.stem, megabytes=page.stat().st_size / 1e6)
 
 
 def copy_live(app: Sphinx, exception: Exception | None) -> None:

@@ -172,7 +172,7 @@ def _traffic(scene: Scene, chosen: RenderPlan) -> FrameTraffic:
 @click.command(epilog="Example: translucent doctor")
 @common_options
 def doctor(as_json: bool) -> None:
-    """Explain this machine: OpenGL, packages, and what is missing for what."""
+    """Explain this machine: its OpenGL, its packages, and what each missing one is needed for."""
     from translucent import doctor as examination
 
     facts = examination.examine()

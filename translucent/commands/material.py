@@ -102,7 +102,7 @@ class ApplyOptions:
         is_flag=False,
         flag_value="scatter",
         type=click.Choice(["scatter", "volume-scatter"]),
-        help="Write scattering, too, by a draft: KHR_materials_scatter, or KHR_materials_volume_scatter.",
+        help="Write scattering as well, by a draft extension: KHR_materials_scatter or KHR_materials_volume_scatter.",
     )
     overwrite: bool = overwrite_option()
     allow_outside: bool = outside_option()
