@@ -175,7 +175,6 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     --color, --preset or --scattering-color replaces the media. All other files are one mesh.
 
     Several models, each with its material: translucent render goblet:crystal wine:red_wine -o wine.png
-
     A medium behind an --object is for the object of that name: --object Wine --preset merlot.
     """
     import translucent as tl
