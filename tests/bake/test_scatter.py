@@ -277,7 +277,7 @@ def test_bodies_in_which_light_cannot_diffuse() -> None:
     with pytest.raises(tl.InputError, match="its mesh is not closed; give a closed mesh"):
         tl.bake_scatter(tl.Mesh(BALL.vertices, BALL.faces[3:], name="open"), wax)
     sheet = trimesh.creation.box((1.0, 1.0, 1e-4))
-    with pytest.raises(tl.InputError, match="thinner than a cell everywhere"):
+    with pytest.raises(tl.InputError, match=r"thinner than 0\.25 cells everywhere"):
         tl.bake_vertex_scatter(tl.Mesh(sheet.vertices, sheet.faces), wax)
     with pytest.raises(tl.InputError, match="its medium emits"):
         tl.bake_scatter(BALL, tl.Medium(scattering=50.0, emission=1.0))

@@ -24,7 +24,7 @@ WAX = tl.Medium(absorption=0.1, scattering=5.0, ior=1.4)
 LIT = [tl.PointLight((0, 0, 5), (1, 1, 1))]
 INSIDE_OUT = tl.Mesh(BOX.vertices, BOX.faces[:, ::-1], name="inside out")
 THIN = tl.Mesh(
-    *(getattr(Box((0, 0, 0), (1, 1, 0.004)).tessellate(), part) for part in ("vertices", "faces")), name="thin"
+    *(getattr(Box((0, 0, 0), (1, 1, 0.001)).tessellate(), part) for part in ("vertices", "faces")), name="thin"
 )
 DENSE = tl.Medium(scattering=500.0)  # more than a mean free path across a cell
 VARYING = tl.LinearDensity(0.0, 0.5, 1.0)
@@ -46,7 +46,10 @@ def test_light_diffuses_in_closed_bodies_with_an_interface(lights: list[tl.Point
     [
         (body(WAX, OPEN), "its mesh is not closed"),
         (body(WAX, INSIDE_OUT), "its mesh is inside out"),
-        (body(tl.Medium(scattering=5e3, ior=1.4), THIN), "it is thinner than a cell everywhere, 0.0079 m at this"),
+        (
+            body(tl.Medium(scattering=5e3, ior=1.4), THIN),
+            "it is thinner than 0.25 cells everywhere, of 0.005 m at this",
+        ),
     ],
     ids=["open", "inside out", "thin"],
 )
@@ -63,12 +66,12 @@ def test_bodies_in_which_light_cannot_diffuse_are_layers(what: tl.Object, why: s
 
 
 def test_smaller_cells_let_light_diffuse_in_thinner_bodies() -> None:
-    """A slab 16 mm thick: cells are 20 mm wide, and 10 mm at twice the resolution."""
-    slab = Box((0, 0, 0), (1, 1, 0.016)).tessellate()
+    """A slab 2 mm thick: cells are 10 mm wide, and 5 mm at twice the resolution."""
+    slab = Box((0, 0, 0), (1, 1, 0.002)).tessellate()
     medium = tl.Medium(scattering=5e3, ior=1.4)
-    assert tl.Diffusion(20).cell_size(body(medium, slab)) == pytest.approx(0.02)
-    # Its mean thickness is 2 V / A = 0.032 / 2.064 m.
-    assert body(medium, slab).mean_thickness == pytest.approx(0.032 / 2.064)
+    assert tl.Diffusion(20).cell_size(body(medium, slab)) == pytest.approx(0.01)
+    # Its mean thickness is 2 V / A = 0.004 / 2.008 m.
+    assert body(medium, slab).mean_thickness == pytest.approx(0.004 / 2.008)
     for resolution, diffused in ((20, ()), (40, (0,))):
         found = plan(scene(body(medium, slab)), scattering=tl.Diffusion(resolution))
         assert found.treated(Treatment.DIFFUSION) == diffused

@@ -17,6 +17,7 @@ import numpy as np
 from translucent.arrays import Array, Floats, Integers
 from translucent.diffusion.densities import Densities
 from translucent.diffusion.grid import BodyGrid, box_points
+from translucent.diffusion.walls import SlabSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
     diffuse_interface,
@@ -124,6 +125,10 @@ class LayerSolution:
         u = even + condition * rise
         u = np.maximum(u + spread * slope, LEAST_LEFT * u)
         return cls(depth, attenuation, condition, spread, scale, even, rise, u, slope)
+
+    def bend(self) -> Array:
+        """(cosh(k d) - 1) / k^2 at the depth of reading, d^2 / 2 where nothing is absorbed."""
+        return np.asarray(0.5 * (self.depth * optics.mean_transmittance(self.attenuation * self.depth)) ** 2)
 
     def events(self, samples: Integers, rate: Array) -> tuple[Array, Array]:
         """Effects of first events above the depth of reading, where light decays with the depth at a rate (k,) in 1/m.
@@ -241,6 +246,8 @@ class Events:
         Fraction that comes to an opaque inclusion, unscattered.
     counted : (k,) float64
         Fraction that is scattered or absorbed in all, as cells count it.
+    slab : tuple of two (k,) float64
+        Fluence at the surface and across, in walls, see `SlabSolution`.
     """
 
     near: Array
@@ -248,6 +255,7 @@ class Events:
     below: list[tuple[Integers, Array]]
     reached: Array
     counted: Array
+    slab: tuple[Array, Array]
 
     def scaled(self, factor: float) -> Events:
         """More events, or fewer, by a factor."""
@@ -278,6 +286,8 @@ class FirstEvents:
     phase : PhaseFunction
     chord : float
         Mean chord of the body in m, weighted by the density.
+    slab : SlabSolution, optional
+        Of walls, if there are any.
     """
 
     def __init__(
@@ -289,8 +299,10 @@ class FirstEvents:
         scattering: float,
         phase: PhaseFunction,
         chord: float,
+        slab: SlabSolution | None = None,
     ) -> None:
         self._grid, self._layer, self._ior, self._phase = grid, layer, ior, phase
+        self._slab = slab
         self._extinction = absorption + scattering
         self._albedo = scattering / self._extinction
         self._d = float(diffusion_coefficient(absorption, scattering))
@@ -315,6 +327,7 @@ class FirstEvents:
             fewer = straight / (1.0 + STRAIGHT)
             less_near, less_above = layer.events(paths.samples, (1.0 + STRAIGHT) * rate)
             near, above = near - fewer * less_near, above - fewer * less_above
+        slab = (near, near) if self._slab is None else self._slab.events(paths.samples, cosine)
         slant = layer.depth[paths.samples] / cosine
         below, deep = optics.transmittance(extinction * slant), []
         counted = 1.0 - below
@@ -334,7 +347,7 @@ class FirstEvents:
             deep.append((cell, weight))
         # As if the density was even up to there.
         reached = optics.transmittance(np.where(np.isfinite(paths.limit), extinction * paths.limit, np.inf))
-        return Events(self._albedo * near / self._d - excess, self._albedo * above, deep, reached, counted)
+        return Events(self._albedo * near / self._d - excess, self._albedo * above, deep, reached, counted, slab)
 
 
 @lru_cache(maxsize=16)

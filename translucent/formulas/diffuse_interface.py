@@ -121,7 +121,7 @@ def diffuse_interface(ior: float, roughness: float = 0.0) -> DiffuseInterface:
     roughness : float
         Square root of the GGX alpha, 0 to 1.
     """
-    cosine, weight = _nodes(ior)
+    cosine, weight = interface_nodes(ior)
     outside, outside_weight = _gauss()
     entered = 1.0 - optics.fresnel_dielectric(outside, ior)
     flux = 2.0 * outside * outside_weight * entered
@@ -147,7 +147,7 @@ def exit_quadrature(ior: float) -> tuple[Array, Array]:
 
     The Gaussian quadrature for what the interface lets through: exact for polynomials of up to the fifth degree.
     """
-    cosine, weight = _nodes(ior)
+    cosine, weight = interface_nodes(ior)
     passed = 0.5 * cosine * weight * (1.0 - _inside_reflectance(cosine, ior))
     # Three steps of Lanczos for the polynomials that are orthogonal under this weight (Golub & Welsch 1969).
     before, now = np.zeros_like(cosine), np.sqrt(passed / passed.sum())
@@ -205,11 +205,11 @@ def _half_space(albedo: float, ior: float, phase: PhaseFunction) -> tuple[Array,
     linear system on a quadrature.
     """
     if phase == ISOTROPIC:
-        cosine, weight = _nodes(ior)
+        cosine, weight = interface_nodes(ior)
         h = _chandrasekhar_h(albedo, cosine, weight)
         bare = 0.5 * albedo * np.outer(h, h * cosine * weight) / (cosine[:, None] + cosine)
     else:
-        cosine, weight = _nodes(ior, MODE_NODES)
+        cosine, weight = interface_nodes(ior, MODE_NODES)
         bare = bare_half_space(albedo, phase, cosine, weight, 2 * MODE_NODES)
     mirrored, flux = _inside_reflectance(cosine, ior), cosine * weight
     # The transposed system: what leaves for each radiance that goes up for the first time.
@@ -237,7 +237,7 @@ def _chandrasekhar_h(albedo: float, cosine: Array, weight: Array) -> Array:
 
 
 def _inside_reflectance(cosine: Array, ior: float) -> Array:
-    """Fresnel's reflectance of light from inside, at the nodes of `_nodes`."""
+    """Fresnel's reflectance of light from inside, at the nodes of `interface_nodes`."""
     return optics.fresnel_dielectric(cosine, 1.0 / ior) if ior > 1.0 else np.zeros_like(cosine)
 
 
@@ -248,7 +248,7 @@ def _gauss(number: int = NODES) -> tuple[Array, Array]:
     return 0.5 * (x + 1.0), 0.5 * weight
 
 
-def _nodes(ior: float, number: int = NODES) -> tuple[Array, Array]:
+def interface_nodes(ior: float, number: int = NODES) -> tuple[Array, Array]:
     """Nodes and weights for cosines inside, apart on both sides of the critical one."""
     x, weight = _gauss(number)
     if ior == 1.0:

@@ -281,7 +281,7 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
     if bodies := [body for body in scene.bodies if treatment_of(body) is Treatment.DIFFUSION]:
         text = (
             f"{object_names(bodies)}: light of the environment that other bodies scatter onto them, and details that "
-            "are smaller than a cell: thin walls, leaves and edges are up to 15 % dark"
+            "are smaller than a cell: spikes and edges are up to 15 % dark"
         )
         if any(body.medium is not None and body.medium.emits for body in bodies):
             text += "; light that they emit and scatter is up to 10 % dark"

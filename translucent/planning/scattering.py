@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from translucent.arguments import brief, checked
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.media.medium import Medium
 from translucent.planning.bodies import MAX_SLOTS, medium_slots
@@ -43,6 +44,9 @@ LEAST_RESOLUTION, MOST_RESOLUTION = 8, 128
 #: Resolution from which on solutions are corrected by uniform light. At 12, pixels of milk, jade and wax in bear and
 #: candle change by less than 0.5 of 255 by that, and are 0.5 to 5.6 off those at 32.
 LEAST_CORRECTED = 16
+
+#: Thickness in cells, everywhere, of the thinnest bodies in which light diffuses: as slabs.
+LEAST_WALL = 0.25
 
 #: Cells in the bounds of a body, most of them empty; each takes about 150 bytes.
 MOST_IN_BOX = 2_000_000
@@ -97,19 +101,28 @@ class Diffusion(Scattering):
         return float(np.cbrt(4.0 * volume) / self.resolution)
 
     def refusal(self, body: Object) -> str | None:
-        """Reason: no closed solid wound outwards, or thinner than a cell everywhere."""
+        """Reason: no closed solid wound outwards, or much thinner than a cell everywhere."""
         if body.sheet_thickness is not None:
             return "it is a sheet"
         if not body.mesh.diagnosis.sound:
             return "its mesh is not closed"
         if not body.mesh.volume > 0.0:
             return "its mesh is inside out"
-        extent = np.asarray(body.bounds[1]) - np.asarray(body.bounds[0])
-        if (box := float(np.prod(extent / self.cell_size(body) + 2.0))) > MOST_IN_BOX:
-            return f"its bounds, nearly empty, would hold {box:.2g} cells of {self.cell_size(body):.2g} m"
-        if body.mean_thickness < self.cell_size(body):
-            return f"it is thinner than a cell everywhere, {self.cell_size(body):.2g} m at this resolution"
+        step = self.cell_size(body)
+        if (box := float(np.prod(_own_extent(body) / step + 2.0))) > MOST_IN_BOX:
+            return f"its bounds, nearly empty, would hold {box:.2g} cells of {step:.2g} m"
+        # Rays that gather light on their path find it in cells alone.
+        least = 1.0 if body.density is not None or (body.medium is not None and _is_volume(body, self)) else LEAST_WALL
+        if body.mean_thickness < least * step:
+            return f"it is thinner than {least:g} cells everywhere, of {step:.2g} m at this resolution"
         return None
+
+
+def _own_extent(body: Object) -> Array:
+    """(3,): sides in metres of the bounds of a body in its own frame, in which its grid is: without its rotation."""
+    linear = body.matrix[:3, :3]
+    _, sizes, axes = np.linalg.svd(linear)
+    return np.asarray(np.ptp(body.mesh.vertices @ (axes.T * sizes) @ axes, axis=0))
 
 
 @dataclass(frozen=True)
