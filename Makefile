@@ -30,10 +30,13 @@ demo: ## render a few pictures into out/, and build what runs in browsers where 
 
 # One thread of the BLAS in each: more would wait for one another. Bytecode is kept whatever the shell says: tests start
 # Python dozens of times, and pytest keeps the asserts that it rewrites.
+# glibc keeps the memory of freed arrays: else it goes back to the system, which clears it anew for each of the next ones.
 test: ## run the tests, in two processes
 	$(BOOTSTRAP) --group test
 	@$(BIN)/python tools/build_web.py --if-npm
-	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
+	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= \
+	GLIBC_TUNABLES=glibc.malloc.mmap_threshold=33554432:glibc.malloc.trim_threshold=268435456 \
+	$(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
 
 test-drivers: ## run the tests of rendering on every OpenGL driver that is here: it takes long, see docs/drivers.md
 	$(BOOTSTRAP) --group test

@@ -23,6 +23,8 @@ import translucent as tl
 from tests.command_line import Result, Run
 from translucent.bake import batch
 from translucent.cli import main
+from translucent.planning.caustics import Caustics
+from translucent.planning.scattering import Diffusion
 from translucent.planning.shadow_maps import ShadowMaps
 from translucent.scene import stages
 
@@ -81,8 +83,18 @@ def uninstalled(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 @pytest.fixture
 def few_shadows(monkeypatch: pytest.MonkeyPatch) -> None:
     """Maps of shadows of 128 texels a side, where no size is stated, and of 8 directions on stages."""
-    monkeypatch.setattr(ShadowMaps.__init__, "__defaults__", (128, None))
+    # What `checked` has wrapped: the wrapper has no defaults.
+    monkeypatch.setattr(ShadowMaps.__init__.__wrapped__, "__defaults__", (128, None))  # type: ignore[attr-defined]
     monkeypatch.setattr(stages, "ENVIRONMENT_SHADOWS", 8)
+    assert ShadowMaps().size == 128
+
+
+@pytest.fixture
+def coarse_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cells of a 12th of a body for light that diffuses, and 20,000 photons, where no numbers are stated."""
+    monkeypatch.setattr(Diffusion.__init__.__wrapped__, "__defaults__", (12,))  # type: ignore[attr-defined]
+    monkeypatch.setattr(Caustics.__init__.__wrapped__, "__defaults__", (20_000, 0))  # type: ignore[attr-defined]
+    assert (Diffusion().resolution, Caustics().photons) == (12, 20_000)
 
 
 @pytest.fixture

@@ -299,7 +299,7 @@ def _loaded(
             scene = load_gltf(path, f"{scale * metres_per_unit(stated or 'm')!r}m", allow_outside=allow_outside)
         if medium is not None:
             scene = filled(scene, medium)
-        objects = list(scene.objects)
+        objects = [replace(item, priority=0) for item in scene.objects]  # among all parts, each has one later
     else:
         if sizes:
             mesh = load_mesh(mesh_path(path) if own else path, None, allow_outside=allow_outside, **sizes)

@@ -24,9 +24,14 @@ NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 
 @pytest.fixture(autouse=True)
 def small(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_tmp_path: Path, few_shadows: None, renderer: tl.Renderer
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    in_tmp_path: Path,
+    few_shadows: None,
+    coarse_light: None,
+    renderer: tl.Renderer,
 ) -> None:
-    """Little pictures, with few shadows, by the one renderer that all tests share."""
+    """Little pictures, with few shadows and coarse light, by the one renderer that all tests share."""
     monkeypatch.setenv("EXAMPLE_WIDTH", "48")
     monkeypatch.setattr(tl, "Renderer", lambda: nullcontext(renderer))
 

@@ -74,11 +74,11 @@ def test_damaged_files_are_read_or_refused(tmp_path: Path, monkeypatch: pytest.M
     try:
         kept = tmp_path / "kept"
         kept.mkdir()
-        tally = fuzzer.fuzz(fuzzer.readers(tmp_path), 180, 7, tmp_path, kept)
+        tally = fuzzer.fuzz(fuzzer.readers(tmp_path), 60, 7, tmp_path, kept)
     finally:
         for name in ("fuzz_readers", "fuzz_seeds"):
             sys.modules.pop(name, None)
     assert tally.faults == []
-    assert re.match("180 runs: .* 0 faults", str(tally))
-    assert tally.read > 10
-    assert tally.refused > 100
+    assert re.match("60 runs: .* 0 faults", str(tally))
+    assert tally.read > 3
+    assert tally.refused > 33

@@ -18,6 +18,8 @@ from translucent.preview.exports import Recipe, command_line, python_code
 from translucent.preview.scenes import first_orbit, load, scene_of, stage_name
 from translucent.scene.touching import with_priorities
 
+pytestmark = pytest.mark.usefixtures("few_shadows")
+
 TEXT = "goblet:crystal wine:#7b1e3a@1cm"
 
 

@@ -153,9 +153,9 @@ def test_what_is_closed_by_itself_is_a_body_of_its_own(tmp_path: Path) -> None:
     assert [result.values.max() for result in results.values()] == pytest.approx([2, 2, 1])
 
 
-@pytest.mark.parametrize("scale", [[0.01, 0.01, 0.01], [-0.01, 0.01, 0.01]], ids=["small", "mirrored"])
-def test_maps_are_in_metres_of_the_scene(scale: list[float], vase: Vase, run: Run, tmp_path: Path) -> None:
-    model = vase(*lit("A", "B"), scale=scale, translation=[5, 0, 0])
+def test_maps_are_in_metres_of_the_scene(vase: Vase, run: Run, tmp_path: Path) -> None:
+    """Small ones, and mirrored."""
+    model = vase(*lit("A", "B"), scale=[-0.01, 0.01, 0.01], translation=[5, 0, 0])
     assert run(model, "-o", tmp_path / "t.npy", *QUICK, "--check").code == 0
     for primitive, name in enumerate("AB"):
         found = values_on(model, primitive, np.load(tmp_path / f"t-{name}.npy"))

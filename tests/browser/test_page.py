@@ -171,14 +171,18 @@ def test_an_absorber_that_scatters_a_little_has_its_thickness(
     """Pages follow no light into media: what little is scattered is left out and told, and nothing is invalid."""
     merlot = tl.preset("merlot")
     assert merlot.medium.scatters
-    scene = scene_of(ball(merlot.medium), lights=[tl.DirectionalLight((-0.4, -1, -0.3), 2.0)])
+    scene = scene_of(
+        ball(merlot.medium, transform=np.diag((0.5, 0.5, 0.5, 1.0))),
+        lights=[tl.DirectionalLight((-0.4, -1, -0.3), 2.0)],
+    )
     opened(web_page, scene, tmp_path, tools)
     page = web_page.page
     page.evaluate("async () => { window.viewer = await translucent; }")
     # The picture may move once more as the page finds its size: until it is still there is nothing to read.
     found = page.wait_for_function("() => viewer.probe(0.5, 0.5)").json_value()
     assert found["valid"]
-    assert found["thickness"] == pytest.approx(0.04, rel=2e-3)
+    # On slow machines pixels are as large as a tenth of it.
+    assert found["thickness"] == pytest.approx(0.02, rel=0.04)
     assert found["transmittance"] == pytest.approx(merlot.medium.transmittance(found["thickness"]), rel=1e-4)
     notes = page.locator(".notes li").all_text_contents()
     assert any("scattered in 'ball.ply'" in note for note in notes)

@@ -89,8 +89,8 @@ def test_scanned_and_made_meshes(name: str, assets: Path) -> None:
 @pytest.mark.parametrize("path", sorted(MESHES.glob("*.ply")), ids=lambda path: path.stem)
 def test_meshes_of_the_project(path: Path) -> None:
     mesh = tl.load_mesh(path)
-    for camera in cameras(mesh, (24, 24)).values():
-        assert len(assert_as_reference(mesh, camera, (24, 24)).pixel)
+    for camera in cameras(mesh, (16, 16)).values():
+        assert len(assert_as_reference(mesh, camera, (16, 16)).pixel)
 
 
 def lattice_camera(size: int, span: float) -> tl.Camera:
@@ -194,8 +194,8 @@ def test_transforms(kind: str) -> None:
 def test_any_unit(scale: float) -> None:
     sphere = Sphere().tessellate(24)
     mesh = tl.Mesh(scale * sphere.vertices, sphere.faces)
-    for camera in cameras(mesh, (24, 24)).values():
-        assert len(assert_as_reference(mesh, camera, (24, 24)).pixel)
+    for camera in cameras(mesh, (16, 16)).values():
+        assert len(assert_as_reference(mesh, camera, (16, 16)).pixel)
 
 
 @settings(max_examples=60)

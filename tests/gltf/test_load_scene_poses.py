@@ -262,3 +262,23 @@ def test_broken_mappings_are_refused(tmp_path: Path, mappings: Any) -> None:
     primitive["extensions"]["KHR_materials_variants"]["mappings"] = mappings
     with pytest.raises(tl.InputError):
         load(writer, tmp_path, variant="Red")
+
+
+def test_a_liquid_in_its_glass_has_a_priority_and_the_file_that_has_one_body_none(tmp_path: Path) -> None:
+    """The glass has the space that both claim; a part of another scene has none of its own."""
+    writer = Writer()
+    crystal = writer.material(extensions=glass(ior=1.5, attenuationColor=[0.9, 0.9, 0.9], attenuationDistance=1.0))
+    wine = writer.material(extensions=WINE)
+    for name, material, x in (("Glass", crystal, 0.0), ("Wine", wine, 1.5)):
+        index = writer.mesh(writer.primitive(material=material))
+        writer.add("nodes", mesh=index, name=name, translation=[x, 0.0, 0.0])
+    scene = load(writer, tmp_path)
+    assert scene.overlap == "priority"
+    assert [item.mesh.name for item in sorted(scene.objects, key=lambda item: item.priority)] == ["Wine", "Glass"]
+    assert scene.remarks[0].startswith("where bodies touch, Glass displaces Wine")
+    (tmp_path / "scene.toml").write_text(f'[[object]]\nmodel = "{tmp_path / "model.glb"}"\n')
+    composed = tl.load_scene(tmp_path / "scene.toml")
+    assert composed.overlap == "priority"
+    del writer.tree["nodes"][1]
+    alone = load(writer, tmp_path)
+    assert (alone.overlap, alone.remarks, alone.objects[0].priority) == ("add", (), 0)

@@ -12,7 +12,7 @@ from tests.scans import scan
 from tests.solids import Box
 from translucent.frames.metrics import interior
 
-SIZE = (256, 256)
+SIZE = (160, 160)
 ABSORBING = tl.Medium(absorption=1.0)
 SCANS = ["bunny.obj", "armadillo.obj", "quadknot.obj", "mengerSponge3.glb"]
 

@@ -11,7 +11,7 @@ import translucent as tl
 from translucent.assets import mesh_path
 from translucent.frames.appearance import average_color, medium_for_average_color, thickness_samples
 
-SIZE = (160, 120)
+SIZE = (96, 72)
 
 
 def _check(renderer: tl.Renderer, mesh: tl.Mesh, color: str | tuple[float, ...]) -> None:

@@ -156,13 +156,12 @@ PAIRS = {
         ),
         0.05,
     ),
-    "rough": (scene(ball(TINTED, mesh=COARSE, surface=tl.Surface(roughness=0.4)), GROUND, light=LAMP), 0.01),
     "film and coat": (scene(ball(CLEAR, mesh=COARSE, surface=FILM_AND_COAT), GROUND, light=SUN), 0.01),
-    "sphere light": (scene(ball(CLEAR, mesh=COARSE), GROUND, light=tl.SphereLight((1.5, 6, 1), 20.0, 0.6)), 0.01),
     "rough film and coat": (
-        scene(ball(CLEAR, mesh=COARSE, surface=replace(FILM_AND_COAT, roughness=0.4)), GROUND, light=SUN),
+        scene(ball(TINTED, mesh=COARSE, surface=replace(FILM_AND_COAT, roughness=0.4)), GROUND, light=LAMP),
         0.01,
     ),
+    "sphere light": (scene(ball(CLEAR, mesh=COARSE), GROUND, light=tl.SphereLight((1.5, 6, 1), 20.0, 0.6)), 0.01),
     "dispersive": (scene(ball(CLEAR, mesh=COARSE, surface=tl.Surface(dispersion=2.0)), GROUND, light=SUN), 0.01),
 }
 

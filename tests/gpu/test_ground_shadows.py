@@ -20,7 +20,7 @@ MATTE = tl.Surface(color=(1.0, 1.0, 1.0), ior=1.0, roughness=1.0, double_sided=F
 GROUND = tl.Object(tl.Mesh(CORNERS, [(0, 2, 1), (0, 3, 2)], name="ground"), surface=MATTE, shadow_catcher=True)
 #: Looks straight down onto 6 m of the ground.
 ABOVE = tl.Camera.orthographic((0, 9, 0), (0, 0, 0), up=(0, 0, -1), height=6.0)
-SIZE = (120, 120)
+SIZE = (80, 80)
 
 
 def light_left(renderer: tl.Renderer, mesh: tl.Mesh, *, directions: int = 256, **options: Any) -> tuple[Array, Array]:

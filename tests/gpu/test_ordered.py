@@ -21,7 +21,7 @@ from translucent.gpu.constants import PEEL_BATCH
 from translucent.gpu.pass_costs import PassTimer
 from translucent.gpu.targets import Storage
 
-SIZE = (160, 120)
+SIZE = (112, 84)
 #: For pictures in which a pixel of that size would see past an edge without its neighbors telling.
 FINE = (320, 240)
 METHODS = {
@@ -77,7 +77,7 @@ def assert_equal_to_reference(renderer: tl.Renderer, scene: tl.Scene, size: tupl
 @pytest.mark.parametrize("name", ["bunny.obj", "armadillo.obj", "mengerSponge3.glb"])
 def test_scans_equal_the_reference(renderer: tl.Renderer, assets: Path, name: str, method: Any) -> None:
     mesh = scan(assets / "meshes_clean" / name)
-    size = (256, 256)
+    size = (160, 160)
     scene = tl.Scene(
         [tl.Object(mesh, tl.Medium(absorption=1.0 / mesh.diagonal))], tl.Camera.framing(mesh.vertices, size)
     )
@@ -166,10 +166,11 @@ def test_two_bodies_that_share_a_face_neither_leak_nor_flicker(renderer: tl.Rend
     turn = trimesh.transformations.rotation_matrix(0.7, (1, 2, 3))
     objects = [tl.Object(low, AMBER, turn, priority=1), tl.Object(high, AZURE, turn)]
     scene = tl.Scene(objects, tl.Camera.look_at((1, 2, 5), (0, 0, 0)), overlap=policy)
-    frame = assert_equal_to_reference(renderer, scene, SIZE, method)
+    size = (160, 120)
+    frame = assert_equal_to_reference(renderer, scene, size, method)
     one = tl.Scene([tl.Object(Box(low=(-1, -1, -1), high=(1, 1, 1)).tessellate(), AMBER, turn)], scene.camera)
-    whole = renderer.render(one, SIZE)
-    same = interior(references.hit_counts(scene, SIZE))
+    whole = renderer.render(one, size)
+    same = interior(references.hit_counts(scene, size))
     np.testing.assert_allclose(frame.thickness[same], whole.thickness[same], atol=20 * EPS * scene.diagonal)
 
 

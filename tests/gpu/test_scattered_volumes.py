@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 
 import translucent as tl
 from translucent.diffusion.volume import DiffusingVolume, VolumeField, VolumeGrid
-from translucent.geometry.solids import Box, Sphere
+from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.planning.rendered import Treatment
 from translucent.scene.environment_map import texel_directions
 
@@ -197,6 +197,25 @@ def test_only_what_changes_the_light_is_solved_for_again(
         solved.clear()
         renderer.render(changed, SIZE, scattering=tl.Diffusion(12))
         assert len(solved) == times
+
+
+@pytest.mark.parametrize("solid", [Sphere((0, 0, 0), 0.5), Torus(0.4, 0.12)], ids=["ball", "torus"])
+@pytest.mark.parametrize(("scattering", "absorption"), [(2.0, 1.5), (12.0, 0.5), (12.0, 0.02)])
+def test_glowing_bodies_vanish_in_the_light_of_their_like(
+    renderer: tl.Renderer, solid: Sphere | Torus, scattering: float, absorption: float
+) -> None:
+    """What emits as much as it absorbs of light of 1 is invisible in it (Kirchhoff): with an interface, too.
+
+    Measured: at most .015.
+    """
+    medium = tl.Medium(absorption, scattering, emission=absorption, ior=1.4)
+    camera = tl.Camera.look_at((0.8, 1.8, 2.4), (0, 0, 0), fov_y=24.0)
+    scene = tl.Scene([tl.Object(solid.tessellate(32), medium)], camera, environment=tl.Environment.constant((1, 1, 1)))
+    frame = renderer.render(scene, SIZE, samples=4)
+    assert frame.plan.treated(Treatment.DIFFUSION) == (0,)
+    off = np.abs(frame.radiance[frame.coverage] - 1.0)
+    print(np.median(off), off.max())
+    assert off.max() < 0.02
 
 
 @pytest.mark.parametrize("depth", [1.0, 6.0])

@@ -103,8 +103,9 @@ def test_layers_throw_no_shadow_and_change_none(renderer: tl.Renderer) -> None:
     assert alone.radiance[beside & ~alone.coverage].min() < 0.7 * alone.radiance.max()
 
 
-@pytest.mark.parametrize("mesh", ["bear", "knot", "shell", "goblet", "bangle", "soap"])
-@pytest.mark.parametrize("light", ["sun", "lamp"])
+@pytest.mark.parametrize(
+    ("mesh", "light"), [("bear", "lamp"), ("knot", "sun"), ("shell", "lamp"), ("goblet", "sun"), ("bangle", "lamp")]
+)
 def test_each_texel_has_the_transmittance_of_its_ray(renderer: tl.Renderer, mesh: str, light: str) -> None:
     """Away from edges, where texels as wide as a pixel of the light's picture see other faces."""
     body = tl.load_mesh(mesh_path(mesh))

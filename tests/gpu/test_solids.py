@@ -18,7 +18,7 @@ import pytest
 import translucent as tl
 from tests.solids import Box, Ellipsoid, Frustum, Solid, Sphere, SphericalShell, Torus, TwoSpheres
 
-SIZE = (120, 90)
+SIZE = (80, 60)
 SEGMENTS = 96
 EPS = float(np.finfo(np.float32).eps)
 

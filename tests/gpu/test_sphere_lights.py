@@ -175,7 +175,7 @@ def test_random_paths_in_smoke(renderer: tl.Renderer, follows: None) -> None:
     np.testing.assert_allclose(found, truth, rtol=0.06)
 
 
-@pytest.mark.parametrize("roughness", [0.2, 0.4, 0.7])
+@pytest.mark.parametrize("roughness", [0.2, 0.4])
 def test_highlights_in_rough_interfaces(renderer: tl.Renderer, roughness: float) -> None:
     """Against the reference, which samples the sphere. Measured .026, .005 and .003 RMS, in the mean 3e-4."""
     scene = wall(tl.Surface(roughness=roughness))

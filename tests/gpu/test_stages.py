@@ -52,7 +52,7 @@ def test_a_caught_shadow_is_what_the_medium_takes_from_the_light(renderer: tl.Re
 
 
 @pytest.mark.parametrize("stage", ["studio", "light-table"])
-def test_thickness_is_what_it_was(renderer: tl.Renderer, stage: str) -> None:
+def test_thickness_is_what_it_was(renderer: tl.Renderer, few_shadows: None, stage: str) -> None:
     scene = tl.showcase(BALL, GREEN, SIZE, stage=stage)
     alone = tl.Scene(scene.objects[:1], scene.camera)
     on, off = renderer.render(scene, SIZE), renderer.render(alone, SIZE)
@@ -62,7 +62,7 @@ def test_thickness_is_what_it_was(renderer: tl.Renderer, stage: str) -> None:
     np.testing.assert_allclose(on.thickness, off.thickness, rtol=1e-5, atol=2e-6)  # two formulas in float32
 
 
-def test_pictures_are_the_same_at_every_scale(renderer: tl.Renderer) -> None:
+def test_pictures_are_the_same_at_every_scale(renderer: tl.Renderer, few_shadows: None) -> None:
     pictures = []
     for unit in (1.0, 1e-6, 1e6):
         mesh = tl.Mesh(unit * BALL.vertices, BALL.faces)
@@ -73,7 +73,7 @@ def test_pictures_are_the_same_at_every_scale(renderer: tl.Renderer) -> None:
         assert (off > 1e-2).mean() < 5e-3  # rays at silhouettes may go either way
 
 
-def test_the_ground_is_dark_below_and_bright_elsewhere(renderer: tl.Renderer) -> None:
+def test_the_ground_is_dark_below_and_bright_elsewhere(renderer: tl.Renderer, few_shadows: None) -> None:
     black = tl.Medium(absorption=1e4)
     scene = tl.showcase(BALL, black, SIZE)
     radiance = renderer.render(scene, SIZE, samples=4).radiance.mean(axis=-1)

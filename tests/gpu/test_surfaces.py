@@ -43,7 +43,7 @@ LOSSLESS = {
 }
 
 
-@pytest.mark.parametrize("mesh", ["sphere", "knot", "bear"])
+@pytest.mark.parametrize("mesh", ["sphere", "knot"])
 @pytest.mark.parametrize("kind", LOSSLESS)
 def test_white_furnace(renderer: tl.Renderer, kind: str, mesh: str) -> None:
     medium, surface = LOSSLESS[kind]

@@ -120,11 +120,15 @@ def needed(*plans: tl.RenderPlan) -> list[set[ProgramName]]:
     return found
 
 
-@pytest.mark.parametrize("name", scenes())
-def test_what_stands_in_for_a_scene_is_drawn_with_its_programs(name: str) -> None:
+#: Each method with three of the scenes, and all with those that have the most features.
+DRAWN_BY = {name: METHODS if name in ("painted", "floor") else METHODS[i % 3 :: 3] for i, name in enumerate(scenes())}
+
+
+@pytest.mark.parametrize("name", DRAWN_BY)
+def test_what_stands_in_for_a_scene_is_drawn_with_its_programs(name: str, coarse_light: None) -> None:
     scene = scenes()[name]
     with tl.Renderer() as renderer:
-        for method in (None, *METHODS):
+        for method in (None, *DRAWN_BY[name]):
             try:
                 plan = renderer.plan(scene, method)
             except tl.InputError:
@@ -265,7 +269,7 @@ def test_what_looks_like_the_material_is_on_show_until_its_picture_is_compiled(
     assert view.state == "preparing the new picture: a stand-in"
     stood = pixels(view)
     np.testing.assert_array_equal(stood[:, :8], before[:, :8])
-    assert view.draw(work, (320, 192))  # larger now, and still a stand-in
+    assert view.draw(work, (2 * SIZE[0], 2 * SIZE[1]))  # larger now, and still a stand-in
     assert np.abs(pixels(view)[::2, ::2] - stood).mean() < 3.0
     view.draw(work, SIZE)
     near.set()

@@ -61,9 +61,9 @@ def test_a_still_picture_converges_until_something_changes(
     work.do(SetField("display.denoise", False))
     finish(view, work)
     np.testing.assert_array_equal(pixels(view), noisy)
-    probe = view.probe(80, 48)
+    probe = view.probe(SIZE[0] // 2, SIZE[1] // 2)
     assert probe is not None
-    assert probe.thickness == pytest.approx(truth.thickness[48, 80], rel=1e-5)
+    assert probe.thickness == pytest.approx(truth.thickness[SIZE[1] // 2, SIZE[0] // 2], rel=1e-5)
     work.do(OrbitBy(20.0, 10.0))
     assert view.draw(work, SIZE)
     assert view.paths.note == ""

@@ -231,8 +231,8 @@ def test_a_split_shows_another_method_and_then_the_reference(view: ViewportRende
     assert scene is not None
     left, right = (view.viewport.steps(side) for side in (0, 1))
     assert left == right > 0
-    sheet = view.probe(80, 48, 1)
-    solid = view.probe(80, 48, 0)
+    sheet = view.probe(SIZE[0] // 2, SIZE[1] // 2, 1)
+    solid = view.probe(SIZE[0] // 2, SIZE[1] // 2, 0)
     assert sheet is not None
     assert solid is not None
     assert sheet.thickness != solid.thickness
@@ -241,7 +241,7 @@ def test_a_split_shows_another_method_and_then_the_reference(view: ViewportRende
     wait(work, lambda: work.truth is not None and work.lanes["truth"].task is None)
     finish(view, work)
     assert view.presenter.truth is not None
-    truth = view.probe(80, 48, 1)
+    truth = view.probe(SIZE[0] // 2, SIZE[1] // 2, 1)
     assert truth is not None
     assert truth.thickness == pytest.approx(solid.thickness, rel=1e-4, abs=1e-9)
 
@@ -342,5 +342,5 @@ def test_a_defect_in_a_task_is_a_message(work: Workspace) -> None:
 def test_random_actions() -> None:
     tool = Path(tl.__file__).parents[1] / "tools" / "preview_monkey.py"
     with np.errstate(all="warn"):
-        told = runpy.run_path(str(tool))["play"](30, 11)
-    assert told["actions"] == 30
+        told = runpy.run_path(str(tool))["play"](12, 11)
+    assert told["actions"] == 12

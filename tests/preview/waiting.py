@@ -12,7 +12,7 @@ import numpy as np
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 
-SIZE = (160, 96)
+SIZE = (112, 64)
 
 
 def environment(display: str, folder: Path) -> dict[str, str]:

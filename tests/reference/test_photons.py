@@ -44,9 +44,7 @@ def test_the_closed_form_has_the_paraxial_focus() -> None:
     assert flux.sum() == pytest.approx(np.pi, rel=1e-4)  # what stays inside longer is next to nothing
 
 
-@pytest.mark.parametrize(
-    ("light", "lamp", "absorption"), [(SUN, None, 0.0), (PointLight((0, 5, 0), 1.0), 3.0, 0.0), (SUN, None, 0.4)]
-)
+@pytest.mark.parametrize(("light", "lamp", "absorption"), [(SUN, None, 0.0), (PointLight((0, 5, 0), 1.0), 3.0, 0.4)])
 def test_a_ball_throws_what_its_rays_carry(light: Light, lamp: float | None, absorption: float) -> None:
     """In all, and within circles around the focus."""
     scene_of = scene(Medium(absorption, ior=1.5), light)

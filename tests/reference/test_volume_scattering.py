@@ -163,11 +163,20 @@ def spans(spheres: list[Sphere], origin: Array, direction: Array) -> list[tuple[
     return list(zip(cuts[::2], cuts[1::2], strict=True))
 
 
-@pytest.mark.parametrize("name", SOLIDS)
 @pytest.mark.parametrize(
-    "light",
-    [DirectionalLight((1.0, -0.4, -0.2), 3.0), PointLight((-1.2, 0.9, 0.8), 5.0), PointLight((0.5, 0.1, 0.1), 1.0)],
-    ids=["sun", "lamp", "lamp inside"],
+    ("name", "light"),
+    list(
+        zip(
+            SOLIDS,
+            [
+                DirectionalLight((1.0, -0.4, -0.2), 3.0),
+                PointLight((-1.2, 0.9, 0.8), 5.0),
+                PointLight((0.5, 0.1, 0.1), 1.0),
+            ],
+            strict=True,
+        )
+    ),
+    ids=SOLIDS,
 )
 def test_round_solids_converge(name: str, light: Light) -> None:
     """Meshes are polyhedra: of second order, so with four times the segments the error is 16 times smaller."""

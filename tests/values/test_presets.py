@@ -46,6 +46,7 @@ COLORS = {
     "ice": ((0.94, 0.975, 0.99), 0.1),
     "paraffin": ((0.965, 0.925, 0.84), 0.01),
     "resin": ((0.95, 0.90, 0.74), 0.03),
+    "beeswax": ((0.988, 0.942, 0.577), 0.001),
 }
 
 #: Reduced scattering per mm of those that scatter, and the roughness of their surfaces.
@@ -54,6 +55,7 @@ SCATTERING = {
     "wax": ((1.5, 1.5, 1.5), 0.35),
     "soap": ((1.0, 1.0, 1.0), 0.3),
     "paraffin": ((1.2, 1.2, 1.2), 0.35),
+    "beeswax": ((1.2, 1.2, 1.2), 0.3),
 }
 
 #: Roughness of clear ones whose surfaces are not polished.
@@ -137,7 +139,7 @@ def test_a_centimetre_of_chardonnay() -> None:
 
 
 def test_estimated_presets_have_their_colors_at_their_distances() -> None:
-    assert sorted([*COLORS, *DROPLETS, "skin"]) == sorted(ESTIMATED)
+    assert sorted([*COLORS, *DROPLETS, "skin", "carved_marble", "gummy_bear"]) == sorted(ESTIMATED)
     for name, (color, distance) in COLORS.items():
         found = tl.preset(name)
         assert np.exp(-found.absorption * distance) == pytest.approx(color, rel=4e-15), name
@@ -152,6 +154,15 @@ def test_skin_is_the_measured_one_with_a_surface() -> None:
     np.testing.assert_array_equal(found.absorption, measured.absorption)
     np.testing.assert_array_equal(found.scattering, measured.scattering)
     assert (found.medium.ior, found.roughness) == (1.4, 0.45)
+
+
+def test_recipes_of_marble_and_gummy_are_these_with_another_surface_and_with_haze() -> None:
+    carved, marble, bear, clear = map(tl.preset, ("carved_marble", "marble", "gummy_bear", "gummy"))
+    np.testing.assert_array_equal(carved.absorption, marble.absorption)
+    np.testing.assert_array_equal(carved.scattering, marble.scattering)
+    np.testing.assert_allclose(bear.absorption, clear.absorption, rtol=1e-5)
+    assert (carved.roughness, bear.medium.anisotropy, clear.medium.scatters) == (0.3, 0.8, False)
+    assert bear.regime == "single scattering"
 
 
 @pytest.mark.parametrize("name", DROPLETS)
@@ -278,7 +289,7 @@ def test_the_list_is_the_callers_own() -> None:
 
 @pytest.mark.parametrize("name", ["unobtainium", "", "&"])
 def test_an_unknown_name_without_a_like_gives_some(name: str) -> None:
-    message = f"preset {name!r}; not a known preset; use one of marble, skim_milk, merlot, honey, jade and 62 more"
+    message = f"preset {name!r}; not a known preset; use one of marble, skim_milk, merlot, honey, jade and 65 more"
     with pytest.raises(tl.InputError, match=re.escape(message)):
         tl.preset(name)
 

@@ -162,8 +162,7 @@ def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
     or .gltf MODEL has stays. Beside each file goes a record, FILE.json. With --out-dir, many models: models
     that are done are skipped, and a model that fails stops no other.
 
-    --mode scatter bakes the light that leaves the body after scattering, into an .exr map or the vertices of a
-    .glb: translucent bake candle -o candle.exr --mode scatter --preset wax
+    --mode scatter bakes the light that leaves the body after scattering: --mode scatter --preset wax -o candle.exr
     """
     output, out_dir, named = given.output, given.out_dir, _named()
     if given.mode == SCATTER:

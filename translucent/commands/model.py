@@ -234,6 +234,8 @@ def _file_scene(model: str, requested: SceneRequest, stage: str | None) -> tuple
         allow_outside=requested.file.allow_outside,
         draft_extensions=requested.file.draft_extensions,
     )
+    for remark in scene.remarks:
+        advise(remark)
     if requested.medium is not None:
         scene = filled(scene, requested.medium, keeps_ior=requested.keeps_ior)
     scene = _with_media(scene, requested.media)

@@ -174,13 +174,8 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     The model stands on a ground with its shadow; see --stage. A .glb or .gltf file keeps its camera, lights and media;
     --color, --preset or --scattering-color replaces the media. All other files are one mesh.
 
-    Several models, each with its material:
-
-    translucent render goblet:crystal wine:red_wine -o wine.png
-
-    A medium behind an --object is for the object of that name:
-
-    translucent render bar.glb -o bar.png --object Wine --preset merlot --object Glass --preset crystal
+    Several models, each with its material: translucent render goblet:crystal wine:red_wine -o wine.png
+    A medium behind an --object is for the object of that name: --object Wine --preset merlot.
     """
     import translucent as tl
     from translucent.gpu.context import quick_compiles

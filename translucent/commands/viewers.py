@@ -61,9 +61,9 @@ class PreviewOptions:
     session: Path | None = option(metavar="FILE", help="Begin with a session, a .toml file.")
     stage: str | None = option(metavar="S", help=_stage_words)
     size: str = option("1600x1000", metavar="WxH", help="Size of the window.")
-    scale: float = option(1.0, help="Makes letters and fields larger.")
-    script: Path | None = option(metavar="FILE", help="Do what a .toml file says; close.")
-    screenshot: Path | None = option(metavar="PNG", help="Of the window, at the end.")
+    scale: float = option(1.0, help="Size of letters and fields, 0.5 to 4.")
+    script: Path | None = option(metavar="FILE", help="Run the actions of a .toml file, then close the window.")
+    screenshot: Path | None = option(metavar="PNG", help="Save a picture of the window at the end, as this .png.")
 
 
 @click.command(epilog="Example: translucent preview goblet")

@@ -126,10 +126,6 @@ class LayerSolution:
         u = np.maximum(u + spread * slope, LEAST_LEFT * u)
         return cls(depth, attenuation, condition, spread, scale, even, rise, u, slope)
 
-    def bend(self) -> Array:
-        """(cosh(k d) - 1) / k^2 at the depth of reading, d^2 / 2 where nothing is absorbed."""
-        return np.asarray(0.5 * (self.depth * optics.mean_transmittance(self.attenuation * self.depth)) ** 2)
-
     def events(self, samples: Integers, rate: Array) -> tuple[Array, Array]:
         """Effects of first events above the depth of reading, where light decays with the depth at a rate (k,) in 1/m.
 

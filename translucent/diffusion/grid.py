@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask, expanded
+from translucent.diffusion.escape import EscapePaths
 from translucent.diffusion.voxels import Voxels, cut_cells, voxels, without
 from translucent.formulas import optics
 from translucent.geometry.mesh import Mesh, Triangles, joined
@@ -158,6 +159,7 @@ class BodyGrid:
     opaque: tuple[Object, ...] = ()
     _body_cells: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     _crossings: dict[float, tuple[Array, Array]] = field(default_factory=dict)
+    _escape_paths: dict[float, EscapePaths] = field(default_factory=dict)
 
     @cached_property
     def nearest(self) -> Integers:
@@ -180,6 +182,14 @@ class BodyGrid:
             self._crossings.clear()
             self._crossings[ior] = directions, metres
         return self._crossings[ior]
+
+    def escape_paths(self, ior: float) -> EscapePaths:
+        """Paths out of the body through a surface of this index; the last ones are cached."""
+        if ior not in self._escape_paths:
+            start = self.points - START * self.cells.step * self.face_normals
+            self._escape_paths.clear()
+            self._escape_paths[ior] = EscapePaths.of(self.body, start, self.inward_directions(1.0), ior)
+        return self._escape_paths[ior]
 
     def inward_directions(self, ior: float, number: int = 0) -> Array:
         """(s, 3): set `number` of directions inside, one for each sample, distributed as refracted uniform light."""

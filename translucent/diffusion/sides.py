@@ -25,9 +25,6 @@ SIDES = 6
 #: Samples around a cell that it fits, at most, and their distance in cells.
 AROUND, REACH = 32, 2.0
 
-#: Distance of cells from a sample, in cells, up to which somebody looks them up.
-_LOOKED_UP = 1.8
-
 #: Cosine between a sample's normal and the plane of a side, above which it counts there: what looks hardly aside does.
 _ASIDE = -0.1
 

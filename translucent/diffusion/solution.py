@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -25,6 +25,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from translucent.arrays import Array, Integers
 from translucent.diffusion.densities import Densities, even_densities
+from translucent.diffusion.escape import scattered_escape
 from translucent.diffusion.first_events import (
     EnteringRays,
     EntryPaths,
@@ -215,6 +216,9 @@ MOST_RETURNED = 0.99
 LEAST_CORRECTION, MOST_CORRECTION = 0.5, 2.0
 
 _TINY = np.finfo(np.float64).tiny
+
+#: Fraction of the probability to escape that is absorbed at least where what uniform light misses is looked for.
+LEAST_ABSORBED = 0.1
 
 #: Least fraction of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
@@ -452,27 +456,25 @@ class _ChannelSystem:
         self._diffuse = diffuse.scaled(float(grid.areas @ scattered) / max(float(grid.areas @ diffuse.counted), _TINY))
         reflected = np.zeros(0) if reflected is None else reflected
         self._inclusions = _InclusionLosses.of(grid, absorption, d, reflected)
-        # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
-        # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
-        self._emitted_near = (layer.bend() + spread * layer.rise) / d * self._relative
-        below = grid.areas * (layer.rise + layer.condition * layer.bend()) * self._relative
-        self._emitted_cells = dense.cells * grid.cores + self._read.T @ below
         lost = grid.areas * d * layer.slope * self._relative
         absorbing = np.maximum(grid.cores, _LEAST_ABSORBING * grid.volumes)
         absorbed = absorption * dense.cells * absorbing
         lost = np.concatenate([lost, self._inclusions.lost])
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
-        self._correction = np.ones(len(depth))
+
+        def system(part: float, *, corrected: bool = True) -> _ChannelSystem:
+            """The same of a medium that absorbs a part of what it takes, around inclusions that absorb nothing."""
+            a, b, white = part * extinction, (1.0 - part) * extinction, np.ones(len(self._inclusions.lost))
+            same = partial(_ChannelSystem, grid, ior, roughness, a, b, dense, paths, scattered, walls=walls)
+            return same(reflected=white, corrected=corrected)
+
+        self._absorbing, self._correction = system, np.ones(len(depth))
         #: (s,): see `SurfaceLight`.
         self.scattered = scattered
         if corrected:
-            white, same = np.ones_like(reflected), (dense, paths, scattered)
-            lossless = _ChannelSystem(
-                grid, ior, roughness, 0.0, extinction, *same, reflected=white, walls=self._walls, corrected=False
-            )
             # What half-spaces absorb has not been in the body long enough to get to other parts of it.
             reflectance = half_space_reflectance(round(self._albedo, 6), ior)
-            self._correction = 1.0 + reflectance * (lossless.by_uniform_light() - 1.0)
+            self._correction = 1.0 + reflectance * (system(0.0, corrected=False).by_uniform_light() - 1.0)
 
     def by_uniform_light(self) -> Array:
         """(s,): factors of the fluence with which a lossless body in uniform light is as invisible as it has to be.
@@ -497,44 +499,55 @@ class _ChannelSystem:
         """(s,): fluence by cells (s,), and that of slabs (s,) in walls."""
         return np.asarray(fluence + self._walls.part * (slab - fluence))
 
-    def _emitted_again(self, emission: float) -> tuple[Array, Array, float]:
-        """Power in the cells (cells,), and fluence at the samples (s,), of emitted light at its first scattering event.
+    @cached_property
+    def _uniform(self) -> tuple[Array, Array, float]:
+        """(cells,), (s,): fluence for a unit of flux that enters everywhere; and a factor that is in both.
 
-        Rays see what leaves the body before, which is missing here; the flux of that is the third value. In uniform
-        light of 1, a medium that emits sigma_t per metre has a radiance of 1 everywhere: unscattered emitted radiance
-        is q / sigma_t less the part of uniform light that gets there. As radiance is that outside, L / n^2, the power
-        of `emission`, 4 pi q in W/m^3, is n^2 times as much.
+        As long as little is absorbed on a chord the fluence is even, and as much of the scattered light leaves as the
+        probability to escape says. Diffusion lets a few per cent more out of thin parts.
         """
-        inside, near = self._emitted_cells, self._emitted_near
-        if emission == 0.0:
-            return np.zeros_like(inside), np.zeros_like(near), 0.0
+        source = self._power(np.ones(len(self._grid.points)))
+        cells, _ = self._cells.solved(source, self._cells.even(source))
+        found = np.maximum((self._read @ cells) * self._attenuated + self._diffuse.near, 0.0) * self._correction
+        areas, absorbed, extinction = self._grid.areas, 1.0 - self._albedo, self._extinctions[0]
+        left = self._exit_fraction * float(areas @ found) / max(float(areas @ self.scattered), _TINY)
+        even = self._albedo * scattered_escape(self._escape(extinction), self._albedo) / max(left, _TINY)
+        factor = 1.0 + float(optics.transmittance(absorbed * extinction * self._chord)) * (even - 1.0)
+        return factor * cells, np.asarray(factor * found), factor
+
+    def _emitted(self, emission: float) -> tuple[Array, Array, float]:
+        """Fluence in the cells (cells,), and at the samples (s,), of emitted light that has been scattered.
+
+        Where the body and all around it glow alike, everything has one radiance: what the medium sends out is what
+        uniform light misses (Kirchhoff 1860). So of q / sigma_a the part 1 - S is left, S the radiance of scattered
+        light in uniform light of 1. Rays see the part q / sigma_t of it that nothing has scattered; its flux is the
+        third value. `emission` is 4 pi q in W/m^3.
+        """
         (extinction, every), entering = self._extinctions, self._interface.entering
-        uniform = self._diffuse.power(self._grid, self._all, np.ones_like(near))
-        # Fraction of uniform light that has an event on its way through; a part of the rest is mirrored, and goes on.
-        events = float(uniform.sum()) / (self._albedo * self._grid.area * len(near))
+        absorbed, escape = 1.0 - self._albedo, self._escape(extinction)
+        # Of a medium that absorbs little this is the difference of nearly the same: then the one of a medium that
+        # absorbs more is scaled to its power.
+        part = max(absorbed, LEAST_ABSORBED * escape)
+        system, (power, given) = self, (scattered_escape(escape, 1.0 - one) * (1.0 - one) for one in (absorbed, part))
+        if part > absorbed or self._grid.inclusions is not None:
+            system = self._absorbing(part)
+        cells, fluence, _ = system._uniform
         # Rays take what is scattered ahead for lost, and diffusion for unscattered: it stays here.
         ahead = float(optics.opacity(every * self._chord) / optics.opacity(extinction * self._chord))
-        flux, all_flux = (
-            emission / (4.0 * sigma) * entering * part / (1.0 - (1.0 - entering) * (1.0 - part))
-            for sigma, part in ((extinction, events), (every, min(events * ahead, 1.0)))
+        all_of_it = 0.25 * emission * entering / (part * extinction)
+        left = (all_of_it - 0.25 * emission * entering / every * ahead) / self._exit_fraction
+        inside, at_samples = (
+            power / given * np.maximum(left * scattered - all_of_it * found, 0.0)
+            for scattered, found in ((self.scattered.mean(), cells), (self.scattered, fluence))
         )
-        power = self._albedo * emission * self._ior**2
-        lost = all_flux / max(events, np.finfo(np.float64).tiny)
-        thin = self._thin_escape(4.0 * flux / (emission * self._ior**2 * self._chord))
-        return thin * (power * inside - lost * uniform), thin * (power * near - lost * self._diffuse.near), all_flux
+        if self._grid.inclusions is not None:
+            at_samples *= self._uniform[1] / np.maximum(fluence, _TINY)
+        return inside, at_samples, 0.25 * emission * self._ior**2 * self._chord * self._escape(every)
 
-    def _thin_escape(self, escape: float) -> float:
-        """Factor of emitted and scattered light that leaves a body as thin as a free path, where its fluence is even.
-
-        There a fraction `escape` of what an event sends out leaves without another one. Diffusion has a gradient of the
-        fluence below the surface, which is not there, and lets more out. In thick bodies there is one; between both,
-        the probability to leave a body without an interface decides.
-        """
-        depth, conductance = self._extinctions[0] * self._chord, self._interface.conductance
-        absorbed = 1.0 - self._albedo
-        exact = escape / (escape + (1.0 - escape) * absorbed)
-        diffused = conductance / (conductance + 0.25 * absorbed * depth)
-        return 1.0 + float(optics.mean_transmittance(depth)) * (exact / diffused - 1.0)
+    def _escape(self, extinction: float) -> float:
+        """Fraction of what is sent out inside that leaves without an event, for an extinction at a density of 1."""
+        mean = self._chord / (2.0 * self._grid.body.mean_thickness)
+        return self._grid.escape_paths(self._ior).probability(extinction * mean)
 
     def directional(self, entering: Array, mirrored: Array, paths: EntryPaths) -> _DirectionalEffects:
         """Effects of rays that enter with a flux (k,), and are reflected with another: first events on their paths."""
@@ -576,23 +589,25 @@ class _ChannelSystem:
 
         Light of the body falls on it again, as `returned` says of a flux that leaves, until little changes.
         """
-        emitted_inside, emitted, unscattered = self._emitted_again(emission)
-        inside = self._albedo * power + emitted_inside + straight.power
-        emitted = emitted + straight.near
+        emitted_inside, emitted, unscattered = self._emitted(emission) if emission > 0.0 else (0.0, 0.0, 0.0)
+        inside = self._albedo * power + straight.power
         # What walls emit themselves is known to the cells alone.
         walls = self._walls.any and emission == 0.0
 
         def source(flux: Array) -> Array:
             return np.asarray(self._power(flux) + inside)
 
+        # Emitting media are often thin, and their uniform light is known.
+        correction = self._correction * (self._uniform[2] if emission > 0.0 else 1.0)
+
         def at_surface(cells: Array, flux: Array) -> Array:
-            fluence = (self._read @ cells) * self._attenuated + self._diffuse.near * flux + emitted
+            fluence = (self._read @ cells) * self._attenuated + self._diffuse.near * flux + straight.near
             if walls:
                 own, across = self._diffuse.slab
                 fluence = self._with_walls(
                     fluence, self._in_walls((own * flux, across * flux), self._all) + straight.slab
                 )
-            return np.asarray(np.maximum(fluence, 0.0) * self._correction)
+            return np.asarray(np.maximum(fluence, 0.0) * correction + emitted)
 
         def leaving(fluence: Array, flux: Array) -> Array:
             # What the surface mirrors goes on as if it was diffuse.
@@ -624,7 +639,15 @@ class _ChannelSystem:
                 break
             tolerance = min(max(OF_CHANGE * largest / max(most, np.finfo(np.float64).tiny), TOLERANCE), FIRST)
             before = change if again == 0.0 else np.zeros_like(entering)
-        return fluence, flux + straight.flux, leaving(fluence, flux), np.maximum(near, 0.0), steps
+        # Emitted light leaves at each angle as what is scattered of uniform light does: with as much that enters.
+        even = emitted / np.maximum(self._uniform[1], _TINY) if emission > 0.0 else 0.0
+        return (
+            fluence,
+            flux + straight.flux + even,
+            leaving(fluence, flux),
+            np.maximum(near, 0.0) + emitted_inside,
+            steps,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,7 @@ from translucent.scene.environment import Environment
 from translucent.scene.lights import NARROWEST_CONE, DirectionalLight, PointLight, SpotLight
 from translucent.scene.scene import Light, Scene
 from translucent.scene.showcase import LIGHT_TABLE, framing
+from translucent.scene.touching import with_priorities
 from translucent.units import metres_per_unit
 
 SUFFIXES = (".glb", ".gltf")
@@ -88,12 +89,15 @@ class GltfScene(Scene):
         Names of the file's variants of materials, for `variant` of `load_scene`.
     duration : float, optional
         Seconds of the file's animations, for `time` of `load_scene`; None: it has none.
+    remarks : tuple of str
+        Choices that the file does not state: which body displaces another one that it touches.
     """
 
     left_out: tuple[str, ...] = ()
     has_camera: bool = False
     variants: tuple[str, ...] = ()
     duration: float | None = None
+    remarks: tuple[str, ...] = ()
 
 
 @checked_but("path", "camera", "size")
@@ -169,7 +173,7 @@ def load_scene(
     environment = Environment.studio() if polished else LIGHT_TABLE
     view = own or framing(objects, size)
     variants = variant_names(file)
-    return GltfScene(
+    scene = GltfScene(
         objects,
         view,
         lights,
@@ -179,6 +183,8 @@ def load_scene(
         variants=variants,
         duration=animation_end(file),
     )
+    scene, said = with_priorities(scene)
+    return replace(scene, remarks=said)
 
 
 def _exported(scene: Any) -> GltfFile:

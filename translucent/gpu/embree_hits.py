@@ -49,11 +49,6 @@ def mesh_scene(mesh: Mesh) -> EmbreeScene:
     return found
 
 
-def has_mesh_scene(mesh: Mesh) -> bool:
-    """True if `mesh_scene` has been made, or takes no time to speak of."""
-    return mesh in _scenes or len(mesh.faces) < OWN_SCENE
-
-
 class RayHits(NamedTuple):
     """Nearest surfaces on rays.
 

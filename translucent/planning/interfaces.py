@@ -34,8 +34,8 @@ ONE_SHADED = 0.45
 #: Note of a plan in which rays hit interfaces as far as the first interval shows them.
 LATER_REFRACTION = Note(
     NoteKind.LATER_REFRACTION,
-    "refraction and reflection beyond the first interval of a ray: what lies farther on is crossed straight, "
-    "and interfaces mirror the environment only",
+    "refraction and reflection beyond the first interval of a ray: from there on rays go straight, and interfaces "
+    "reflect the environment alone",
 )
 
 

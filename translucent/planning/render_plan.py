@@ -241,7 +241,8 @@ class RenderPlan:
         }
 
     def __str__(self) -> str:
-        cost = f", at about the cost of {self.cost:.1f} depth-only draws" if self.cost else ""
+        digits = 1 if self.cost < 10 else 0
+        cost = f", at about the cost of {self.cost:.{digits}f} depth-only draws" if self.cost else ""
         lines = [f"{self.runs}: {'exact' if self.exact else 'not exact everywhere'}{cost}"]
         lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
         if mode := self.multiple_scattering:

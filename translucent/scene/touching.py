@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from graphlib import CycleError, TopologicalSorter
-from itertools import combinations
 from pathlib import PurePath
 from typing import TypeVar
 
@@ -35,9 +34,9 @@ def with_priorities(scene: AnyScene) -> tuple[AnyScene, tuple[str, ...]]:
     above: dict[int, set[int]] = {i: set() for i in solids}
     said: dict[str, None] = {}
     overlapping = False
-    for i, j in combinations(solids, 2):
+    for i, j in _overlapping_boxes(scene, solids):
         one, other = scene.objects[i], scene.objects[j]
-        if _alike(one, other) or not _boxes_overlap(one, other):
+        if _alike(one, other):
             continue
         overlapping = True
         of_one, of_other = _winding_numbers(one, other), _winding_numbers(other, one)
@@ -70,8 +69,14 @@ def _name(item: Object) -> str:
     return PurePath(item.mesh.name).stem
 
 
-def _boxes_overlap(one: Object, other: Object) -> bool:
-    return bool((one.bounds[0] < other.bounds[1]).all() and (other.bounds[0] < one.bounds[1]).all())
+def _overlapping_boxes(scene: Scene, solids: list[int]) -> list[tuple[int, int]]:
+    """Pairs of these objects whose boxes overlap."""
+    if len(solids) < 2:
+        return []
+    low, high = np.stack([scene.objects[i].bounds for i in solids]).transpose(1, 0, 2)
+    below = (low[:, None] < high[None]).all(axis=2)
+    pairs = np.argwhere(np.triu(below & below.T, 1)).tolist()
+    return [(solids[first], solids[second]) for first, second in pairs]
 
 
 def _displaces(one: Object, other: Object, of_one: Array, of_other: Array) -> bool:
