@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +23,7 @@ from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_int
 from translucent.formulas.interface import refracted_direction
 from translucent.geometry.ray_caster import RayCaster, ray_caster_of
 from translucent.scene.environment import Environment
-from translucent.scene.environment_map import row_solid_angles, texel_directions
+from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, texel_directions
 from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Object, Scene
 
@@ -301,11 +302,17 @@ def radiance_without_suns(environment: Environment, directions: Array) -> Array:
     return radiance if environment.map is None else radiance * _below_suns(radiance, environment)
 
 
+#: Pictures of environments, (k, 3), in the size of `_map_texels`: they stay when one is turned, or brightened.
+_reduced: WeakKeyDictionary[EnvironmentMap, Array] = WeakKeyDictionary()
+
+
 def _map_texels(environment: Environment) -> tuple[Array, Array, Array]:
     """Directions (k, 3) in the world of an image's texels, their radiance times solid angle, and that without suns."""
     assert environment.map is not None
     height, width = MAP_HEIGHT, 2 * MAP_HEIGHT
-    radiance = environment.scale * environment.map.reduced(height, width).reshape(-1, 3)
+    if (reduced := _reduced.get(environment.map)) is None:
+        reduced = _reduced[environment.map] = environment.map.reduced(height, width).reshape(-1, 3)
+    radiance = environment.scale * reduced
     angle = np.repeat(row_solid_angles(height, width), width)[:, None]
     down, right = np.divmod(np.arange(height * width), width)
     polar, azimuth = np.pi * (down + 0.5) / height, 2.0 * np.pi * ((right + 0.5) / width - environment.turn - 0.5)

@@ -10,6 +10,7 @@ Salkauskas 1981): interpolated between cells it follows them, without steps at t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 
 import numpy as np
 from scipy import sparse
@@ -27,6 +28,9 @@ AROUND, REACH = 32, 2.0
 
 #: Cosine between a sample's normal and the plane of a side, above which it counts there: what looks hardly aside does.
 _ASIDE = -0.1
+
+#: Numbers of the entries of a symmetric matrix (3, 3) among those of its upper half.
+_SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 #: Squared distance in cells over which samples must be spread for their gradient to count.
 _STIFF = 0.1
@@ -66,26 +70,19 @@ class SurfaceSides:
         near = np.where(np.isfinite(distance), (1.0 - (distance / REACH) ** 2) ** 2, 0.0)
         sample = np.where(near > 0.0, sample, 0)
         near *= grid.areas[sample]
-        offset = points[sample] - centers[:, None]
-        rows, columns, values, places = list[Integers](), list[Integers](), list[Array](), list[Integers]()
-        size = 0
-        for side in range(SIDES):
-            sign = 1.0 - 2.0 * (side % 2)
-            facing = np.maximum(sign * grid.face_normals[sample, side // 2] - _ASIDE, 0.0)
-            weight = near * facing**2
-            own = np.flatnonzero(weight.sum(axis=1) > 0.0)
-            fitted = _fitted(weight[own], offset[own], grid.face_normals[sample[own]])
-            row, column = np.nonzero(fitted)
-            rows.append(row + size)
-            columns.append(sample[own][row, column])
-            values.append(fitted[row, column])
-            places.append(side * int(np.prod(shape)) + cells[own])
-            size += len(own)
-        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+        offset = (points[sample] - centers[:, None]).astype(np.float32)
+        normals = grid.face_normals.astype(np.float32)[sample]
+        signs = np.where(np.arange(SIDES) % 2 == 0, np.float32(1.0), np.float32(-1.0))
+        facing = np.maximum(signs * np.repeat(normals, 2, axis=2) - np.float32(_ASIDE), 0.0)
+        weight = np.moveaxis(facing**2, 2, 1) * near[:, None].astype(np.float32)
+        cell, side = np.nonzero(weight.any(axis=2))
+        rows = _fitted(weight, offset, normals)[cell, side]
+        used = rows != 0.0
+        first = np.concatenate([[0], np.cumsum(np.count_nonzero(used, axis=1))])
         number = grid.number.ravel()
         deep = np.setdiff1d(np.flatnonzero(number >= 0), cells, assume_unique=True)
-        weights = sparse.csr_array(entries, (size, len(points)), dtype=np.float32)
-        return cls(weights, np.concatenate(places), deep, number[deep], shape)
+        weights = sparse.csr_array((rows[used], sample[cell][used], first), (len(rows), len(points)))
+        return cls(weights, side * int(np.prod(shape)) + cells[cell], deep, number[deep], shape)
 
     def volume(self, values: Floats, deep: Floats) -> Floats:
         """(6, x, y, z, n) float32: values (s, n) of the samples, interpolated, and `deep` (cells, n) farther inside."""
@@ -110,20 +107,26 @@ def _cells_near(grid: BodyGrid) -> Integers:
     return np.flatnonzero(near | wide)
 
 
-def _fitted(weight: Array, offset: Array, normals: Array) -> Array:
-    """(k, n): factors of values at offsets (k, n, 3) from cells, for what the linear fit to these has in the cells.
+def _fitted(weight: Floats, offset: Floats, normals: Floats) -> Floats:
+    """(k, 6, n): factors of values at offsets (k, n, 3) from cells, for what the linear fit to these has in the cells.
 
-    Along the mean normal nothing changes. Where samples say little of a gradient it is small.
+    For each side, with weights (k, 6, n). Along the mean normal nothing changes. Where samples say little of a gradient
+    it is small. All sums over samples are one product of matrices: only the weights differ from side to side.
     """
-    share = weight / weight.sum(axis=1, keepdims=True)
-    normal = np.einsum("kn,kni->ki", share, normals)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-    along = offset - np.einsum("kni,ki->kn", offset, normal)[..., None] * normal[:, None]
-    mean = np.einsum("kn,kni->ki", share, along)
-    apart = along - mean[:, None]
-    spread = np.einsum("kn,kni,knj->kij", share, apart, apart) + _STIFF * np.eye(3)
-    slope = np.linalg.solve(spread, mean[..., None])[..., 0]
-    return np.asarray(share * (1.0 - np.einsum("ki,kni->kn", slope, apart)))
+    products = [offset[..., i] * offset[..., j] for i, j in combinations_with_replacement(range(3), 2)]
+    terms = np.concatenate([offset, normals, np.stack(products, axis=2)], axis=2)
+    # Of sides without samples all sums are 0.
+    total = np.maximum(weight.sum(axis=2, keepdims=True), np.finfo(np.float32).tiny)
+    share = weight / total
+    sums = share @ terms
+    mean, normal, squares = sums[..., :3], sums[..., 3:6], sums[..., 6:][..., _SYMMETRIC]
+    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), np.finfo(np.float32).tiny)
+    across = np.eye(3, dtype=np.float32) - normal[..., :, None] * normal[..., None, :]
+    spread = across @ (squares - mean[..., :, None] * mean[..., None, :]) @ across
+    aside = (across @ mean[..., None])[..., 0]
+    slope = np.linalg.solve(spread + np.float32(_STIFF) * np.eye(3, dtype=np.float32), aside[..., None])[..., 0]
+    constant = 1.0 + (slope * mean).sum(axis=2, keepdims=True)
+    return np.asarray(share * (constant - slope @ np.swapaxes(offset, 1, 2)))
 
 
 def side_weights(normals: Array) -> Array:
