@@ -146,14 +146,31 @@ uniform sampler2D ground_shadows;  // fraction of the light of the environment t
 uniform vec4 ground_rows[2];       // position on the ground, from a point
 
 // Fraction of the light of the environment that reaches a point of the ground.
-vec3 environment_reaching(vec3 point, vec3 normal) {
+vec3 ground_reaching(vec3 point) {
     vec2 at = vec2(dot(ground_rows[0], vec4(point, 1.0)), dot(ground_rows[1], vec4(point, 1.0)));
     return 1.0 - textureLod(ground_shadows, 0.5 + 0.5 * squeezed(at), 0.0).rgb;
 }
+#endif
+
+#if GROUND_SHADOWS == 1
+vec3 environment_reaching(vec3 point, vec3 normal) { return ground_reaching(point); }
 #else
+#if GROUND_SHADOWS
+uniform vec4 mapped_ground;        // unit normal upwards, and metres along it from the center of the media
+
+bool on_mapped_ground(vec3 point, vec3 normal) {
+    float reach = inversesqrt(dot(ground_rows[0].xyz, ground_rows[0].xyz));
+    return abs(dot(mapped_ground.xyz, point) - mapped_ground.w) <= GROUND_TOLERANCE * reach && dot(normal, mapped_ground.xyz) > 0.5;
+}
+#else
+bool on_mapped_ground(vec3 point, vec3 normal) { return false; }
+vec3 ground_reaching(vec3 point) { return vec3(1.0); }
+#endif
+
 // Share of the light of the environment that reaches a surface.
 vec3 environment_reaching(vec3 point, vec3 normal) {
     if (sky_count == 0) { return vec3(1.0); }
+    if (on_mapped_ground(point, normal)) { return ground_reaching(point); }
     vec3 all = vec3(0.0), reaching = vec3(0.0), light = vec3(0.0);
     int step = abs(sky_step);
     bool alone = sky_step < 0;

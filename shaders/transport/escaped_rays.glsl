@@ -84,17 +84,29 @@ bool environment_in_footprint(EscapedRay end, out vec3 light) {
     return false;
 }
 
-vec3 escaped_radiance(EscapedRay end) {
-    vec3 light;
 #if OPAQUE
-    if (end.object != AIR) {
-        bool has_textures = picture_first == 0 && end.triangle >= 0 && end.blur == 0.0 && reads_all_textures(end.object);
-        if (!has_textures && opaque_in_picture(end, light)) { return light; }
+vec3 radiance_of_opaque(EscapedRay end) {
+    vec3 light;
+    bool has_textures = picture_first == 0 && end.triangle >= 0 && end.blur == 0.0 && reads_all_textures(end.object);
+    // A loop in place of a branch: software rasterizers leave it where no ray of a group is hidden.
+    for (bool hidden = has_textures || !opaque_in_picture(end, light); hidden; hidden = false) {
         ObjectRow body = traced_body(end.object);
         if (end.triangle >= 0) { body = body_at(end.object, end.triangle, end.weights, end.width); }
-        return opaque_light(body, end.normal, end.direction, end.point);
+        light = opaque_light(body, end.normal, end.direction, end.point);
     }
+    return light;
+}
 #endif
+
+vec3 radiance_beyond(EscapedRay end) {
+    vec3 light;
     if (environment_in_footprint(end, light)) { return light; }
     return environment_radiance(end.origin, end.direction, end.reflected, end.blur);
+}
+
+vec3 escaped_radiance(EscapedRay end) {
+#if OPAQUE
+    if (end.object != AIR) { return radiance_of_opaque(end); }
+#endif
+    return radiance_beyond(end);
 }

@@ -108,17 +108,22 @@ void escape(Ray ray, EscapedRay end) {
     ++ends;
 }
 
+// Takes the last of the ends.
+EscapedRay take_end(out vec3 throughput) {
+    bool is_second = ends == 2;
+    --ends;
+    throughput = is_second ? second_throughput : first_throughput;
+    if (is_second) { return second_end; }
+    return first_end;
+}
+
 // Adds the light at the ends of rays.
 void add_ends() {
+    vec3 throughput;
     while (ends > 0) {
-        EscapedRay end = first_end;
-        vec3 throughput = first_throughput;
-        if (ends == 2) {
-            end = second_end;
-            throughput = second_throughput;
-        }
+        EscapedRay end = take_end(throughput);
         traced_radiance += throughput * escaped_radiance(end);
-        if (--ends == 0) { break; }
+        if (ends == 0) { break; }
     }
 }
 

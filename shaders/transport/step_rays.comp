@@ -1,5 +1,6 @@
 // One step of each live ray of a generation: its light, and up to two branches that go on, at places of their own. So nothing depends
-// on the order in which invocations run. The CPU has found what rays hit. MISSES: of the rays that hit nothing.
+// on the order in which invocations run. The CPU has found what rays hit. MISSES: of the rays that hit nothing. Light of opaque
+// objects at their ends is left to shade_ends.comp.
 
 #include <constants>
 
@@ -12,6 +13,11 @@ layout(local_size_x = COMPUTE_GROUP) in;
 #include "transport/ray_step.glsl"
 #include "transport/first_ray.glsl"
 #include "transport/stored_rays.glsl"
+#if OPAQUE
+#include "transport/stored_ends.glsl"
+
+layout(std430, binding = END_COUNTS_BINDING) writeonly buffer EndCounts { uint end_counts[]; };
+#endif
 
 layout(std430, binding = LIVE_RAYS_BINDING) readonly buffer LiveRays { int live_rays[]; };   // rows: number, place, pixel; path, object, triangle, weights of the hit
 layout(std430, binding = RAY_LIGHT_BINDING) writeonly buffer RayLight { vec4 ray_light[]; };  // and fraction that is lost
@@ -44,12 +50,24 @@ void main() {
         primary = primary_hit(pixel_at(pixel_of(word)), front, variance);
     }
     Ray weaker;
-    int goes_on = follow(ray, weaker, hit, primary, channel, known);
-    vec4 light = vec4(traced_radiance, traced_lost);
-#if DISPERSION
-    if (mirrored == 0) { light *= vec4(equal(ivec4(channel), ivec4(0, 1, 2, channel))) * vec4(1.0, 1.0, 1.0, 1.0 / 3.0); }
+    int goes_on = follow_to_end(ray, weaker, hit, primary, channel, known), stored = 0;
+#if MISSES
+    traced_radiance += first_throughput * radiance_beyond(first_end);
+#else
+    while (ends > 0) {
+        vec3 throughput;
+        EscapedRay end = take_end(throughput);
+#if OPAQUE
+        for (bool on_opaque = end.object != AIR; on_opaque; on_opaque = false) { store_end(2 * at + stored++, end, throughput); }
 #endif
-    ray_light[number] = light;
+        for (bool leaves = end.object == AIR; leaves; leaves = false) { traced_radiance += throughput * radiance_beyond(end); }
+        if (ends == 0) { break; }
+    }
+#endif
+    ray_light[number] = vec4(of_channel(traced_radiance, channel), lost_of_channel(traced_lost));
+#if OPAQUE && !MISSES
+    end_counts[at] = uint(stored);
+#endif
 #if !MISSES
     branch_pixels[2 * at] = goes_on == NONE ? NO_RAY : word;
     branch_pixels[2 * at + 1] = goes_on == BOTH ? word : NO_RAY;

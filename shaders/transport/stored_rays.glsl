@@ -1,5 +1,5 @@
 // Rays of a generation in storage buffers: a record of each, as short as the scene allows, and where it starts, its direction and the
-// pixel that it belongs to, which the CPU reads. Needs ray_step.glsl.
+// pixel that it belongs to, which the CPU reads. Needs ray_step.glsl and first_ray.glsl.
 
 layout(std430, binding = RAYS_BINDING) readonly buffer Rays { uint rays[]; };
 layout(std430, binding = RAY_SEGMENTS_BINDING) readonly buffer RaySegments { float ray_segments[]; };
@@ -92,4 +92,19 @@ Ray stored_ray(int place) {
     }
 #endif
     return ray;
+}
+
+// Light of rays of one channel, where each is traced for itself.
+vec3 of_channel(vec3 light, int channel) {
+#if DISPERSION
+    if (mirrored == 0) { return light * vec3(equal(ivec3(channel), ivec3(0, 1, 2))); }
+#endif
+    return light;
+}
+
+float lost_of_channel(float lost) {
+#if DISPERSION
+    if (mirrored == 0) { return lost / 3.0; }
+#endif
+    return lost;
 }

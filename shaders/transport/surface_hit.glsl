@@ -94,6 +94,15 @@ void pass_absorber(ObjectRow wall, float cosine, inout vec3 emitted, inout vec3 
     throughput *= transmittance(wall.extinction * through);
 }
 
+#if !ONE_SURFACE
+uniform vec3 contact_low;   // bounds of all places in which surfaces of two objects may lie together
+uniform vec3 contact_high;
+
+bool may_touch(vec3 point) {
+    return all(greaterThanEqual(point, contact_low)) && all(lessThanEqual(point, contact_high));
+}
+#endif
+
 const int UNKNOWN = -2;  // object of a hit that is still to be found
 
 // The hit for `surface_hit` to begin with, between two distances on a ray: of several objects it is looked for there, in the loop
@@ -158,7 +167,7 @@ SurfaceHit surface_hit(vec3 origin, vec3 direction, uvec4 interior, float start,
 #if ONE_SURFACE
         break;
 #else
-        if (rank == 2) { break; }
+        if (rank == 2 || (surface == 0 && !may_touch(origin + hit.path * direction))) { break; }
         if (surface == 0) {
             float within = path_within(direction, face_normal);
             start = max(hit.path - 0.5 * within, 0.0);

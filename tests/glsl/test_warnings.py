@@ -21,6 +21,7 @@ SETTLED_IN = {
     "shade/backdrop.frag": {"INFINITE": 0},
     "shade/ground_shadows.frag": {"SHADOW_MAPS": 1},
     "shade/layers_over.frag": {"SHARE": 1},
+    "transport/shade_ends.comp": {"OPAQUE": 1},
     "volume/light_lists.frag": {"GRADIENT": 1, "SCATTER": 0, "MARCH": 0},
 }
 

@@ -71,6 +71,9 @@ STORAGE_BINDINGS = {
     "ray_light": 6,
     "pixel_rays": 0,
     "traced_light": 7,
+    "ray_ends": 8,
+    "end_counts": 9,
+    "ended_rays": 0,
 }
 
 #: Invocations in a group of a compute shader.

@@ -72,6 +72,10 @@ RECORD = 13
 #: Largest value of a channel.
 _ONE = 65535
 
+#: Diagonals of a scene by which bounds of objects are larger where these may touch: twice as far as surfaces count as
+#: in one place, on a ray that grazes them.
+_CONTACT_REACH = 2e-4
+
 
 @dataclass(frozen=True, eq=False)
 class PackedMesh:
@@ -202,6 +206,8 @@ class SceneHierarchies:
         Number of the first triangle of the mesh of each object that has been placed.
     surface_table : int
         Texel behind the triangles at which the table of the textures of surfaces begins, if the scene has any.
+    contacts : (2, 3) float64
+        Bounds of all places in which surfaces of two objects that have been placed may lie together.
     """
 
     def __init__(
@@ -238,6 +244,7 @@ class SceneHierarchies:
             _check_texels(gl, texels)
         self.nodes, self.triangles = _texture(gl, first, nodes), _texture(gl, end, triangles)
         self.object_nodes = 0
+        self.contacts: Array = np.zeros((2, 3))
         self.first_triangles = np.zeros(0, np.int32)
         self._placed: tuple[Hashable, tuple[Fields, ...], tuple[float, float, float, float]] | None = None
 
@@ -273,6 +280,7 @@ class SceneHierarchies:
         reserved[: len(nodes)] = nodes
         self.nodes.write(reserved, viewport=(0, 0, _WIDTH, self._rows))
         self.first_triangles = np.array([self._spans[id(body.mesh)].triangle for body in scene.objects], np.int32)
+        self.contacts = _contacts(boxes, _CONTACT_REACH * scene.diagonal)
         return tuple(self._placement(body, center) for body in scene.objects), (*middle, scale)
 
     def faces(self, scene: Scene, objects: Integers, triangles: npt.NDArray[np.integer]) -> Integers:
@@ -326,6 +334,19 @@ class HierarchyCache:
         if self._held is not None:
             self._held.release()
             self._held = None
+
+
+def _contacts(boxes: Array, reach: float) -> Array:
+    """(2, 3): bounds of all places within a reach of the boxes (n, 2, 3) of two objects; empty if none are."""
+    low, high = boxes[:, 0] - reach, boxes[:, 1] + reach
+    found = np.array([np.full(3, 1e30), np.full(3, -1e30)])
+    for i in range(len(boxes) - 1):
+        below, above = np.maximum(low[i], low[i + 1 :]), np.minimum(high[i], high[i + 1 :])
+        shared = (below <= above).all(axis=1)
+        if shared.any():
+            found[0] = np.minimum(found[0], below[shared].min(axis=0))
+            found[1] = np.maximum(found[1], above[shared].max(axis=0))
+    return found
 
 
 def _fading(body: Object, scale: float) -> tuple[float, float, float]:

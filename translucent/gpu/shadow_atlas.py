@@ -239,11 +239,14 @@ class GroundShadows:
         Fraction of the light of the environment that bodies take, by channel.
     rows : tuple of 2 tuples of 4 floats
         Position on the ground, from a point that counts from the center of the media.
+    plane : (float, float, float, float)
+        Unit normal upwards, and metres along it from the center of the media.
     """
 
     number: int
     texture: moderngl.Texture
     rows: tuple[tuple[float, ...], ...]
+    plane: tuple[float, ...]
 
 
 class ShadowAtlas:

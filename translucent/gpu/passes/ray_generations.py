@@ -1,4 +1,4 @@
-"""Trees of rays by generations: the CPU finds what all rays of one hit, then a compute shader lets them interact.
+"""Trees of rays by generations: the CPU finds what all rays of one hit, then compute shaders let them interact.
 
 A generation has a list of live rays, in the order of their pixels. Each leaves up to two branches at places of its own,
 twice its number and one more, and the CPU lists the branches that exist. So pictures are the same each time: no result
@@ -29,9 +29,10 @@ MOST_BYTES = 64 << 20
 #: alive at once, in bodies with many walls three.
 PLACES, MORE_PLACES = 3, 8
 
-#: Rows of the lists of live rays and what they hit; bytes of these, of light, and of the list of pixels, for each ray.
+#: Rows of the lists of live rays and what they hit; bytes of these, of light, and of the lists of pixels and of ends,
+#: for each ray.
 _ROWS = 8
-_LIVE_BYTES = 4 * _ROWS + 16 + 8
+_LIVE_BYTES = 4 * _ROWS + 16 + 8 + 4 + 16
 
 #: What the pixel of a place without a ray is; and the bits of the others that are not the channel.
 _NO_RAY, _PIXEL = np.uint32(0xFFFFFFFF), np.uint32(0x3FFFFFFF)
@@ -60,6 +61,7 @@ class RayGenerations:
         self._unsettled = free
         self._begin = ComputeVariants(gl, "transport/begin_rays.comp", **units, unsettled=free)
         self._step = ComputeVariants(gl, "transport/step_rays.comp", **units)
+        self._shade = ComputeVariants(gl, "transport/shade_ends.comp", **units)
         self._sum = ComputeVariants(gl, "transport/sum_ray_light.comp")
 
     def trace(
@@ -83,15 +85,18 @@ class RayGenerations:
             Of the shaders, whose textures are bound.
         """
         width = job.targets.size[0]
-        programs = (
+        programs = _Programs(
             self._begin.program(**switches),
-            *(self._step.program(**switches, MISSES=misses) for misses in (False, True)),
+            self._step.program(**switches, MISSES=False),
+            self._step.program(**switches, MISSES=True),
+            self._shade.program(**switches) if switches["OPAQUE"] else None,
             self._sum.program(),
         )
         hierarchies = job.resources.hierarchies.of(job.scene, textured=job.features.textured)
         room = _Room(job, part, switches, hierarchies.first_triangles)
-        for program in programs:
-            set_used(program, {**values, "ray_words": room.words, "columns": width})
+        sizes = {"ray_words": room.words, "end_words": room.end_words, "columns": width}
+        for program in filter(None, programs):
+            set_used(program, {**values, **sizes})
         if job.bending:
             job.targets[mask].color_attachments[0].use(self._unsettled)
         hits = job.resources.ray_hits.of(job.scene, media_center(job.scene))
@@ -101,20 +106,12 @@ class RayGenerations:
         waiting = room.rectangles(part)[::-1]
         while waiting:
             rectangle = waiting.pop()
-            if not self._trace_rectangle(rectangle, room, hits, *programs):
+            if not self._trace_rectangle(rectangle, room, hits, programs):
                 waiting += _halves(rectangle)[::-1]
 
-    def _trace_rectangle(
-        self,
-        rectangle: Rectangle,
-        room: _Room,
-        hits: EmbreeHits,
-        begin: moderngl.ComputeShader,
-        step: moderngl.ComputeShader,
-        leave: moderngl.ComputeShader,
-        sum_up: moderngl.ComputeShader,
-    ) -> bool:
+    def _trace_rectangle(self, rectangle: Rectangle, room: _Room, hits: EmbreeHits, programs: _Programs) -> bool:
         """Trace the rays of a rectangle; returns False if there is no room for them all."""
+        begin, step, leave, shade, sum_up = programs
         places = _places(rectangle)
         set_used(begin, {"rectangle": rectangle, "places": places})
         room.bind_branches()
@@ -131,9 +128,23 @@ class RayGenerations:
             room.bind()
             self._step.run(step, found)
             self._step.run(leave, count - found)
+            if shade is not None:
+                ended = room.put_ended(found)
+                set_used(shade, {"ended_count": ended})
+                self._shade.run(shade, ended)
             room.bind_sums()
             self._sum.run(sum_up, pixels)
         return True
+
+
+class _Programs(NamedTuple):
+    """Compute shaders of a frame, in the order in which they run; `shade` where there are opaque objects."""
+
+    begin: moderngl.ComputeShader
+    step: moderngl.ComputeShader
+    leave: moderngl.ComputeShader
+    shade: moderngl.ComputeShader | None
+    sum_up: moderngl.ComputeShader
 
 
 class _Live(NamedTuple):
@@ -157,9 +168,10 @@ class _Room:
     ) -> None:
         self.channels = 3 if switches["DISPERSION"] else 1
         self.words = _words(switches)
+        self.end_words = _end_words(switches)
         branch = 4 * (self.words + 7)
         width, height = part.scissor[2:]
-        most = MOST_BYTES // (2 * branch + _LIVE_BYTES // 2)
+        most = MOST_BYTES // (2 * branch + (_LIVE_BYTES + 8 * self.end_words) // 2)
         self.places = min(MORE_PLACES * self.channels * _places((0, 0, width, height)), most)
         self.live = self.places // 2
         storage = job.resources.rays
@@ -170,10 +182,18 @@ class _Room:
             )
             for side in range(2)
         )
-        self._live, self._light, self._sums = (
+        self._live, self._light, self._sums, self._ends, self._end_counts, self._ended = (
             storage.get(name, size * (self.live + 1))
-            for name, size in (("live", 4 * _ROWS), ("light", 16), ("sums", 8))
+            for name, size in (
+                ("live", 4 * _ROWS),
+                ("light", 16),
+                ("sums", 8),
+                ("ends", 8 * self.end_words),
+                ("end_counts", 4),
+                ("ended", 16),
+            )
         )
+        self._numbers = np.zeros(0, np.int32), np.zeros(0, np.int32)
         self._first_triangles = first_triangles
 
     def rectangles(self, part: Part) -> list[Rectangle]:
@@ -191,9 +211,26 @@ class _Room:
     def bind(self) -> None:
         """Bind the buffers of a step."""
         self.bind_branches()
-        read = {"rays": self._rays[0], "ray_segments": self._rays[1], "live_rays": self._live, "ray_light": self._light}
+        read = {
+            "rays": self._rays[0],
+            "ray_segments": self._rays[1],
+            "live_rays": self._live,
+            "ray_light": self._light,
+            "ray_ends": self._ends,
+            "end_counts": self._end_counts,
+        }
         for name, buffer in read.items():
             buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
+
+    def put_ended(self, found: int) -> int:
+        """List those of the first rays, with a hit, that end on opaque objects; returns how many there are."""
+        counts = np.frombuffer(self._end_counts.read(4 * max(found, 1)), np.uint32)[:found]
+        at = np.flatnonzero(counts)
+        numbers, words = self._numbers
+        channels = words.take(at).view(np.uint32) >> np.uint32(30)
+        self._ended.write(np.stack([2 * at, counts.take(at), numbers.take(at), channels], axis=1).astype(np.uint32))
+        self._ended.bind_to_storage_buffer(STORAGE_BINDINGS["ended_rays"])
+        return len(at)
 
     def bind_sums(self) -> None:
         """Bind the lists of the rays of pixels."""
@@ -227,6 +264,7 @@ class _Room:
         rows[5, :hit] = hits.triangle.take(found) + self._first_triangles.take(rows[4, :hit])
         rows[6:, :hit] = hits.weights.take(found, axis=1).view(np.int32)
         self._live.write(rows)
+        self._numbers = rows[0], rows[2]
         pixels = live.pixels & _PIXEL
         first = np.concatenate([[0], np.flatnonzero(pixels[1:] != pixels[:-1]) + 1, [len(pixels)]])
         self._sums.write(np.stack([first, pixels.take(first, mode="clip")], axis=1).astype(np.uint32))
@@ -238,6 +276,11 @@ def _words(switches: Mapping[str, bool | int]) -> int:
     interior = 1 if switches["ONE_OBJECT"] else 4
     outwards = 3 if switches["LAYERED"] or switches["DIFFUSED"] else 0
     return 5 + interior + 2 * switches["MICROFACETS"] + outwards + 12 * switches["FOOTPRINTS"]
+
+
+def _end_words(switches: Mapping[str, bool | int]) -> int:
+    """Words of the record of an end in ``shaders/transport/stored_ends.glsl``."""
+    return 16 + bool(switches["MICROFACETS"]) + 4 * bool(switches["TEXTURED"])
 
 
 def _places(rectangle: Rectangle) -> int:

@@ -298,7 +298,8 @@ class ShadowMapsPass:
 
 def _mapped_ground(job: FrameJob) -> Mirror | None:
     """Ground whose shadows of the environment are found once for all samples; None where they are not."""
-    if job.bending or job.any_eye or not job.scene.environment_shadows or not job.plan.has(PassName.OPAQUE):
+    few = job.bending and job.plan.shadows.directions is not None
+    if few or job.any_eye or not job.scene.environment_shadows or not job.plan.has(PassName.OPAQUE):
         return None
     return ground_from_above(job.scene)
 
@@ -429,7 +430,8 @@ class GroundShadowsPass:
                 self._variants.draw_part(part, program, target)
             self._made_of = key
         rows = [(*row, float(row @ (center - middle))) for row in axes / np.square(axes).sum(axis=1, keepdims=True)]
-        return GroundShadows(scene.objects.index(ground.ground), target.color_attachments[0], tuple(rows))
+        plane = *ground.normal.tolist(), ground.height - float(ground.normal @ center)
+        return GroundShadows(scene.objects.index(ground.ground), target.color_attachments[0], tuple(rows), plane)
 
     def _sized(self, side: int) -> moderngl.Framebuffer:
         """Framebuffer of the map, so many texels wide."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
@@ -42,6 +43,7 @@ _RAY_SAMPLERS = (
     "diffused_light",
     "shadow_sums",
     "shadow_ends",
+    "ground_shadows",
 )
 _SAMPLERS = *_RAY_SAMPLERS, "emitted_radiance_sum", "straight_transmittance"
 _ENTERED = ("entered", "surface_parameters", "surface_color")
@@ -112,6 +114,7 @@ class TracedInterfacesPass:
             "picture_first": int(_shows_more(job)),
             **scene_values,
             **_ground(job.scene),
+            **_ground_shadows(job, switches),
             **_footprint(job),
         }
         if mirror is not None and not any(record):
@@ -186,6 +189,8 @@ class TracedInterfacesPass:
             textures["diffused_light"] = job.diffused_light.texture
         self._variants.bind(emitted_radiance_sum=emitted, straight_transmittance=through, **textures)
         resources.shadows.use(self._variants.units)
+        if resources.shadows.ground is not None:
+            resources.shadows.ground.texture.use(self._variants.units["ground_shadows"])
 
 
 def _shows_more(job: FrameJob) -> bool:
@@ -199,6 +204,7 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
     scene, environment = job.scene, job.scene.environment
     surfaces = [body.surface for body in scene.bodies if body.surface is not None]
     rough = any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces)
+    shadows = interface_shadow_switches(job)
     return {
         "FORKS": job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
         "FROM_EYE": job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
@@ -212,7 +218,9 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
         "MIRROR": mirror,
         "DISPERSION": any(surface.dispersion > 0 for surface in surfaces),
         "OPAQUE": job.features.has_opaque,
-        **interface_shadow_switches(job),
+        **shadows,
+        # Shadows on the ground that the picture does not show are looked up in the map of it.
+        "GROUND_SHADOWS": 2 if shadows["SHADOW_MAPS"] and job.resources.shadows.ground is not None else 0,
         "DIMMED": job.features.dims_interfaces,
         "DIFFUSE_BASE": any(s.transmission < 1 or s.transmission_texture is not None for s in surfaces),
         **background_switches(environment),
@@ -255,6 +263,14 @@ def _ground(scene: Scene) -> dict[str, Any]:
     return {"ground_object": scene.objects.index(ground.ground), "ground_plane": (*ground.normal, height)}
 
 
+def _ground_shadows(job: FrameJob, switches: Mapping[str, bool | int]) -> dict[str, Any]:
+    """Where the map of shadows on the ground lies."""
+    ground = job.resources.shadows.ground
+    if not switches["GROUND_SHADOWS"] or ground is None:
+        return {}
+    return {"ground_rows": ground.rows, "mapped_ground": ground.plane}
+
+
 def faintest_throughput(forks: int) -> float:
     """Throughput of a ray, its three channels together, below which it is not followed.
 
@@ -287,6 +303,7 @@ def traced_scene(job: FrameJob, stack: ExitStack) -> tuple[dict[str, moderngl.Te
         "object_nodes": hierarchies.object_nodes,
         "objects_frame": frame,
         "surface_table": hierarchies.surface_table,
+        **dict(zip(("contact_low", "contact_high"), map(tuple, hierarchies.contacts.tolist()), strict=True)),
         # Metres from the center of the media within which all bodies are.
         "bodies_radius": 0.5 * float(np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0))),
     }
