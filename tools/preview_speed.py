@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from translucent.frames.animation import on_stage
 from translucent.preview import app, viewport_renderer
 from translucent.preview.actions import OrbitBy, SetField
 from translucent.preview.document import Document, Look, Model
 from translucent.preview.script import Script
 from translucent.preview.window_state import WindowState
-from translucent.scene.turntable import on_stage
 
 VIEWPORT = (1280, 720)
 

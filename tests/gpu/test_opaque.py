@@ -12,7 +12,7 @@ from tests import references
 from translucent.frames.metrics import interior
 from translucent.geometry.solids import Box, Sphere
 
-SIZE = (112, 84)
+SIZE = (88, 66)
 BODY = Box(low=(-1, -1, -1), high=(1, 1, 1)).tessellate()
 WALL = Box.slab((6.0, 6.0), 0.2).tessellate()
 BALL = Sphere().tessellate(48)
@@ -61,6 +61,14 @@ POSITIONS = {
 }
 
 
+#: Each method with each position and with each camera, and each position with each camera.
+PLACES = sorted(
+    (position, list(CAMERAS)[(i + j) % len(CAMERAS)], method)
+    for i, position in enumerate(POSITIONS)
+    for j, method in enumerate(METHODS)
+)
+
+
 def thin(method: Any) -> tl.ThinLayer | None:
     """The one method that changes what is true: all others are ways to the same."""
     return method if isinstance(method, tl.ThinLayer) else None
@@ -84,13 +92,11 @@ def assert_equal(renderer: tl.Renderer, scene: tl.Scene, method: Any, opaque_edg
     return frame
 
 
-@each_method
-@pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
-@pytest.mark.parametrize("position", POSITIONS)
+@pytest.mark.parametrize(("position", "camera", "method"), PLACES)
 @pytest.mark.filterwarnings("ignore::translucent.errors.TranslucentWarning")
-def test_where_the_opaque_object_is(renderer: tl.Renderer, method: Any, position: str, camera: tl.Camera) -> None:
-    scene = tl.Scene([tl.Object(BODY, WINE), POSITIONS[position]], camera, lights=LIGHTS, environment=SKY)
-    assert_equal(renderer, scene, method)
+def test_where_the_opaque_object_is(renderer: tl.Renderer, method: str, position: str, camera: str) -> None:
+    scene = tl.Scene([tl.Object(BODY, WINE), POSITIONS[position]], CAMERAS[camera], lights=LIGHTS, environment=SKY)
+    assert_equal(renderer, scene, METHODS[method])
 
 
 @each_method
@@ -151,7 +157,7 @@ def test_a_hole_before_an_opaque_surface_is_marked(
     backdrop = tl.Backdrop(np.zeros((*SIZE[::-1], 3)), np.full(SIZE[::-1], 9.0)) if ends == "backdrop" else None
     alone = renderer.render(tl.Scene(bodies, camera), SIZE, method)
     frame = renderer.render(tl.Scene([*bodies, *around], camera), SIZE, method, backdrop=backdrop)
-    assert (~alone.valid).sum() > 500
+    assert (~alone.valid).sum() > 300
     assert not (frame.valid & ~alone.valid).any()
 
 
@@ -167,7 +173,7 @@ def test_bent_rays_that_end_in_an_open_body_are_marked(renderer: tl.Renderer) ->
         straight = renderer.render(tl.Scene([tl.Object(open_below, WINE), *objects], camera), SIZE)
         for frame in (renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)):
             bent = straight.valid & ~frame.valid & interior(straight.valid)
-            assert bent.sum() > 300
+            assert bent.sum() > 180
             marked.append(bent)
     alone, truly_alone, grounded, truly_grounded = marked
     assert (alone & ~grounded).sum() <= 0.02 * alone.sum()
@@ -175,16 +181,16 @@ def test_bent_rays_that_end_in_an_open_body_are_marked(renderer: tl.Renderer) ->
 
 
 @pytest.mark.filterwarnings("ignore::translucent.TranslucentWarning")
-def test_a_ground_is_marked_where_it_mirrors_a_hole(renderer: tl.Renderer) -> None:
+def test_a_ground_is_marked_where_it_mirrors_a_hole(renderer: tl.Renderer, few_shadows: None) -> None:
     """Nothing of the body is seen there directly."""
     camera = tl.Camera.look_at((0.5, 0.6, 6), (0, -0.8, 0), fov_y=35)
     frames = []
     for mesh in (BODY, CUP):
         scene = tl.staged(tl.Scene([tl.Object(mesh, tl.Medium(absorption=0.1, ior=1.5))], camera), "night")
-        frames.append(renderer.render(scene, SIZE))
+        frames.append(renderer.render(scene, (56, 42)))
     closed, cup = frames
     assert closed.valid.all()
-    assert (~closed.coverage & ~cup.valid).sum() > 100
+    assert (~closed.coverage & ~cup.valid).sum() > 25
 
 
 def test_an_opaque_object_in_a_closed_body_beside_an_open_one_is_trusted(renderer: tl.Renderer) -> None:
@@ -229,11 +235,15 @@ def _lying(position: Any) -> np.ndarray:
     return matrix
 
 
-@pytest.mark.parametrize("lights", [[], [LIGHTS[0]], [LIGHTS[1]], LIGHTS * 16], ids=["none", "point", "sun", "32"])
 @pytest.mark.parametrize(
-    "environment",
-    [SKY, tl.Environment.constant((0.5, 0.6, 0.7)), tl.Environment.checkerboard((1, 1, 1), (0, 0, 0))],
-    ids=["gradient", "constant", "checkerboard"],
+    ("lights", "environment"),
+    [
+        ([], SKY),
+        ([LIGHTS[0]], tl.Environment.constant((0.5, 0.6, 0.7))),
+        ([LIGHTS[1]], tl.Environment.checkerboard((1, 1, 1), (0, 0, 0))),
+        (LIGHTS * 16, SKY),
+    ],
+    ids=["gradient", "point, constant", "sun, checkerboard", "32, gradient"],
 )
 def test_opaque_objects_are_lit(renderer: tl.Renderer, lights: list[Any], environment: tl.Environment) -> None:
     scene = tl.Scene([tl.Object(BODY, WINE), POSITIONS["in front"]], CAMERAS["perspective"], lights, environment)

@@ -175,7 +175,7 @@ def test_a_camera_10_000_diameters_away_sees_the_same(renderer: tl.Renderer) -> 
 @pytest.mark.parametrize(("name", "light"), [("bear", "far"), ("goblet", "back")])
 def test_concave_bodies_equal_the_reference(renderer: tl.Renderer, name: str, light: str) -> None:
     mesh = tl.load_mesh(mesh_path(name))
-    d, size = mesh.diagonal, (14, 14)
+    d, size = mesh.diagonal, (10, 10)
     lights = {
         "far": tl.PointLight(mesh.center + np.array([5, 6, 3]) * d, (100 * d**2,) * 3),
         "back": tl.DirectionalLight((0.1, -0.2, 1), (1, 1, 1)),

@@ -13,6 +13,7 @@ import pytest
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.cli import main
+from translucent.frames.animation import on_stage
 from translucent.gpu.passes import shadow_maps
 from translucent.gpu.shaders import PostponedError
 from translucent.planning.request import RenderRequest
@@ -27,7 +28,6 @@ from translucent.preview.workspace import Workspace
 from translucent.scene import stages
 from translucent.scene.showcase import framing
 from translucent.scene.stages import stage_named
-from translucent.scene.turntable import on_stage
 
 SMALL = (48, 32)
 

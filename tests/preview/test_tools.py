@@ -34,7 +34,7 @@ from translucent.preview.scenes import Loaded, degrees_of, load, material_of, ro
 from translucent.preview.session import from_table, load_session, save_session, to_table
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
-from translucent.scene.lens import Lens
+from translucent.scene.camera import Lens
 
 SEEN = dataclasses.replace(Document(), orbit=Orbit())
 PLACE = Placed(1, (0.1, -0.2, 0.3), (20.0, -50.0, 110.0), (1.0, 2.0, 0.5))

@@ -89,10 +89,6 @@ value = 0.0
 do = "keep"
 name = "1"
 [[action]]
-do = "scatter"
-color = "#f2e0b8"
-radius = "2mm"
-[[action]]
 do = "save"
 kind = "save session"
 file = "{changed}"
@@ -200,7 +196,6 @@ def test_the_window_does_what_a_script_says(preview, tmp_path: Path) -> None:  #
     assert (round(y, 6), round(z, 6)) == (0.0, 0.0)
     assert [light.radius for light in document.lights] == [0.0]
     assert [one.name for one in document.snapshots] == ["1"]
-    assert min(document.material.scattering) > 100.0
     assert load_session(asked).placed == (), "the built-in browser asks where it is to be written"
     assert "[deep_red]" in (tmp_path / "translucent" / "presets" / "deep_red.toml").read_text()
     window = np.asarray(Image.open(tmp_path / "window.png").convert("RGB"))

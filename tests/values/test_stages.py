@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from translucent.frames.animation import turntable
 from translucent.geometry.solids import Box, Sphere
 from translucent.media.colors import parse_color
 from translucent.scene.grounds import before_page, page_radiance
@@ -24,7 +25,6 @@ from translucent.scene.stages import (
     upright_turn,
     world_vertices,
 )
-from translucent.scene.turntable import turntable
 
 SIZE = (160, 90)
 BOX = Box((-1.0, -0.5, -0.25), (1.0, 0.5, 0.25)).tessellate()

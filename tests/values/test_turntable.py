@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from translucent.frames.animation import framed_all_around, swept_points, turntable
 from translucent.geometry.solids import Box
-from translucent.scene.turntable import framed_all_around, swept_points, turntable
 
 SIZE = (160, 90)
 

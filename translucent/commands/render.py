@@ -178,9 +178,9 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     A medium behind an --object is for the object of that name: --object Wine --preset merlot.
     """
     import translucent as tl
+    from translucent.frames.animation import framed_all_around
     from translucent.gpu.context import quick_compiles
     from translucent.scene.stages import NO_STAGE, STAGED_TONE
-    from translucent.scene.turntable import framed_all_around
 
     pixels, began = read_size(given.size), time.perf_counter()
     request = replace(given.choices.read(), samples=given.samples, transparent=given.transparent, denoise=given.denoise)
@@ -396,8 +396,7 @@ class Pictures:
         return frame, totals.summary((width, height))
 
     def _write_turntable(self, scene: Scene, draw: Callable[[Scene], Frame], count: int) -> Frame:
-        from translucent.frames.animation import write_animation
-        from translucent.scene.turntable import turntable
+        from translucent.frames.animation import turntable, write_animation
 
         views = turntable(scene, count)
         first = draw(next(views))

@@ -24,7 +24,6 @@ from translucent.files.reading import require_room
 from translucent.geometry.foreign import foreign_name, is_scene, unit_of
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh, Triangles, joined
 from translucent.gltf.accessors import Accessors, raw_mesh
-from translucent.gltf.deforming import animation_end
 from translucent.gltf.file import COMPRESSIONS, GltfFile, JsonFields, LeftOut, gltf_of, label, read_gltf
 from translucent.gltf.materials import (
     CLEARCOAT,
@@ -38,7 +37,7 @@ from translucent.gltf.materials import (
     VOLUME,
 )
 from translucent.gltf.nodes import VARIANTS, node_transforms, posed, primitives, variant_names
-from translucent.gltf.objects import UNLIT, scene_objects
+from translucent.gltf.objects import UNLIT, animation_end, scene_objects
 from translucent.gltf.textures import TEXTURE_TRANSFORM
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
@@ -132,7 +131,7 @@ def load_scene(
         Name of a variant of materials (KHR_materials_variants). Default: the materials that primitives have themselves.
     time : float, optional
         Seconds on the clock of the animations at which nodes, skins and morph targets stand; see
-        `translucent.gltf.nodes` and `translucent.gltf.deforming`. Default: as they are written.
+        `translucent.gltf.nodes` and `translucent.gltf.objects`. Default: as they are written.
     draft_extensions : bool
         Whether to read KHR_materials_scatter and KHR_materials_volume_scatter, which are drafts.
 

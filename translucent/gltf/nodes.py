@@ -8,7 +8,7 @@ and world coincide.
 Source: KHR_materials_volume ("thickness in the coordinate space of the mesh"), KHR_materials_variants, glTF 2.0
 section 3.5.
 
-Not read: instancing extensions. `translucent.gltf.deforming` has skins and morph targets.
+Not read: instancing extensions. `translucent.gltf.objects` has skins and morph targets.
 
 Animations follow glTF 2.0, section 3.11 and appendix C (interpolation): STEP, LINEAR (spherical for rotations, along
 the shorter arc) and CUBICSPLINE. Before the first key of a sampler its first value holds, after the last its last. A

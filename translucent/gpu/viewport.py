@@ -25,7 +25,7 @@ from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import before_drawing, before_making, build_program, set_uniform
 from translucent.gpu.stand_in import StandIn
 from translucent.planning.render_plan import RenderPlan
-from translucent.scene.lens import Lens
+from translucent.scene.camera import Lens
 from translucent.scene.scene import Scene
 
 #: Strides of steps; the sides of pictures are multiples of the largest.

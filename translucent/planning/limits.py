@@ -239,7 +239,7 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
             "light of these objects that is scattered ahead on its way to the eye"
         )
         if scene.opaque:
-            text += "; light that grounds reflect into it, up to 25 % of the light of a body on a bright ground"
+            text += "; light that grounds reflect into it, up to 30 % of the light of a body on a bright ground"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     rendered = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
     if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in rendered]:
@@ -263,6 +263,10 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
     return notes
 
 
+#: Mean cosine of scattering from which on what is scattered ahead is still seen as an image of what is behind.
+STRONGLY_AHEAD = 0.5
+
+
 def _may_hold(body: Object, item: Object) -> bool:
     """Whether an opaque object may be inside a body, so that it is lit by the light there."""
     meet = (item.bounds[0] < body.bounds[1]).all() and (item.bounds[1] > body.bounds[0]).all()
@@ -283,6 +287,11 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             f"{object_names(bodies)}: light of the environment that other bodies scatter onto them, and details that "
             "are smaller than a cell: spikes and edges are up to 15 % dark"
         )
+        if len(scene.bodies) > 1:
+            text += "; one beside another is up to 10 % dark"
+        ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
+        if any(ahead) and scene.environment.kind == "image":
+            text += "; bright parts of the environment that they scatter ahead are up to 30 % dark"
         if any(body.medium is not None and body.medium.emits for body in bodies):
             text += "; light that they emit and scatter is up to 10 % dark"
         if held := [item for item in scene.opaque if any(_may_hold(body, item) for body in bodies)]:

@@ -20,9 +20,8 @@ from translucent.media.medium import MAX_COEFFICIENT, MAX_EMISSION, MAX_IOR, Med
 from translucent.planning.flags import Flags
 from translucent.planning.methods import METHODS
 from translucent.planning.scattering import SCATTERINGS
-from translucent.scene.camera import MAX_COORDINATE, Camera, direction_from, framing_directions
+from translucent.scene.camera import MAX_COORDINATE, Camera, Lens, direction_from, framing_directions
 from translucent.scene.environment import MAX_EXPOSURE
-from translucent.scene.lens import Lens
 from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.scene import Object
 from translucent.scene.showcase import DEFAULT_COLOR, framing

@@ -16,7 +16,7 @@ from translucent.assets import mesh_names
 from translucent.errors import InputError
 from translucent.formulas.color import srgb_to_linear
 from translucent.formulas.sampling import sample_shifts
-from translucent.frames.animation import check_animation, write_animation
+from translucent.frames.animation import check_animation, turntable, write_animation
 from translucent.frames.aovs import EMPTY, false_colors
 from translucent.frames.frame import Frame
 from translucent.frames.writing import SUFFIXES, check_output
@@ -51,16 +51,14 @@ from translucent.preview.scenes import (
 from translucent.preview.tasks import Task
 from translucent.preview.worker import Pool, Urgency, report
 from translucent.renderer import Renderer
-from translucent.scene.camera import Window, direction_from
+from translucent.scene.camera import Lens, Window, direction_from
 from translucent.scene.environment import Environment
-from translucent.scene.lens import Lens
 from translucent.scene.lights import SphereLight
 from translucent.scene.scene import Object, Scene
 from translucent.scene.showcase import SOLID_IOR
 from translucent.scene.stages import NO_STAGE
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Texture
-from translucent.scene.turntable import turntable
 from translucent.scene_files import is_composed
 
 if TYPE_CHECKING:
@@ -372,7 +370,7 @@ def python_code(recipe: Recipe) -> str:
     for added in document.lights:
         lines += [f"scene = dataclasses.replace(scene, lights=[*scene.lights, {_light_text(added)}])"]
     if look.depth_of_field:
-        lines += ["# depth of field: translucent.scene.lens.Lens gives the cameras; this picture is through a pinhole"]
+        lines += ["# depth of field: translucent.scene.camera.Lens gives cameras; this picture is through a pinhole"]
     choices = [f"samples={document.export.samples:.0f}"]
     choices += ["denoise=True"] if document.export.denoise else []
     request = request_of(document)

@@ -18,6 +18,7 @@ from translucent.errors import InputError
 from translucent.formulas.bsdf import brdf_table
 from translucent.formulas.color import srgb_to_linear
 from translucent.formulas.phase import parse_phase
+from translucent.frames.animation import on_stage
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals, keep_drawn_normals
 from translucent.geometry.solids import Box
@@ -78,7 +79,6 @@ from translucent.scene.stages import (
 )
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Texture
-from translucent.scene.turntable import on_stage
 from translucent.scene_files import ComposedScene, is_composed, load_composed
 from translucent.units import metres_per_unit
 

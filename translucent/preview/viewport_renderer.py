@@ -44,7 +44,7 @@ from translucent.preview.scenes import method_of, request_of, tone_of
 from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
-from translucent.scene.lens import Lens
+from translucent.scene.camera import Lens
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import filled, with_roughness
 from translucent.scene.stages import STAGED_TONE

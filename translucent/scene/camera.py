@@ -1,7 +1,11 @@
-"""Cameras: right-handed, looking along -Z of their own frame, +Y up. Row 0 of every image is the top row."""
+"""Cameras: right-handed, looking along -Z of their own frame, +Y up. Row 0 of every image is the top row.
+
+A thin lens takes the place of a pinhole: the mean of pictures from all over its aperture is in focus in one plane.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -24,6 +28,9 @@ FRAMED_AT_ONCE = 1 << 16
 
 #: Largest coordinate of an eye or target in metres, as for meshes.
 MAX_COORDINATE = 1e18
+
+#: Angle in radians between one point and the next of a spiral that fills a disc evenly (Vogel 1979).
+GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 
 
 @dataclass(frozen=True)
@@ -314,3 +321,56 @@ def view_ray(
     ndc = 2.0 * np.asarray(pixel, np.float64) / np.asarray(size, np.float64) - 1.0
     across = ndc[..., :1] * np.asarray(right, np.float64) - ndc[..., 1:] * np.asarray(up, np.float64)
     return np.asarray(np.asarray(forward, np.float64) + across)
+
+
+@dataclass(frozen=True)
+class Lens:
+    """Thin lens in place of the pinhole of a perspective camera.
+
+    A picture through a lens is the mean of those through the points of its aperture, each with the frustum in which the
+    plane in focus stays where it is (Haeberli and Akeley 1990, *The Accumulation Buffer*).
+
+    Parameters
+    ----------
+    diameter : float
+        Of the aperture in metres, > 0.
+    focus : float
+        Distance of the plane in focus from the eye, along the view, in metres, > 0.
+
+    Raises
+    ------
+    InputError
+        If one of them is not above 0 and finite.
+    """
+
+    diameter: float
+    focus: float
+
+    def __post_init__(self) -> None:
+        for name in ("diameter", "focus"):
+            if not 0.0 < (value := getattr(self, name)) < math.inf:
+                raise InputError(f"lens {name} {value!r}", "not above 0 and finite", "give metres")
+
+    def camera(self, camera: Camera, size: tuple[int, int], number: int, count: int) -> Camera:
+        """Camera at one of `count` points of the aperture, for a picture of a size in pixels.
+
+        An orthographic camera stays as it is: all of its picture is in focus.
+        """
+        if camera.fov_y is None:
+            return camera
+        offset = 0.5 * self.diameter * aperture_point(number, count)
+        half_width, half_height = camera.half_extent(size)
+        # What is at the distance of the focus, right and up from the axis, is seen there from every point.
+        right = -0.5 * size[0] * offset[0] / (self.focus * half_width)
+        down = 0.5 * size[1] * offset[1] / (self.focus * half_height)
+        window = camera.window or Window(0, 0, size)
+        pose = camera.pose.copy()
+        pose[:3, 3] += offset[0] * camera.right + offset[1] * camera.up
+        moved = Window(window.left + right, window.top + down, window.whole)
+        return dataclasses.replace(camera, pose=pose, window=moved)
+
+
+def aperture_point(number: int, count: int) -> Array:
+    """(2,): point of `count` that fill the unit disc evenly."""
+    radius, angle = math.sqrt((number + 0.5) / count), GOLDEN_ANGLE * number
+    return radius * np.array([math.cos(angle), math.sin(angle)])
