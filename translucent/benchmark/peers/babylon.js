@@ -28,13 +28,13 @@ window.drawScene = async ({ home, size }) => {
   const side = PARTS * size;
   engine.setSize(side, side);
   const scene = new Scene(engine);
+  scene.useRightHandedSystem = true; // as glTF
   scene.imageProcessingConfiguration.applyByPostProcess = true; // materials leave linear radiance, and nothing processes it
   const map = new HDRCubeTexture(home + "environment.hdr?" + told.name, scene, 256, false, true, false, true);
   await ready(map);
   scene.environmentTexture = map;
   const container = await LoadAssetContainerAsync(home + "scene.glb?" + told.name, scene);
   container.addAllToScene();
-  map.rotationY = 0;
   scene.activeCamera = container.cameras[0];
   const sky = scene.createDefaultSkybox(map, true, scene.activeCamera.maxZ * 0.9, 0, false);
   sky.material.imageProcessingConfiguration = scene.imageProcessingConfiguration;
@@ -42,6 +42,9 @@ window.drawScene = async ({ home, size }) => {
     if (light.getTypeID() !== 1) continue;
     const shadows = new ShadowGenerator(2048, light);
     shadows.usePercentageCloserFiltering = true;
+    shadows.bias = 2e-3;
+    shadows.normalBias = 0.01;
+    light.autoCalcShadowZBounds = true;
     for (const mesh of container.meshes) {
       shadows.addShadowCaster(mesh);
       mesh.receiveShadows = true;
