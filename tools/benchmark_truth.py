@@ -37,7 +37,7 @@ from translucent.benchmark.truth import (
 )
 
 #: Noise of a half that is wanted: of clear scenes, and of those that scatter.
-WANTED, WANTED_SCATTERING = 0.029, 0.073
+WANTED, WANTED_SCATTERING = 0.028, 0.076
 
 #: Paths of a trial, and the fewest and most of a half.
 TRIAL, FEWEST, MOST = 32, 128, 3000

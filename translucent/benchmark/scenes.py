@@ -229,12 +229,12 @@ def _glass_ball() -> Scene:
 
 def _glass_shell() -> Scene:
     shell = SphericalShell(1.0, 0.84).tessellate(64)
-    return _framed([Object(shell, _tinted(shell, (0.7, 0.9, 0.95), 0.15, ior=GLASS_IOR))], window_room())
+    return _framed([Object(shell, _tinted(shell, (0.7, 0.9, 0.95), 0.15, ior=GLASS_IOR))], DAY)
 
 
 def _glass_knot() -> Scene:
     knot = toolkit("knot")
-    return _framed([Object(knot, _tinted(knot, (0.18, 0.62, 0.35), 0.15, ior=GLASS_IOR))], window_room())
+    return _framed([Object(knot, _tinted(knot, (0.18, 0.62, 0.35), 0.15, ior=GLASS_IOR))], DAY)
 
 
 def _lens() -> Scene:
@@ -257,7 +257,7 @@ def _wine() -> Scene:
     red = Medium.from_color((0.62, 0.05, 0.09), 0.02, ior=1.34)
     goblet = Object(toolkit("goblet"), preset("crystal").medium, priority=1)
     camera = Camera.look_at((0.0, 0.20, 0.62), (0.0, 0.1, 0.0), fov_y=22.0)
-    return Scene([goblet, Object(toolkit("wine"), red)], camera, (), window_room(), "priority")
+    return Scene([goblet, Object(toolkit("wine"), red)], camera, (), DAY, "priority")
 
 
 def _ice() -> Scene:
@@ -268,7 +268,7 @@ def _ice() -> Scene:
         Object(_ball(0.8), drink, priority=1),
         Object(_ball(0.35, (0.1, 0.2, 0.1)), ice, priority=3),
     ]
-    return _framed(bodies, window_room())
+    return _framed(bodies, DAY)
 
 
 def _core_in_ball() -> Scene:
@@ -277,7 +277,7 @@ def _core_in_ball() -> Scene:
         Object(outer, _tinted(outer, (0.8, 0.95, 0.9), ior=1.33)),
         Object(core, _tinted(outer, (0.95, 0.55, 0.2), ior=1.8), priority=1),
     ]
-    return _framed(bodies, window_room())
+    return _framed(bodies, DAY)
 
 
 # --- rough interfaces ------------------------------------------------------------------------------------------------
@@ -286,7 +286,7 @@ def _core_in_ball() -> Scene:
 def _frosted(name: str, roughness: float, color: Sequence[float]) -> Scene:
     mesh = _ball(segments=64) if name == "ball" else toolkit(name)
     body = Object(mesh, _tinted(mesh, color, ior=GLASS_IOR), surface=Surface(roughness=roughness))
-    return _framed([body], window_room())
+    return _framed([body], window_room() if name == "ball" else DAY)
 
 
 # --- scattering ------------------------------------------------------------------------------------------------------
