@@ -31,6 +31,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "mathml",
     "measurements",
+    "benchmark_results",
     "preset_reference",
     "typescript_reference",
     "live_scene",

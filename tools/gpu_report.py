@@ -2,9 +2,10 @@
 
 Into OUT (default: out/gpu-report): the tests of rendering on this device (tests.txt), the report of all methods
 (report.json, .svg, .html), frames of large models of glass, wine and wax (frames.json), frame times of the previewer
-where there is a display (preview.txt), and summary.md with what came of each. With ``--keep`` the report and the frames
-become docs/reports/gpu.json, gpu.svg and gpu-frames.json. A step that fails is told at the end, and leaves the others
-alone. On a software rasterizer only with ``--software``, to try this tool out: models and frames are small then.
+where there is a display (preview.txt), our results on the benchmark as one file to send (benchmark/ours.zip), and
+summary.md with what came of each. With ``--keep`` the report and the frames become docs/reports/gpu.json, gpu.svg and
+gpu-frames.json. A step that fails is told at the end, and leaves the others alone. On a software rasterizer only with
+``--software``, to try this tool out: models and frames are small then.
 """
 
 from __future__ import annotations
@@ -125,7 +126,9 @@ def run(command: list[str], log: Path | None = None) -> str:
 @click.argument("output", type=click.Path(path_type=Path), default=ROOT / "out" / "gpu-report")
 @click.option("--keep", is_flag=True, help="Put the report and the frames into docs/reports/.")
 @click.option("--software", is_flag=True, help="Go on with a software rasterizer, small.")
-@click.option("--only", type=click.Choice(["tests", "report", "frames", "preview"]), help="One step alone.")
+@click.option(
+    "--only", type=click.Choice(["tests", "report", "frames", "preview", "benchmark"]), help="One step alone."
+)
 def main(output: Path, keep: bool, software: bool, only: str | None) -> None:
     """Do all steps, and tell what came of them."""
     output.mkdir(parents=True, exist_ok=True)
@@ -159,6 +162,11 @@ def main(output: Path, keep: bool, software: bool, only: str | None) -> None:
         suites = ["tests/gpu/test_accuracy.py"] if small else ["tests/gpu", "tests/glsl"]
         return run(["-m", "pytest", "-q", "-p", "no:cacheprovider", *suites], output / "tests.txt")
 
+    def benchmark() -> str:
+        few = ["--only", "thickness"] if small else []
+        where = ["-o", str(output / "benchmark")]
+        return run(["-m", "translucent", "benchmark", "run", "ours", *where, *few], output / "benchmark.txt")
+
     def preview() -> str:
         if "DISPLAY" not in os.environ:
             return "left out: there is no display"
@@ -166,6 +174,7 @@ def main(output: Path, keep: bool, software: bool, only: str | None) -> None:
 
     # What is lost least if the time on a borrowed machine ends comes last.
     steps: dict[str, Callable[[], str]] = {"frames": frames, "report": report, "tests": tests, "preview": preview}
+    steps |= {"benchmark": benchmark}
     lines, failed = [f"# {device}", ""], False
     for name, step in steps.items():
         if only in (None, name):

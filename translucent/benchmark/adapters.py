@@ -125,6 +125,7 @@ def run_adapter(
             if said is not None:
                 said(scene.name)
             found[scene.name] = _drawn(adapter, session, scene, Path(temporary), folder)
+            dataclasses.replace(results, scenes=found).write(folder)  # what is done is kept, if the run is ended
     results = dataclasses.replace(results, scenes=found)
     results = scored(results, folder)
     results.write(folder)
@@ -241,7 +242,9 @@ def _blender(engine: str, samples: int, title: str, settings: str, features: fro
     def start() -> Iterator[Session]:
         script = str(files("translucent.benchmark").joinpath("peers", "blender_scene.py"))
         command = [python or sys.executable, script, engine, str(samples)]
-        with subprocess.Popen(command, stdin=PIPE, stdout=PIPE, stderr=DEVNULL, text=True) as process:
+        # EEVEE refuses Mesa's software driver for its version, and works on it.
+        environment = {"MESA_GL_VERSION_OVERRIDE": "4.6", **os.environ}
+        with subprocess.Popen(command, stdin=PIPE, stdout=PIPE, stderr=DEVNULL, text=True, env=environment) as process:
             assert process.stdin is not None
             assert process.stdout is not None
 
