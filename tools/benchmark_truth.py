@@ -52,8 +52,6 @@ JUDGE_SECONDS, JUDGE_NOISE = 4.0, 0.03
 #: Batches of Mitsuba, whose spread is its standard error.
 BATCHES = 8
 
-LIBRARY = "/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1"
-
 
 def halves_of(
     renderer: tl.Renderer, scene: BenchmarkScene, size: tuple[int, int], mask: np.ndarray
@@ -159,6 +157,12 @@ def main(names: tuple[str, ...], judge: bool, larger: int) -> None:
             size = scene.size[0] * larger, scene.size[1] * larger
             mask, thickness = geometry_truth(scene)
             judged = np.kron(mask, np.ones((larger, larger), bool))
+            if judge:
+                found = stored_truth_of(scene)
+                before = records.get(scene.name)
+                spread = np.abs(found.halves[0].astype(np.float64) - found.halves[1]) / 2
+                judge_of(scene, found, spread, 0.0 if before is None else before.seconds)
+                continue
             halves, error, paths, seconds = halves_of(renderer, scene, size, judged)
             if larger > 1:
                 folder = Path("out/truth")
@@ -168,20 +172,22 @@ def main(names: tuple[str, ...], judge: bool, larger: int) -> None:
                 )
                 continue
             found = TruthPicture(halves, mask, thickness, scene_parameters(scene.make()), 2 * paths)
-            if not judge:
-                truth_path(scene.name).parent.mkdir(exist_ok=True)
-                found.write(truth_path(scene.name))
-            mean = halves.mean(axis=0, dtype=np.float64), error
-            agreements = by_reference(scene, mean), by_mitsuba(scene, mean)
-            records = {**read_records(), scene.name: TruthRecord(2 * paths, found.noise, seconds, agreements)}
-            write_records(records)
-            said = "; ".join(
-                f"{one.renderer}: {one.within:.1%} within 4, bias {one.bias:+.2%}, noise {one.noise:.1%}, {one.paths}"
-                if one.paths
-                else f"{one.renderer}: {one.explained}"
-                for one in agreements
-            )
-            print(f"{scene.name}: {2 * paths} paths, {seconds:.0f} s, noise {found.noise:.2%}; {said}", flush=True)
+            truth_path(scene.name).parent.mkdir(exist_ok=True)
+            found.write(truth_path(scene.name))
+            judge_of(scene, found, error, seconds)
+
+
+def judge_of(scene: BenchmarkScene, found: TruthPicture, error: np.ndarray, seconds: float) -> None:
+    """Let the judges render a scene, and keep and print what they say of its truth with a standard error (h, w, 3)."""
+    agreements = by_reference(scene, (found.radiance, error)), by_mitsuba(scene, (found.radiance, error))
+    write_records({**read_records(), scene.name: TruthRecord(found.paths, found.noise, seconds, agreements)})
+    said = "; ".join(
+        f"{one.renderer}: {one.within:.1%} within 4, bias {one.bias:+.2%}, noise {one.noise:.1%}, {one.paths}"
+        if one.paths
+        else f"{one.renderer}: {one.explained}"
+        for one in agreements
+    )
+    print(f"{scene.name}: {found.paths} paths, {seconds:.0f} s, noise {found.noise:.2%}; {said}", flush=True)
 
 
 if __name__ == "__main__":

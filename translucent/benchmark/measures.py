@@ -90,6 +90,13 @@ class ThicknessScore:
     marked: float
 
 
+def score_thickness_alone(thickness: Array, truth: TruthPicture) -> Score:
+    """Score of a renderer that has thickness (h, w) in metres and no light."""
+    none = math.nan
+    scored = None if truth.thickness is None else score_thickness(thickness, truth.thickness)
+    return Score(none, none, (none, none, none), none, none, none, none, scored)
+
+
 def score_picture(picture: Array, truth: TruthPicture, thickness: Array | None = None) -> Score:
     """Errors of linear radiance (h, w, 3), and of thickness (h, w) in metres, of the size of the truth."""
     picture = np.nan_to_num(picture.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)

@@ -59,13 +59,16 @@ def table_of(results: Results) -> str:
 
 def _line(one: SceneResult) -> str:
     if one.score is None:
-        return "  " + (f"not supported: {one.lacking}" if one.lacking else one.failure or "no picture")
+        return "  " + (
+            f"not supported: {one.lacking}" if one.lacking else one.failure or "no truth of it yet, or no picture"
+        )
     score = one.score
     thick = "" if score.thickness is None else f"{score.thickness.p99:.1e}"
     numbers = f"{score.nrmse:8.4f}{score.block:8.4f}{score.bias[0]:+8.3f}{score.bias[1]:+7.3f}{score.bias[2]:+7.3f}"
     times = "" if one.seconds is None else f"{one.seconds:9.3f}{_ratio(one):>9}"
     said = f"  <- {score.suspicions[0]}" if score.suspicions else ""
-    return f"{numbers}{score.flip:7.3f}{score.visible:9.1%}{thick:>15}{times}{said}"
+    text = f"{numbers}{score.flip:7.3f}{score.visible:9.1%}{thick:>15}{times}{said}"
+    return text.replace("+nan", "   -").replace("nan%", "   -").replace("nan", "  -")
 
 
 def _ratio(one: SceneResult) -> str:
@@ -86,6 +89,12 @@ class PageRow:
     frontier: bool
     picture: str = ""
     error: str = ""
+
+    @property
+    def nrmse(self) -> float:
+        """Its error; infinite where it has thickness alone."""
+        found = math.nan if self.result.score is None else self.result.score.nrmse
+        return found if math.isfinite(found) else math.inf
 
     @property
     def ratio(self) -> float | None:
@@ -158,8 +167,9 @@ def _no(value: float | None) -> bool:
 
 def _place(number: int, parts: Sequence[ScenePart]) -> float:
     """Median nRMSE of a renderer over the scenes that it did; a very large one if it did none."""
-    found = [row.result.score.nrmse for part in parts for row in part.rows if row.number == number and row.result.score]
-    return statistics.median(found) if found else 1e9
+    found = [row.nrmse for part in parts for row in part.rows if row.number == number]
+    known = [value for value in found if math.isfinite(value)]
+    return statistics.median(known) if known else 1e9
 
 
 def _times(number: int, parts: Sequence[ScenePart]) -> float | None:
@@ -189,11 +199,11 @@ def _scene_part(scene: BenchmarkScene, results: Sequence[Results]) -> ScenePart:
             if radiance is not None:
                 picture, error = _shown(radiance / white), _heat(radiance, truth)
         rows.append(PageRow(number, one.name, COLORS[number % len(COLORS)], result, False, picture, error))
-    rows.sort(key=lambda row: row.result.score.nrmse if row.result.score else 1e9)
+    rows.sort(key=lambda row: row.nrmse)
     best = math.inf
     marked = []
-    for row in sorted(rows, key=lambda row: (row.ratio or math.inf, row.result.score.nrmse if row.result.score else 0)):
-        error_of = row.result.score.nrmse if row.result.score else math.inf
+    for row in sorted(rows, key=lambda row: (row.ratio or math.inf, row.nrmse)):
+        error_of = row.nrmse
         if row.ratio and error_of < best:
             best = error_of
             marked.append(row.number)
@@ -205,7 +215,7 @@ def _scene_part(scene: BenchmarkScene, results: Sequence[Results]) -> ScenePart:
             continue
         text = f"{judge.renderer}: {judge.within:.1%} of the pixels within 4 standard errors, mean {judge.bias:+.2%}"
         said.append(text if judge.within >= AGREEING else f"{text}; {judge.explained or 'not explained'}")
-    plot = _plot([(row.ratio, row.result.score.nrmse, row.color, row.name) for row in rows if row.result.score])
+    plot = _plot([(row.ratio, row.nrmse, row.color, row.name) for row in rows])
     return ScenePart(scene, _shown(truth.radiance / white), truth.noise, said, rows, others, plot)
 
 

@@ -28,9 +28,15 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.bench.run import processor_name
-from translucent.benchmark.measures import Score, ThicknessScore, common_suspicions, score_picture
+from translucent.benchmark.measures import (
+    Score,
+    ThicknessScore,
+    common_suspicions,
+    score_picture,
+    score_thickness_alone,
+)
 from translucent.benchmark.scenes import BenchmarkScene, scene_named, scene_names
-from translucent.benchmark.truth import stored_truth_of
+from translucent.benchmark.truth import stored_truth_of, truth_path
 from translucent.errors import InputError, printable
 from translucent.files.images import read_array, read_exr, write_exr
 from translucent.files.paths import OutputFiles, make_folder, write_text_atomically
@@ -170,7 +176,7 @@ def read_results(folder: Path) -> Results:
     told = scenes if isinstance(scenes, dict) else {}
     results = {name: _scene_result(told[name], path) for name in scene_names() if name in told}
     for name in scene_names():
-        if name not in results and picture_path(folder, name) is not None:
+        if name not in results and any(picture_path(folder, name, what) for what in ("", ".thickness")):
             results[name] = SceneResult()
     return Results(**texts, scenes={name: results[name] for name in scene_names() if name in results}, folder=folder)
 
@@ -291,13 +297,20 @@ def scored(results: Results, folder: Path, said: Callable[[str], None] | None = 
     """Results with scores of all pictures in a folder; what cannot be read becomes a failure."""
     scenes = dict(results.scenes)
     for name, result in results.scenes.items():
-        if result.lacking or (result.failure and picture_path(folder, name) is None):
+        has_none = picture_path(folder, name) is None and picture_path(folder, name, ".thickness") is None
+        if result.lacking or (result.failure and has_none):
+            continue
+        if not truth_path(name).is_file():  # it is to be rendered yet
             continue
         if said is not None:
             said(name)
         scene = scene_named(name)
         try:
-            score = score_picture(read_picture(folder, scene), stored_truth_of(scene), read_thickness(folder, scene))
+            truth, thickness = stored_truth_of(scene), read_thickness(folder, scene)
+            if thickness is not None and picture_path(folder, name) is None:
+                score = score_thickness_alone(thickness, truth)
+            else:
+                score = score_picture(read_picture(folder, scene), truth, thickness)
         except InputError as error:
             scenes[name] = dataclasses.replace(result, failure=str(error), score=None)
             continue

@@ -250,7 +250,7 @@ def _lens() -> Scene:
 
 def _amber() -> Scene:
     pebble = toolkit("amber")
-    return _framed([Object(pebble, Medium.from_color((0.93, 0.46, 0.06), 0.02, ior=1.54))], window_room())
+    return _framed([Object(pebble, Medium.from_color((0.93, 0.46, 0.06), 0.02, ior=1.54))], DAY)
 
 
 def _wine() -> Scene:
