@@ -165,6 +165,7 @@ FIGURE = re.compile(
 DEFINED = {
     "docs/baking-files.md": {"2 %"},
     "docs/benchmark.md": {"97 %", "99 %", "99.9 %"},
+    "docs/measurements/renderers.md": {"99 %"},
     "docs/baking.md": {"0.2 %", "64 times", "5 %", "35 %"},
     "docs/gltf.md": {"1.5 times", "3 times", "10 %", "25 %", "2 %", "5 %", "0.139 s", "1.17 s"},
     "docs/guides/sizes-and-units.md": {"10 %"},
@@ -183,7 +184,7 @@ def test_no_measured_figure_is_typed_by_hand() -> None:
     found = {}
     for path in (ROOT / "README.md", *DOCS.rglob("*.md")):
         name = path.relative_to(ROOT).as_posix()
-        prose = re.sub(r"(?ms)^ *```(?!\{).*?^ *```", "", path.read_text(encoding="utf-8"))
+        prose = re.sub(r"(?ms)^ *```.*?^ *```$", "", path.read_text(encoding="utf-8"))
         figures = set(FIGURE.findall(prose))
         if figures and not name.startswith(apart):
             found[name] = figures
