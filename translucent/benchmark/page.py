@@ -259,7 +259,7 @@ def _plot(points: Sequence[tuple[float | None, float, str, str]]) -> str:
     x0, x1, y0, y1 = math.floor(min(xs)), math.ceil(max(xs) + 0.01), math.floor(min(ys)), math.ceil(max(ys) + 0.01)
 
     def at(x: float, y: float) -> tuple[float, float]:
-        across = LEFT + (WIDTH - LEFT - 12) * (x - x0) / (x1 - x0)
+        across = LEFT + (WIDTH - LEFT - 24) * (x - x0) / (x1 - x0)
         return across, 10 + (HEIGHT - BELOW - 10) * (y1 - y) / (y1 - y0)
 
     out = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="error against time">']
@@ -269,7 +269,7 @@ def _plot(points: Sequence[tuple[float | None, float, str, str]]) -> str:
         out.append(f'<text x="{a:.1f}" y="{HEIGHT - BELOW + 14}" text-anchor="middle">{10.0**power:g}</text>')
     for power in range(y0, y1 + 1):
         _, b = at(x0, power)
-        out.append(f'<line x1="{LEFT}" y1="{b:.1f}" x2="{WIDTH - 12}" y2="{b:.1f}" class="grid"/>')
+        out.append(f'<line x1="{LEFT}" y1="{b:.1f}" x2="{WIDTH - 24}" y2="{b:.1f}" class="grid"/>')
         out.append(f'<text x="{LEFT - 5}" y="{b + 4:.1f}" text-anchor="end">{10.0**power:g}</text>')
     best, steps = math.inf, []
     for x, y in sorted(zip(xs, ys, strict=True)):
