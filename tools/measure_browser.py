@@ -45,7 +45,7 @@ Array = npt.NDArray[Any]
 SIZE = (512, 512)
 
 # `draw(kind, n)` draws n times, then waits until the last pixel of it can be read.
-TIMING = """({ mesh, camera, size }) => {
+TIMING = """({ mesh, camera, size, options }) => {
     const renderer = tools.renderer(...size);
     const { THREE, ExactThicknessPass } = translucentThree;
     const gl = renderer.getContext();
@@ -54,7 +54,7 @@ TIMING = """({ mesh, camera, size }) => {
     const body = tools.mesh(mesh, floor);
     scene.add(body);
     const seen = tools.camera(camera);
-    const pass = new ExactThicknessPass(renderer, { bodies: [body] });
+    const pass = new ExactThicknessPass(renderer, { bodies: [body], ...options });
     const target = new THREE.WebGLRenderTarget(...size);
     const texel = [new Uint8Array(4), new Float32Array(4)];
     const finish = pass.finish;
@@ -204,18 +204,20 @@ def compare_materials(page: WebPage, path: Path, side: int) -> None:
     picture.save(path)
 
 
-def measure_mesh(page: WebPage, name: str, draws: int, rounds: int) -> None:
+def measure_mesh(page: WebPage, name: str, draws: int, rounds: int, options: dict[str, int]) -> None:
     """Print errors and times of a mesh."""
     mesh = load(name)
     camera = framing(mesh)
-    errors = Errors.of(measure(page, [described(mesh)], camera, SIZE), Truth.of(mesh, camera, SIZE), mesh.diagonal)
+    found = measure(page, [described(mesh)], camera, SIZE, **options)
+    errors = Errors.of(found, Truth.of(mesh, camera, SIZE), mesh.diagonal)
     print(
         f"{Path(name).stem}, {len(mesh.faces)} triangles: median {errors.median:.1e}, p99.9 {errors.p999:.1e} "
         f"({errors.p999_off_edges:.1e} off edges), wrong {errors.wrong} + {errors.wrong_by_edges} by edges, "
         f"marked {errors.marked}, coverage {100 * errors.coverage:.3f} %",
         flush=True,
     )
-    page.run(TIMING, {"mesh": described(mesh), "camera": described_camera(camera, SIZE), "size": SIZE})
+    asked = {"mesh": described(mesh), "camera": described_camera(camera, SIZE), "size": SIZE, "options": options}
+    page.run(TIMING, asked)
     took: dict[str, Any] = {kind: [] for kind in KINDS}
     for _ in range(rounds + 1):
         for kind, times in took.items():
@@ -260,6 +262,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("meshes", nargs="*", default=["knot", "bear"])
     parser.add_argument("--angle", default="swiftshader", help="what Chromium draws with")
+    parser.add_argument("--refine", type=int, choices=(1, 3, 5), help="pixels along each side of a pixel")
     parser.add_argument("--draws", type=int, default=5)
     parser.add_argument("--rounds", type=int, default=25)
     parser.add_argument("--materials", type=Path, help="compare materials, into this picture")
@@ -273,7 +276,8 @@ def main() -> None:
             compare_materials(page, arguments.materials, arguments.side)
         else:
             for name in arguments.meshes:
-                measure_mesh(page, name, arguments.draws, arguments.rounds)
+                options = {"refine": arguments.refine} if arguments.refine else {}
+                measure_mesh(page, name, arguments.draws, arguments.rounds, options)
         if page.errors:
             raise SystemExit(f"error: the page said {page.errors}")
         browser.close()

@@ -125,8 +125,8 @@ def test_thickness_is_that_of_the_reference(page: WebPage, name: str) -> None:
         mesh = rounded(tl.load_mesh(path))
     camera = framing(mesh)
     truth = Truth.of(mesh, camera, SIZE)
-    for precision, refine, by_edges in (("float32", 3, 1e-5), ("fixed28", 1, 5e-5)):
-        found = measure(page, [described(mesh)], camera, SIZE, precision=precision, refine=refine)
+    for options, by_edges in (({}, 1e-5), ({"precision": "fixed28", "refine": 1}, 5e-5)):
+        found = measure(page, [described(mesh)], camera, SIZE, **options)
         errors = Errors.of(found, truth, mesh.diagonal)
         assert errors.pixels > 50_000
         assert errors.median <= 1e-7
@@ -134,6 +134,31 @@ def test_thickness_is_that_of_the_reference(page: WebPage, name: str) -> None:
         assert errors.p999 <= by_edges
         assert (errors.wrong, errors.wrong_by_edges, errors.marked) == (0, 0, 0)
         assert errors.coverage <= 3e-4
+
+
+ADAPTERS = """async ({ ball, camera, infos }) => {
+  const { ThicknessNode } = translucentThree;
+  const body = tools.mesh(ball);
+  const refined = async (options) => {
+    const node = new ThicknessNode({ bodies: [body], ...options });
+    await found(node, body, camera, [8, 8]);
+    return node.refine;
+  };
+  const all = [await refined({}), await refined({ refine: 1 })];
+  for (const info of infos) {
+    Object.defineProperty(gpu.backend.device, "adapterInfo", { value: info, configurable: true });
+    all.push(await refined({}));
+  }
+  delete gpu.backend.device.adapterInfo;
+  return all;
+}"""
+
+
+def test_adapters_in_software_are_refined(page: WebPage) -> None:
+    infos = [{"vendor": "nvidia"}, {"isFallbackAdapter": True}, {"vendor": "mesa", "description": "llvmpipe"}, None]
+    camera = described_camera(seen_from(5.0, fov_y=30.0), (8, 8))
+    found = page.run(ADAPTERS, {"ball": described(BALL), "camera": camera, "infos": infos})
+    assert found == [3, 1, 1, 3, 3, 1]
 
 
 def test_transforms_eyes_and_opaque_objects(page: WebPage) -> None:
@@ -160,8 +185,8 @@ def test_transforms_eyes_and_opaque_objects(page: WebPage) -> None:
         assert np.all(inside.count == 1)
         assert inside.thickness[64, 64] == pytest.approx(1.4, abs=SAGITTA)
         wall = described(rounded(Box((0.0, -2.0, -0.01), (2.0, 2.0, 0.0)).tessellate()))
-        far, refine = seen_from(500.0, fov_y=0.3), 3 if precision == "float32" else 1
-        walled = measure(page, [described(BALL)], far, opaque=(wall,), precision=precision, refine=refine)
+        far = seen_from(500.0, fov_y=0.3)
+        walled = measure(page, [described(BALL)], far, opaque=(wall,), precision=precision)
         assert walled.valid.all()
         assert walled.thickness[64, 65] == pytest.approx(1.0, abs=SAGITTA)
         assert walled.thickness[64, 50] == pytest.approx(2 * walled.thickness[64, 77], abs=2 * SAGITTA)

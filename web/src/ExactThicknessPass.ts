@@ -26,6 +26,7 @@ import { COVERAGE_FLOOR, NOTHING, OPEN_WEIGHTS, ROUNDING } from "./generated/sha
 import { expectedCount, place, seesFrom } from "./placement.js";
 import type { DepthRange, View } from "./placement.js";
 import { last, nearest, resolveUniforms, resolving, summing } from "./programs.js";
+import { drawsInSoftware, refinementOf } from "./software.js";
 import { isClosed } from "./topology.js";
 import { bodyUniforms } from "./uniforms.js";
 
@@ -67,6 +68,7 @@ export class ExactThicknessPass {
   // Any: the shaders place bodies themselves. One of these knows reversed and logarithmic depth.
   private readonly eye = new OrthographicCamera();
   private layout = "";
+  private software: boolean | null = null;
 
   constructor(renderer: WebGLRenderer, options: ExactThicknessOptions = {}) {
     if (!(renderer as { isWebGLRenderer?: boolean }).isWebGLRenderer) {
@@ -97,6 +99,13 @@ export class ExactThicknessPass {
     );
   }
 
+  /** Pixels along each side of a pixel that faces are drawn into: of the options, else 3 if this machine draws in software, and 1 if not. */
+  get refine(): number {
+    const { renderer } = this;
+    this.software ??= drawsInSoftware(renderer.getContext() as WebGL2RenderingContext);
+    return refinementOf(this.options.refine, this.software, this.size(), renderer.capabilities.maxTextureSize, "ExactThicknessPass");
+  }
+
   /** Metres, count, validity and coverage of each pixel; null before the first `render`. */
   get texture(): Texture | null {
     return this.result?.textures[0] ?? null;
@@ -107,7 +116,7 @@ export class ExactThicknessPass {
     return this.result?.textures[1] ?? null;
   }
 
-  /** Depth at which opaque surfaces end rays: metres along the camera's axis are `near + length * r`; null where there are none. */
+  /** Depth at which opaque surfaces end rays, in `refine` times as many pixels across: metres along the camera's axis are `near + length * r`; null where there are none. */
   get opaqueDepth(): Texture | null {
     return this.ends?.texture ?? null;
   }
@@ -129,7 +138,9 @@ export class ExactThicknessPass {
     checkView(renderer, camera, [...bodies, ...opaque].map((one) => one.mesh));
     const [width, height] = this.size();
     const subpixel = 0.5 ** (gl.getParameter(gl.SUBPIXEL_BITS) as number);
+    const { refine } = this;
     const view = seesFrom(camera, width, height, subpixel);
+    const fine = seesFrom(camera, width * refine, height * refine, subpixel);
     const media = new Box3();
     for (const one of bodies) {
       one.measure();
@@ -140,18 +151,18 @@ export class ExactThicknessPass {
     const spectral = several === "auto" ? areSpectral(bodies) : several;
     const bending = this.options.exits ?? "auto";
     const exits = bending === "auto" ? bodies.some((one) => bends(one.mesh)) : bending;
-    this.prepare(width, height, spectral, opaque.length > 0, exits);
+    this.prepare(width, height, refine, spectral, opaque.length > 0, exits);
 
     const diagonal = media.isEmpty() ? 1 : Math.max(media.getSize(new Vector3()).length(), Number.MIN_VALUE);
     this.diagonal = diagonal;
     const range = view.range(media);
     const saved = this.save();
     try {
-      if (this.ends) this.draw(this.ends, this.placed(opaque, view, range, (one) => this.ending(one, subpixel)), [this.nothing, 0, 0, 0]);
+      if (this.ends) this.draw(this.ends, this.placed(opaque, fine, range, (one) => this.ending(one, subpixel)), [this.nothing, 0, 0, 0]);
       const expected = [0, 0];
       const sound = bodies.every((one) => isClosed(one.mesh.geometry));
       let open = 0;
-      const meshes = this.placed(bodies, view, range, (one) => {
+      const meshes = this.placed(bodies, fine, range, (one) => {
         const weight = isClosed(one.mesh.geometry) ? 1 : this.openWeight(open++);
         const [least, most] = expectedCount(one, view);
         expected[0] += weight * least;
@@ -252,9 +263,9 @@ export class ExactThicknessPass {
   }
 
   /** Make the targets, where they are not there yet in this size. */
-  private prepare(width: number, height: number, spectral: boolean, opaque: boolean, exits: boolean): void {
+  private prepare(width: number, height: number, refine: number, spectral: boolean, opaque: boolean, exits: boolean): void {
     const type = this.precision === "float32" ? FloatType : HalfFloatType;
-    const layout = [width, height, type, spectral, opaque, exits].join();
+    const layout = [width, height, refine, type, spectral, opaque, exits].join();
     if (layout === this.layout) return;
     for (const target of [this.sums, this.ends, this.last, this.result]) target?.dispose();
     const common = {
@@ -265,9 +276,9 @@ export class ExactThicknessPass {
       magFilter: NearestFilter,
     } as const;
     const count = spectral ? 2 : 1;
-    this.sums = new WebGLRenderTarget(width, height, { ...common, type, format: spectral ? RGBAFormat : RGFormat, count });
+    this.sums = new WebGLRenderTarget(width * refine, height * refine, { ...common, type, format: spectral ? RGBAFormat : RGFormat, count });
     if (spectral) this.sums.textures[1].format = RedFormat;
-    this.ends = opaque ? new WebGLRenderTarget(width, height, { ...common, type, format: RedFormat }) : null;
+    this.ends = opaque ? new WebGLRenderTarget(width * refine, height * refine, { ...common, type, format: RedFormat }) : null;
     const precise = this.renderer.extensions.has("EXT_color_buffer_float") ? FloatType : HalfFloatType;
     const filled = { ...common, depthBuffer: true, type: precise, format: RGBAFormat };
     this.last = exits ? new WebGLRenderTarget(width, height, filled) : null;
@@ -293,6 +304,7 @@ export class ExactThicknessPass {
     const precise = this.precision === "float32";
     resolve.accumulated.value = sums!.textures[0];
     resolve.accumulated_path.value = sums!.textures[1] ?? null;
+    resolve.refine.value = sums!.width / result!.width;
     resolve.frame_size.value.set(result!.width, result!.height, 0, 0);
     view.setRays(resolve.ray_right.value, resolve.ray_up.value, resolve.ray_forward.value);
     resolve.expected_count.value.set(expected[0], expected[1]);

@@ -2,6 +2,7 @@
 import type { Camera, Mesh, Object3D, Plane } from "three";
 import { TranslucentError, nameOf } from "./errors.js";
 import { materials } from "./extinction.js";
+import { REFINEMENTS } from "./software.js";
 
 /** What is measured, and what ends rays. */
 export interface ThicknessOptions {
@@ -15,6 +16,12 @@ export interface ThicknessOptions {
   opticalDepth?: "auto" | boolean;
   /** Find where rays leave bodies: always, never, or where a material bends them ("auto", the default). */
   exits?: "auto" | boolean;
+  /**
+   * Pixels along each side of a pixel that faces are drawn into, of which the middle one counts: 1, 3 or 5. Rasterizers put vertices
+   * down on a grid of a part of a pixel (in software: 1/16, graphics cards mostly 1/256), and by edges of faces the grid decides
+   * which one is shown: it is so many times as fine. Costs up to the square of it. Default: 3 in software, 1 on graphics cards.
+   */
+  refine?: 1 | 3 | 5;
 }
 
 /** Pixels that `read` returns; row 0 is the top one. */
@@ -51,7 +58,7 @@ const SIZE: Rule = [
 ];
 
 /** Refuse options that are unknown, or of a wrong kind; `of` names whose they are. */
-export function checkOptions(options: ThicknessOptions, of: string, precisions: string[], refinements: number[] = []): void {
+export function checkOptions(options: ThicknessOptions, of: string, precisions: string[]): void {
   if (typeof options !== "object" || options === null) {
     throw new TranslucentError(`options of ${of}`, `they are ${textOf(options)}`, "give an object, as { exits: true }");
   }
@@ -62,7 +69,7 @@ export function checkOptions(options: ThicknessOptions, of: string, precisions: 
     precision: choice(...precisions),
     opticalDepth: choice("auto", true, false),
     exits: choice("auto", true, false),
-    ...(refinements.length ? { refine: choice(...refinements) } : {}),
+    refine: choice(...REFINEMENTS),
   };
   for (const [name, value] of Object.entries(options)) {
     const rule = rules[name];

@@ -182,6 +182,7 @@ export function resolveUniforms() {
   return {
     accumulated: { value: null as Texture | null },
     accumulated_path: { value: null as Texture | null },
+    refine: { value: 1 },
     frame_size: { value: new Vector4() },
     ray_right: { value: new Vector4() },
     ray_up: { value: new Vector4() },
@@ -193,12 +194,16 @@ export function resolveUniforms() {
   };
 }
 
+// Sums at the middle one of the pixels that a pixel is refined to.
+const refined = (fragment: string): string =>
+  fragment.replace("void main() {", "uniform int refine;\nvoid main() {").replace(/(accumulated(_path)?), texel,/g, "$1, texel * refine + refine / 2,");
+
 /** From sums to metres. */
 export function resolving(uniforms: ReturnType<typeof resolveUniforms>, spectral: boolean): ShaderMaterial {
   return new ShaderMaterial({
     glslVersion: GLSL3,
     vertexShader: FULLSCREEN,
-    fragmentShader: spectral ? generated.spectralThickness : generated.thickness,
+    fragmentShader: refined(spectral ? generated.spectralThickness : generated.thickness),
     uniforms,
     depthTest: false,
     depthWrite: false,

@@ -13,6 +13,9 @@ const SLOW = 60, FAST = 18;
 const MOST_PIXELS = 2560;
 const REST = 140;
 
+/** Times that one pixel is enlarged for the probe where WebGL draws in software: a grid of 1/16 pixel becomes one of 1/4096. */
+const FINER = 256;
+
 /** Milliseconds that one sample of a still picture may take; else it has fewer pixels. */
 const LONGEST = 4000;
 
@@ -303,15 +306,30 @@ export class Viewer {
     return () => this.listeners.delete(listener);
   }
 
+  /** View of one pixel alone, enlarged so much that by edges the coarse grid of a rasterizer in software shows the right face. */
+  #middle(at) {
+    const camera = this.view.camera(this.view.widened(this.size));
+    const scale = FINER * this.size[1];
+    const shift = at.map((pixel, i) => FINER * (pixel + 0.5 - this.size[i] / 2));
+    if (camera.fov_y == null) camera.height /= scale;
+    else camera.fov_y = (360 / Math.PI) * Math.atan(Math.tan((camera.fov_y * Math.PI) / 360) / scale);
+    return { camera, size: [1, 1], sample: null, shift };
+  }
+
   /** Read what is under a place of the canvas, in shares of its width and height from the top left corner. */
   probe(x, y) {
     if (!this.still || this.lost || x < 0 || y < 0 || x >= 1 || y >= 1) return null;
     const key = this.materials.variant;
-    const at = [Math.floor(x * this.size[0]), Math.floor(y * this.size[1])];
-    const read = (name, row = at[1]) => this.player.read(name, key, this.size, [at[0], row, 1, 1]);
+    let { size } = this;
+    let at = [Math.floor(x * size[0]), Math.floor(y * size[1])];
+    if (this.player.caps.software) {
+      this.player.frame(this.#middle(at), this.materials);
+      [size, at] = [[1, 1], [0, 0]];
+    }
+    const read = (name, row = at[1]) => this.player.read(name, key, size, [at[0], row, 1, 1]);
     const flags = read("flags")[0];
-    const count = read("count", this.size[1] - 1 - at[1]);
-    const layers = read("layers", this.size[1] - 1 - at[1]);
+    const count = read("count", size[1] - 1 - at[1]);
+    const layers = read("layers", size[1] - 1 - at[1]);
     return {
       covered: Boolean(flags & 1),
       valid: Boolean(flags & 2),

@@ -1,5 +1,6 @@
 // Plays recorded frames in WebGL2: the steps of translucent/gpu/recording, with the numbers of a camera and a material.
 
+import { drawsInSoftware } from "../software.ts";
 import { fieldsOf, writeBlocks } from "./blocks.js";
 import { changedLight } from "./albedos.js";
 import { drawn } from "./meshes.js";
@@ -25,6 +26,7 @@ export function capabilitiesOf(gl, half = false) {
     drawBuffers: gl.getParameter(gl.MAX_DRAW_BUFFERS),
     largest: gl.getParameter(gl.MAX_TEXTURE_SIZE),
     subpixel: 0.5 ** gl.getParameter(gl.SUBPIXEL_BITS),
+    software: drawsInSoftware(gl),
   };
 }
 
@@ -88,7 +90,7 @@ export class Player {
 
   /**
    * Play a frame.
-   * @param {object} view camera, size, and `sample` of `samples` with `shift`, or none
+   * @param {object} view camera, size, and `sample` of `samples`, or none; `shift` (right, down) in pixels, else that of the sample
    * @param {object} material see material.js
    */
   frame(view, material) {
@@ -105,7 +107,7 @@ export class Player {
     }
     const where = writeBlocks({
       scene: page.scene, meshes: this.meshes, variant, blocks: live.blocks, bodies: live.bodies, camera, size,
-      shift: several ? page.shifts[view.sample] : [0, 0], subpixel: this.caps.subpixel,
+      shift: view.shift ?? (several ? page.shifts[view.sample] : [0, 0]), subpixel: this.caps.subpixel,
     });
     const shadows = `${key} ${material.shadowKey}`;
     if (variant.once.length && this.shadows !== shadows) {

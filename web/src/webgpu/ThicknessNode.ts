@@ -29,6 +29,7 @@ import { checkOptions, checkView } from "../options.js";
 import type { ThicknessOptions, ThicknessPixels } from "../options.js";
 import { expectedCount, isCut, place, seesFrom } from "../placement.js";
 import type { View } from "../placement.js";
+import { isSoftware, refinementOf } from "../software.js";
 import { isClosed } from "../topology.js";
 import { bodyNodes, here, keyOf, last, nearest, opticalDepthOf, summing, thicknessOf } from "./programs.js";
 import type { Nodes, Summed } from "./programs.js";
@@ -39,19 +40,18 @@ export type NodePrecision = "float32" | "fixed28";
 export interface ThicknessNodeOptions extends ThicknessOptions {
   /** Precision of the sums. Default: float32 where the graphics card can add it up (`float32-blendable`), fixed28 elsewhere. */
   precision?: NodePrecision;
-  /**
-   * Pixels along each side of a pixel that faces are drawn into, of which the middle one counts: 1 (the default), 3 or 5. Rasterizers
-   * put vertices down on a grid of a part of a pixel (drawn in software: 1/16, graphics cards mostly 1/256), and by edges of faces
-   * the grid decides which one is shown: it is so many times as fine. Costs up to the square of it.
-   */
-  refine?: 1 | 3 | 5;
+}
+
+/** What a GPUDevice says of itself; browsers do not say all of it. */
+interface Device {
+  limits: { maxTextureDimension2D: number };
+  adapterInfo?: { isFallbackAdapter?: boolean; vendor?: string; architecture?: string; description?: string };
 }
 
 /** Revision of three from which on it was tried. */
 const OLDEST = 185;
 
 const PRECISIONS: NodePrecision[] = ["float32", "fixed28"];
-const REFINEMENTS = [1, 3, 5];
 
 /**
  * Exact thickness of meshes along every view ray, as a node (TSL): metres (r), signed count (g), 1 if the number can be
@@ -73,6 +73,8 @@ export class ThicknessNode extends Node {
   readonly pixels: Nodes = uniform(new Vector2(1, 1));
   /** Numbers that paths were added up in; null before the first picture. */
   precision: NodePrecision | null = null;
+  /** Pixels along each side of a pixel that faces were drawn into; null before the first picture. */
+  refine: number | null = null;
   private readonly standIns = new StandIns(bodyNodes);
   private readonly targets = {
     sums: target(FloatType, RGFormat),
@@ -103,7 +105,7 @@ export class ThicknessNode extends Node {
 
   constructor(options: ThicknessNodeOptions = {}) {
     super("vec4");
-    checkOptions(options, "ThicknessNode", PRECISIONS, REFINEMENTS);
+    checkOptions(options, "ThicknessNode", PRECISIONS);
     if (parseInt(REVISION) < OLDEST) {
       throw new TranslucentError("ThicknessNode", `this is three r${REVISION}, whose nodes make other WGSL of it`, `use three 0.${OLDEST} or newer`);
     }
@@ -183,22 +185,22 @@ export class ThicknessNode extends Node {
       delete this.resolvers[key];
     }
     for (const one of Object.values(this.targets)) one.dispose();
-    this.precision = null;
+    this.precision = this.refine = null;
     super.dispose();
   }
 
   private run(renderer: WebGPURenderer, scene: Object3D, camera: Camera): void {
-    checkOptions(this.options, "ThicknessNode", PRECISIONS, REFINEMENTS);
+    checkOptions(this.options, "ThicknessNode", PRECISIONS);
     const precision = this.choose(renderer);
     const [bodies, opaque] = this.standIns.sort(scene, camera, this.options);
     checkView({}, camera, [...bodies, ...opaque].map((one) => one.mesh));
     const [width, height] = this.size(renderer);
-    const refine = this.options.refine ?? 1;
+    const { device } = renderer.backend as { device?: Device };
+    const software = isFallback(device?.adapterInfo);
+    const most = device?.limits.maxTextureDimension2D ?? Infinity;
+    const refine = refinementOf(this.options.refine, software, [width, height], most, "ThicknessNode");
+    this.refine = refine;
     const fine = [width * refine, height * refine];
-    const most = (renderer.backend as { device?: { limits: { maxTextureDimension2D: number } } }).device?.limits.maxTextureDimension2D ?? Infinity;
-    if (Math.max(...fine) > most) {
-      throw new TranslucentError(`ThicknessNode with refine: ${refine}`, `${fine.join(" x ")} pixels are more than the ${most} of this graphics card`, "refine less, or set a smaller size");
-    }
     const view = seesFrom(camera, width, height, 0);
     const media = new Box3();
     for (const one of bodies) {
@@ -342,6 +344,10 @@ export class ThicknessNode extends Node {
     this.quad.render(renderer);
   }
 }
+
+/** True if an adapter is one in software. */
+const isFallback = (info: Device["adapterInfo"]): boolean =>
+  info?.isFallbackAdapter === true || isSoftware(info?.vendor, info?.architecture, info?.description);
 
 function target(type: typeof FloatType | typeof HalfFloatType, format: typeof RGFormat | typeof RGBAFormat, depth = false): RenderTarget {
   const filters = { minFilter: NearestFilter, magFilter: NearestFilter, generateMipmaps: false };
