@@ -49,3 +49,13 @@ def test_slips_on_the_command_line_get_the_answer(
 
 def test_a_value_that_may_be_left_out_is_none_that_is_missing(run: Run) -> None:
     assert "caustics" in run("explain", "bear", "--caustics", "--stage", "studio").out
+
+
+def test_a_folder_named_like_a_mesh_of_the_toolkit_hides_it_not(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "bear").mkdir()
+    monkeypatch.chdir(tmp_path)
+    result = run("explain", "bear", "--preset", "merlot")
+    assert (result.code, result.err) == (0, "")
+    assert "bear.ply" in result.out

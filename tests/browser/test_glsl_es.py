@@ -76,6 +76,8 @@ APART = {"shade/backdrop.frag": {"INFINITE"}}
 SLACK = {
     "ggx_visible_normal": 2.0**11,
     "sphere_point": 2.0**12 / 12.0,  # is allowed twelve roundings of 2^-23 to begin with
+    # Slopes of phase functions up to about a hundred, times those cosines, over 64 roundings.
+    "mean_first_events_excess": 2.0**12 / 12.0,
     "microfacet_normal": 2.0**11 / 10.0,  # turns the former, and is allowed ten times as much to begin with
     "film_interference": 64.0,
     "thin_film_reflectance": 64.0,
@@ -127,7 +129,7 @@ def test_library_functions_equal_their_twins(web_page: WebPage) -> None:
                 }
             )
             cases.append((path.stem, signature, arguments))
-    assert len(jobs) == 72
+    assert len(jobs) == 74
     for (library, signature, arguments), job, text in zip(cases, jobs, web_page.run(FEEDBACK, jobs), strict=True):
         found = decoded(text)
         found = found if job["width"] == 1 else found.reshape(-1, job["width"])

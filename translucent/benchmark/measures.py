@@ -238,9 +238,9 @@ def suspicions(picture: Array, truth: TruthPicture) -> list[str]:
     used, right = truth.mask, truth.radiance
     product, square = float((picture[used] * right[used]).sum()), float((picture[used] ** 2).sum())
     if product > 0 and abs(math.log2(factor := product / square)) > STOPS:
-        how = "dark" if factor > 1 else "bright"
+        other = "brighter" if factor > 1 else "darker"
         stops = abs(math.log2(factor))
-        found.append((_nrmse(factor * picture, truth), f"exposure is off: {stops:.2g} stops too {how}"))
+        found.append((_nrmse(factor * picture, truth), f"exposure may be off: at {stops:.2g} stops {other} the error halves"))
     down, across = _best_shift(picture, right)
     if math.hypot(down, across) > SHIFTED:
         said = f"shifted by {across} pixels to the right and {down} down"

@@ -52,6 +52,8 @@ def table_of(results: Results) -> str:
     )
     for name, one in results.scenes.items():
         lines.append(f"{name:<16}{_line(one)}")
+    if any(one.score is not None and math.isnan(one.score.flip) for one in results.scenes.values()):
+        lines.append("FLIP is not measured: pip install 'translucent[benchmark]'")
     for said in results.suspicions:
         lines.append(f"warning: most pictures look wrong: {said}")
     return "\n".join(lines)

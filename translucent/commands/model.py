@@ -296,10 +296,10 @@ def require_translucent(model: str, scene: Scene) -> None:
 
 
 def is_own(model: str) -> bool:
-    """True if MODEL is a mesh that comes with the toolkit, and no file of the same name."""
+    """True if MODEL is a mesh that comes with the toolkit, and no file has the same name; a folder may."""
     from translucent.assets import mesh_names
 
-    return not os.path.lexists(model) and model in mesh_names()
+    return model in mesh_names() and (os.path.isdir(model) or not os.path.lexists(model))
 
 
 def read_mesh(model: str, file: FileOptions) -> Mesh:
@@ -339,15 +339,13 @@ def mesh_file(model: str, unit: str | None) -> str:
     """The file of a mesh, which may be the name of one of the toolkit's own."""
     from translucent.assets import mesh_names, mesh_path
 
-    if os.path.lexists(model):
-        return model
     if is_own(model):
         if unit not in (None, "m"):
             raise InputError(
                 f"--unit {unit}", f"{model} comes with the toolkit, in metres", "leave --unit out, or give --height"
             )
         return str(mesh_path(model))
-    if not os.path.dirname(model) and not Path(model).suffix:
+    if not os.path.lexists(model) and not os.path.dirname(model) and not Path(model).suffix:
         raise InputError(
             f"mesh {model!r}",
             "no file and no mesh of the toolkit",
