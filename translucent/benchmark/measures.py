@@ -240,7 +240,8 @@ def suspicions(picture: Array, truth: TruthPicture) -> list[str]:
     if product > 0 and abs(math.log2(factor := product / square)) > STOPS:
         other = "brighter" if factor > 1 else "darker"
         stops = abs(math.log2(factor))
-        found.append((_nrmse(factor * picture, truth), f"exposure may be off: at {stops:.2g} stops {other} the error halves"))
+        said = f"exposure may be off: at {stops:.2g} stops {other} the error halves"
+        found.append((_nrmse(factor * picture, truth), said))
     down, across = _best_shift(picture, right)
     if math.hypot(down, across) > SHIFTED:
         said = f"shifted by {across} pixels to the right and {down} down"
