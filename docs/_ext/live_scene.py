@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import translucent as tl
 from translucent.assets import mesh_path, web_path
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
+
+#: Bytes that a live page may have.
+MOST_BYTES = 1_000_000
 
 PICTURE = """<!doctype html>
 <title>translucent</title>
@@ -18,13 +21,24 @@ PICTURE = """<!doctype html>
 """
 
 
+def write_live_page(scene: tl.Scene, path: Path, **choices: Any) -> int:
+    """Write a live page and return its bytes; raises `ValueError` if they are more than `MOST_BYTES`."""
+    tl.write_page(scene, path, **choices)
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise ValueError(
+            f"live page {path.name}: it has {size} bytes, more than {MOST_BYTES}; use fewer triangles or cells"
+        )
+    return size
+
+
 def write_scene(path: Path) -> None:
     """Write a bear of green glass before a studio, without a ground: what a weak graphics card can turn."""
     size = (960, 600)
     studio = tl.Environment.studio().with_background(tl.Environment.constant((0.8, 0.8, 0.8)))
     bear = tl.load_mesh(mesh_path("bear"))
     scene = tl.showcase(bear, "#5fbf8f", distance=0.006, size=size, environment=studio, stage="none")
-    tl.write_page(scene, path, size=size)
+    write_live_page(scene, path, size=size)
 
 
 def write_live(app: Sphinx, exception: Exception | None) -> None:

@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from live_scene import write_live_page
 from sphinx_gallery.scrapers import figure_rst
 
 import translucent as tl
@@ -46,8 +47,8 @@ def new_pictures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str,
     folder.mkdir(exist_ok=True)
     page = folder / f"{example.stem}.html"
     # A page holds the light of each cell of a body in which it diffuses: with more cells it would have twice the size.
-    tl.write_page(scene, page, size=(960, 720), name=example.stem, scattering=tl.Diffusion(16))
-    return figure + LINK.format(folder=LIVE, name=example.stem, megabytes=page.stat().st_size / 1e6)
+    size = write_live_page(scene, page, size=(960, 720), name=example.stem, scattering=tl.Diffusion(16))
+    return figure + LINK.format(folder=LIVE, name=example.stem, megabytes=size / 1e6)
 
 
 def copy_live(app: Sphinx, exception: Exception | None) -> None:

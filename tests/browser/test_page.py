@@ -302,6 +302,14 @@ def test_without_webgl2(web_page: WebPage, web_dist: Path, tmp_path: Path, tools
     assert web_page.page.locator("#ior").is_disabled()
 
 
+def test_without_decompression(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
+    """The script is packed, too: the page itself says what the browser lacks."""
+    web_page.page.add_init_script("delete globalThis.DecompressionStream")
+    opened(web_page, scene_of(ball(RED)), tmp_path, tools)
+    assert web_page.run("async () => (await translucent) === undefined")
+    assert "no DecompressionStream" in web_page.page.locator(".failed").inner_text()
+
+
 def is_seen(page: Any, name: str) -> bool:
     """Tell whether nothing lies over the middle of an element, such as the poster."""
     return bool(

@@ -24,11 +24,11 @@ class Container:
 
     def __init__(self) -> None:
         self.sections: list[dict[str, Any]] = []
-        self._bytes: list[bytes] = []
+        self._offsets: dict[bytes, int] = {}
         self._end = 0
 
     def add(self, values: npt.NDArray[Any], packing: str = "plain", bits: int = 23) -> int:
-        """Number of a new section that holds an array.
+        """Number of a new section that holds an array. Sections of the same bytes share them.
 
         Parameters
         ----------
@@ -48,18 +48,18 @@ class Container:
         else:
             section["shift"] = 23 - bits
             packed = _planes(held.view(np.uint32), packing, 23 - bits)
-        section |= {"offset": self._end, "bytes": len(packed)}
         padded = packed + bytes(-len(packed) % 8)
-        self._bytes.append(padded)
-        self._end += len(padded)
-        self.sections.append(section)
+        offset = self._offsets.setdefault(padded, self._end)
+        if offset == self._end:
+            self._end += len(padded)
+        self.sections.append(section | {"offset": offset, "bytes": len(packed)})
         return len(self.sections) - 1
 
     def packed(self, header: dict[str, Any]) -> bytes:
         """Header and sections, compressed."""
         text = json.dumps({**header, "sections": self.sections}, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 8)
-        whole = MAGIC + len(text).to_bytes(8, "little") + text + b"".join(self._bytes)
+        whole = MAGIC + len(text).to_bytes(8, "little") + text + b"".join(self._offsets)
         return gzip.compress(whole, 9, mtime=0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -33,6 +34,9 @@ from translucent.version import VERSION
 #: Bits of the mantissa of light that are kept: errors are 5e-4 of each value at most, a tenth of a step of 8 bits.
 LIGHT_BITS = 10
 
+#: Bits of the mantissa of the table of reflectances that are kept: errors are 3e-5 of each value at most.
+REFLECTANCE_BITS = 14
+
 #: Endings of names that meshes have of their files.
 _FILES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 
@@ -41,6 +45,8 @@ MIRROR_STEPS = 65
 
 #: Samplers of textures that hold light.
 _LIGHT = ("light_map", "light_levels", "light_irradiance", "seen_map", "diffused_light")
+
+_COMMENT = re.compile(r"//.*")
 
 #: Steps of `RecordedFrame`, by their names in the header.
 _PARTS = ("once", "single", "averaged")
@@ -110,11 +116,13 @@ def payload(
         },
     }
     sections = _Sections(gl, into, kept)
-    light = _held_as(frames, _LIGHT)
-    header["textures"] = [sections.texture(entry, i in light) for i, entry in enumerate(gl.textures)]
+    bits = dict.fromkeys(_held_as(frames, _LIGHT), LIGHT_BITS)
+    bits |= dict.fromkeys(_held_as(frames, ("reflectance_table",)), REFLECTANCE_BITS)
+    header["textures"] = [sections.texture(entry, bits.get(i)) for i, entry in enumerate(gl.textures)]
     if albedos:
         _add_albedos(header, recorder, planned, into, frames)
-    header["programs"], header["framebuffers"] = gl.programs, gl.framebuffers
+    header["programs"] = [[_code(stage) for stage in program] for program in gl.programs]
+    header["framebuffers"] = gl.framebuffers
     _number_blocks(header, sections)
     return into.packed(header)
 
@@ -187,12 +195,12 @@ class _Sections:
             self._numbers[content] = self._into.add(self._gl.contents[content], packing, bits)
         return self._numbers[content]
 
-    def texture(self, entry: Mapping[str, Any], light: bool) -> dict[str, Any]:
-        """Entry of a texture in the header; light is rounded."""
+    def texture(self, entry: Mapping[str, Any], bits: int | None) -> dict[str, Any]:
+        """Entry of a texture in the header; its values are rounded to `bits` of the mantissa."""
         content = entry["content"]
         if content is None or content in self._kept:
             return {**entry, "content": None}
-        return {**entry, "content": self.number(content, "picture" if light else "plain", LIGHT_BITS if light else 23)}
+        return {**entry, "content": self.number(content) if bits is None else self.number(content, "picture", bits)}
 
 
 def _held_as(frames: Mapping[str, tuple[Scene, RecordedFrame]], names: Sequence[str]) -> set[int]:
@@ -296,8 +304,13 @@ def _layout(item: UniformBlock | PackedTable) -> dict[str, Any]:
 
 
 def _present_entry() -> dict[str, str]:
-    texts = {tone: lift("present/present.frag", {"TONE": i}, "webgl2").text for i, tone in enumerate(TONES)}
-    return {"vertex": lift("geometry/fullscreen.vert", {}, "webgl2").text, **texts}
+    texts = {tone: _code(lift("present/present.frag", {"TONE": i}, "webgl2").text) for i, tone in enumerate(TONES)}
+    return {"vertex": _code(lift("geometry/fullscreen.vert", {}, "webgl2").text), **texts}
+
+
+def _code(shader: str) -> str:
+    """Text of a shader without comments, indentation and empty lines."""
+    return "\n".join(filter(None, (_COMMENT.sub("", line).strip() for line in shader.splitlines())))
 
 
 def _hierarchies_entry(recorder: FrameRecorder, scene: Scene, into: Container) -> dict[str, Any] | None:

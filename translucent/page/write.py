@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import html
 import io
 import os
@@ -47,9 +48,35 @@ html, body {{ margin: 0; height: 100%; background: #131416; }}
 <body>
 <div id="viewer">{poster}<noscript>This page needs JavaScript to show its scene.</noscript></div>
 <script type="text/plain" id="scene">{scene}</script>
-<script>{script}</script>
+<script type="text/plain" id="viewer-script">{script}</script>
+<script>{start}</script>
 </body>
 </html>
+"""
+
+#: Unpacks the viewer's script and runs it. `translucent` is a promise of the viewer, before the script runs and after.
+_START = """
+window.translucent = (async () => {
+  try {
+    if (typeof DecompressionStream === "undefined") {
+      throw new Error("this browser cannot unpack it (no DecompressionStream): use one from 2023 or later");
+    }
+    const packed = atob(document.getElementById("viewer-script").textContent);
+    const bytes = Uint8Array.from(packed, (one) => one.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const script = document.createElement("script");
+    script.textContent = await new Response(stream).text();
+    document.body.append(script);
+  } catch (error) {
+    const told = document.createElement("p");
+    told.className = "failed";
+    told.textContent = `This page cannot show its scene: ${error.message}.`;
+    document.getElementById("viewer").append(told);
+    console.warn(`translucent: ${error.message}`);
+    return undefined;
+  }
+  return window.translucent;
+})();
 """
 
 #: Samples of a pixel that pages add up at rest, as `translucent render` does; those of posters; and the most.
@@ -157,7 +184,7 @@ def page_html(
             f"samples {brief(samples)}", f"not a whole number in 1 to {MOST_SAMPLES}", "give for example 16"
         )
     name = name.encode("utf-8", "replace").decode()  # a name of a file may hold what is no character
-    script = web_path("page.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
+    script = gzip.compress(web_path("page.js").read_bytes(), 9, mtime=0)
     data = payload(planned, name, size, samples, exposure, tone, albedos=True)
     picture = "" if poster is None else f'<img alt="" src="{_data_url(poster)}">'
     return _TEMPLATE.format(
@@ -165,7 +192,8 @@ def page_html(
         title=html.escape(name),
         poster=picture,
         scene=base64.b64encode(data).decode("ascii"),
-        script=script,
+        script=base64.b64encode(script).decode("ascii"),
+        start=_START,
     )
 
 
