@@ -103,7 +103,7 @@ BAD_RENDER_OPTIONS = [
     (["--camera", "first"], "Invalid value for '--camera'"),
     (
         ["--interfaces", "front", "--opaque-with", "pyrender"],
-        "--interfaces front; --opaque-with, whose interfaces are those of the screen",
+        "--interfaces front; --opaque-with, which finds interfaces in screen space",
     ),
     (["--interfaces", "both"], "Invalid value for '--interfaces': 'both' is not one of 'traced', 'screen', 'front'"),
     (["--interface-depth", "3"], "--interface-depth; only --interfaces traced takes it; add --interfaces traced"),

@@ -144,7 +144,7 @@ def test_thickness_needs_no_stage() -> None:
         (("--stage", "studoi"), "stage 'studoi'; no such stage; did you mean studio?"),
         (
             ("--stage", "night", "--opaque-with", "pyrender"),
-            "--stage night; --opaque-with, which throws no such shadows",
+            "--stage night; --opaque-with, which draws no shadows of a stage",
         ),
     ],
 )

@@ -94,44 +94,52 @@ class BakeOptions:
 
     output: Path | None = option(
         names=("-o", "--output"),
-        help="A .exr, .png, .npy, .npz, .glb or .ply file; name.<UDIM>.png: all tiles.",
+        help="A .exr, .png, .npy, .npz, .glb or .ply file; name.<UDIM>.png bakes all tiles.",
     )
     mode: str = option(
         "cone",
         type=click.Choice(MODES),
-        help="What thickness means; or scatter: no thickness, but the light that leaves a body after scattering.",
+        help="Definition of thickness; or scatter, which bakes the light that leaves a body after scattering.",
     )
-    size: int = option(1024, metavar="N", help=f"Texels along each side of the map; of --mode scatter, {SIZE}.")
-    resolution: int = option(32, metavar="N", help="Of --mode scatter: the body has about N^3 / 4 cells, 8 to 128.")
+    size: int = option(
+        1024, metavar="N", help=f"Texels along each side of the map; default with --mode scatter: {SIZE}."
+    )
+    resolution: int = option(
+        32, metavar="N", help="Of --mode scatter: resolution, 8 to 128; a body gets about N^3 / 4 cells."
+    )
     rays: int = option(64, metavar="N", help="Rays per point of the surface.")
-    spread: float = option(180.0, metavar="DEG", help="Full angle of the cone.")
+    spread: float = option(180.0, metavar="DEG", help="Full angle of the cone of rays.")
     weighting: str = option(
         "cosine", type=click.Choice(["cosine", "uniform"]), help="Weights of the directions in the cone."
     )
     gaps: str = option(
         "first-exit",
         type=click.Choice(["first-exit", "total"]),
-        help="Length of a ray that leaves and enters again: up to the first exit, or all of it that is inside.",
+        help="Length of a ray that leaves and enters again: up to its first exit, or the sum of its parts inside.",
     )
     max_distance: str | None = _length("No ray goes farther. Default: no limit.")
-    ignore_back_faces: bool = option(False, help="Rays end only at faces that they leave through.")
-    supersample: int = option(1, metavar="N", help="N x N points per texel.")
-    padding: int = option(16, metavar="N", help="Texels around each chart of the UVs.")
-    seed: int = option(0, metavar="N", help="Of the directions.")
-    tolerance: str | None = _length("More rays where the standard error is above it.")
+    ignore_back_faces: bool = option(False, help="Rays end only at faces through which they leave the body.")
+    supersample: int = option(1, metavar="N", help="Average N x N points per texel.")
+    padding: int = option(16, metavar="N", help="Texels by which the map continues around each chart of the UVs.")
+    seed: int = option(0, metavar="N", help="Seed of the ray directions.")
+    tolerance: str | None = _length("Cast more rays at points whose standard error is larger.")
     tile: int | None = option(metavar="N", help="Bake this UDIM tile, such as 1001. Default: UVs repeat.")
-    high: str | None = option(metavar="MESH", help="Mesh with the details, for a map on a coarser MODEL.")
-    cage: str | None = option(metavar="MESH", help="Of --high: MODEL, moved outwards, where the search begins.")
-    high_distance: str | None = _length("Of --high: how far its surface may be from that of MODEL.")
+    high: str | None = option(metavar="MESH", help="Detailed mesh whose thickness is baked onto the coarser MODEL.")
+    cage: str | None = option(
+        metavar="MESH", help="Of --high: a copy of MODEL, moved outwards, from which rays search for the detailed mesh."
+    )
+    high_distance: str | None = _length("Of --high: largest distance between its surface and that of MODEL.")
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
     medium: AnyMediumOptions = group(AnyMediumOptions)
     unwrap: bool = option(False, help="Make new UVs, even if MODEL has some.")
-    vertices: bool = option(False, help="Thickness per vertex, into a .ply, .glb or .npy file.")
+    vertices: bool = option(False, help="Bake thickness per vertex, into a .ply, .glb or .npy file.")
     normalize: bool = option(False, help="Store fractions of the largest value instead of metres.")
-    invert: bool = option(False, help="Store 1 - t / max, the translucency that some engines want.")
-    max_escaped: str | None = option(metavar="%", help="Of --out-dir: more rays without an exit are suspect. [5%]")
-    resume: bool = option(False, help="Keep finished parts beside the output, and go on from there.")
-    check: bool = option(False, help="Compare the look with the true one; write OUTPUT.check.png.")
+    invert: bool = option(False, help="Store 1 - t / max, the translucency that some engines expect.")
+    max_escaped: str | None = option(
+        metavar="%", help="Of --out-dir: share of rays without an exit above which a map is suspect. [5%]"
+    )
+    resume: bool = option(False, help="Store finished parts next to the output, and continue from them.")
+    check: bool = option(False, help="Compare a picture by the map with an exact one; write OUTPUT.check.png.")
     program: str | None = option(
         names=("--for",),
         type=NamesOf("translucent.bake.settings", "PROGRAMS"),
@@ -142,9 +150,11 @@ class BakeOptions:
         metavar="FILE",
         help="Instead of -o: a .usda or .usdc stage with meshes, OpenPBR materials, and thickness per vertex.",
     )
-    format: str = option("exr", type=click.Choice(FORMATS), help="Of files in --out-dir.")
-    jobs: int | None = option(metavar="N", help="Of --out-dir: processes. Default: one per processor.")
-    dask: str | None = option(metavar="ADDRESS", help="Of --out-dir: a Dask scheduler, such as tcp://farm:8786.")
+    format: str = option("exr", type=click.Choice(FORMATS), help="Format of the files in --out-dir.")
+    jobs: int | None = option(metavar="N", help="Of --out-dir: number of processes. Default: one per processor.")
+    dask: str | None = option(
+        metavar="ADDRESS", help="Of --out-dir: bake on a Dask scheduler, such as tcp://farm:8786."
+    )
     overwrite: bool = overwrite_option()
 
 
@@ -158,9 +168,9 @@ class BakeOptions:
 def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
     """Bake the thickness of MODEL, a file or one of the toolkit's own meshes, into a map over its UVs.
 
-    Values are metres; 0.2 in the map is 20 cm. A .glb gets thicknessFactor and thicknessTexture, and what else a .glb
-    or .gltf MODEL has stays. Beside each file goes a record, FILE.json. With --out-dir, many models: models
-    that are done are skipped, and a model that fails stops no other.
+    Values are metres; 0.2 in the map is 20 cm. A .glb gets thicknessFactor and thicknessTexture; all other content of a
+    .glb or .gltf MODEL stays. FILE.json next to each file is its record. --out-dir bakes many models, skips
+    finished ones, and goes on if one fails.
 
     --mode scatter bakes the light that leaves the body after scattering: --mode scatter --preset wax -o candle.exr
     """
@@ -553,8 +563,8 @@ class LithophaneOptions:
         metavar="D", help="Transmission distance of the filament, after which 10 % of light is left: 4mm."
     )
     medium: MediumOptions = group(MediumOptions)
-    thickness: str = option("0.6mm..3mm", metavar="A..B", help="Least and largest.")
-    width: str = option("100mm", metavar="W", help="Of the plate.")
+    thickness: str = option("0.6mm..3mm", metavar="A..B", help="Least and largest thickness.")
+    width: str = option("100mm", metavar="W", help="Width of the plate.")
     pitch: str = option("0.25mm", metavar="P", help="Distance of the relief's points.")
     check: bool = option(False, help="Write OUTPUT.check.png: the requested picture, and the rendered relief.")
     overwrite: bool = overwrite_option()

@@ -230,7 +230,7 @@ class NamesOf(click.Choice):  # type: ignore[type-arg] # click below 8.4 has no 
 
 def clamp_option() -> Any:
     """Field for colors with a channel of 0, which no finite extinction makes."""
-    reported = "Take channels below 1e-4 for 1e-4 and say so, or refuse those of 0. Default: --clamp."
+    reported = "Replace color channels below 1e-4 by 1e-4, with a warning; or refuse channels of 0. Default: --clamp."
     return option(names=("--clamp/--no-clamp",), help=reported)
 
 
@@ -285,11 +285,11 @@ class AnyMediumOptions(MediumOptions):
 
     scattering_color: str | None = option(
         metavar="C",
-        help=f"Diffuse color of a body that is thick and scatters, with --mean-free-path; its ior is "
-        f"{SCATTERING_IOR:g}. Wax: --scattering-color '#f2e0b8' --mean-free-path 2mm.",
+        help=f"Diffuse color of a thick body that scatters, with --mean-free-path; its index of refraction is "
+        f"{SCATTERING_IOR:g}. For wax: --scattering-color '#f2e0b8' --mean-free-path 2mm.",
     )
     mean_free_path: str | None = option(
-        metavar="L", help="Length after which light in such a medium is scattered or absorbed, on average: 0.5mm."
+        metavar="L", help="Of --scattering-color: mean distance after which light is scattered or absorbed, as 0.5mm."
     )
 
     def read(self, *, shows_scattering: bool = True) -> Medium | None:
@@ -319,14 +319,15 @@ class BodyOptions(AnyMediumOptions):
     ior: float | None = option(
         type=click.FloatRange(1.0, 100.0),
         metavar="N",
-        help="Index of refraction; 1: light goes straight on, as in fog. Default: the preset's, the file's, "
-        f"{SCATTERING_IOR:g} of --scattering-color, or 1.5, that of glass.",
+        help="Index of refraction; at 1, light enters without refraction, as in fog. Default: that of the preset or "
+        "the "
+        f"file, {SCATTERING_IOR:g} with --scattering-color, else 1.5 (glass).",
     )
 
     dilute: float | None = option(
         type=click.FloatRange(0.0, 1e12, min_open=True),
         metavar="F",
-        help="Divide the coefficients of the medium by this: 5 makes it five times as clear.",
+        help="Divide the coefficients of the medium by F: 5 makes the medium five times as clear.",
     )
 
     def read(self, *, shows_scattering: bool = True) -> Medium | None:
@@ -372,7 +373,7 @@ def outside_option() -> Any:
     """Field for reading what a model links to."""
     return option(
         False,
-        help="Read files that MODEL links to wherever they are, not only below its folder. For models that you trust.",
+        help="Also read files that MODEL links to outside its folder. Only for models that you trust.",
     )
 
 
@@ -382,10 +383,10 @@ class FileOptions:
 
     unit: str | None = option(metavar="U", help="Unit of the file's coordinates: mm, cm, in, ... or 25mm. Default: m.")
     height: str | None = option(metavar="L", help="Scale the model to this height, along +Y: 12cm.")
-    longest: str | None = option(metavar="L", help="Scale the model so that its longest side is this: 12cm.")
+    longest: str | None = option(metavar="L", help="Scale the model so that its longest side has this length: 12cm.")
     allow_outside: bool = outside_option()
     draft_extensions: bool = option(
-        False, help="Of a glTF MODEL: read KHR_materials_scatter and KHR_materials_volume_scatter, which are drafts."
+        False, help="Read the draft extensions KHR_materials_scatter and KHR_materials_volume_scatter of a glTF MODEL."
     )
 
     @property
@@ -416,16 +417,16 @@ class CameraOptions:
         metavar="X,Y,Z", help="Position of the camera in metres. Default: the whole model in view."
     )
     target: str | None = option(metavar="X,Y,Z", help="What the camera looks at. Default: the model's center.")
-    up: str | None = option(metavar="X,Y,Z", help=f"What is up in the picture. Default: {DEFAULT_UP}.")
+    up: str | None = option(metavar="X,Y,Z", help=f"Direction that points up in the picture. Default: {DEFAULT_UP}.")
     fov: float | None = option(metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
     orbit: str | None = option(
         metavar="YAW,PITCH",
-        help="See the model from around it: degrees about +Y from the front, 90 from +X, and upwards: 30,15.",
+        help="View the model from these angles: degrees about +Y (0: front, 90: +X), and degrees upwards: 30,15.",
     )
     fit: float | None = option(
         type=click.FloatRange(0.0, 1.0, min_open=True),
         metavar="F",
-        help="Let the model take this part of the picture's width or height, whichever is more: 0.8.",
+        help="Let the model fill this fraction of the picture, along the side that it fills more: 0.8.",
     )
 
     @property
@@ -465,9 +466,9 @@ def stage_option() -> Any:
         from translucent.scene.stages import DEFAULT_STAGE, STAGES
 
         return (
-            f"What the model stands on, and is lit by: {', '.join(STAGES)}, or none, before the environment alone; "
-            f"{DEFAULT_STAGE},90 turns it by degrees. Default: {DEFAULT_STAGE}; none with --environment or "
-            "--background, and for a glTF file with a camera, lights or a ground of its own."
+            f"Ground, backdrop and lights of the model: {', '.join(STAGES)}, or none (the environment alone); "
+            f"{DEFAULT_STAGE},90 turns the stage by 90 degrees. Default: {DEFAULT_STAGE}; none with --environment or "
+            "--background, and none for a glTF file with a camera, lights or a ground."
         )
 
     return option(metavar="S", help=words)
@@ -475,13 +476,15 @@ def stage_option() -> Any:
 
 def ground_option() -> Any:
     """Field for the color of what a stage's model stands on."""
-    words = "Color of the ground of the stage; none leaves it out. Shadows alone: --transparent. Default: the stage's."
+    words = (
+        "Color of the stage's ground; none: no ground. For shadows without a ground: --transparent. Default: by stage."
+    )
     return option(metavar="C", help=words)
 
 
 def roughness_option() -> Any:
     """Field for the surfaces of media."""
-    reported = "Of the interfaces of media, 0 (polished) to 1. Default: the preset's, else the file's, or 0."
+    reported = "Roughness of the surfaces of media, 0 (polished) to 1. Default: that of the preset, of the file, or 0."
     return option(type=click.FloatRange(0.0, 1.0), metavar="R", help=reported)
 
 
@@ -491,16 +494,21 @@ class LookOptions:
 
     environment: str | None = option(
         metavar="E",
-        help="Lights the model, and is visible in reflections: light-table, studio, checkerboard, a color, or a .hdr, "
-        ".exr or .png of all directions; studio,90 turns it by degrees. Default: the stage's, or else light-table.",
+        help="Environment that lights the model and shows in reflections: light-table, studio, checkerboard, a "
+        "color, or "
+        "a .hdr, .exr or .png of all directions; studio,90 turns it by 90 degrees. Default: by stage, else "
+        "light-table.",
     )
     background: str | None = option(
-        metavar="E", help="Seen behind the model instead of the environment, and through it; as above."
+        metavar="E", help="Environment that is visible behind the model and through it; values as of --environment."
     )
-    exposure: float = option(0.0, metavar="STOPS", show_default=False, help="Makes a .png brighter.")
+    exposure: float = option(
+        0.0, metavar="STOPS", show_default=False, help="Exposure of a .png: positive numbers make it brighter."
+    )
     tone: str | None = option(
         type=NamesOf("translucent.formulas.tone", "TONES"),
-        help="Tone curve of a .png: clamped, Khronos PBR Neutral, or AgX. Default: neutral on a stage, else none.",
+        help="Tone curve of a .png: none (clamped), neutral (Khronos PBR) or agx. Default: neutral on a stage, else "
+        "none.",
     )
     roughness: float | None = roughness_option()
 
@@ -534,8 +542,9 @@ def _method_words() -> str:
     *names, last = METHODS
     sheets = " and ".join(name for name, method in METHODS.items() if method.makes_sheets)
     return (
-        f"{', '.join(names)} or {last}. Default: by plan. Without OpenGL all but {sheets} give way to all surfaces on "
-        "each ray."
+        f"{', '.join(names)} or {last}. Default: the planner's choice. Without OpenGL, a method that finds all "
+        f"surfaces "
+        f"on each ray replaces all but {sheets}."
     )
 
 
@@ -546,56 +555,64 @@ class ChoiceOptions:
     method: str | None = option(metavar="NAME", help=_method_words)
     paths: int | None = option(
         metavar="N",
-        help="Of --method path-traced: random paths of each pixel. Default: 64. Four times as many halve the noise.",
+        help="Of --method path-traced: random paths per pixel. Default: 64. Four times as many paths halve the noise.",
     )
     interfaces: str | None = option(
         type=NamesOf("translucent.planning.interfaces", "INTERFACES"),
         help="Where light is reflected and refracted. traced: at all interfaces, by rays through the meshes. screen: "
-        "where it enters bodies and where it leaves them, in screen space (quicker). front: only where it enters "
-        "(quickest). Default: traced, where bodies are solid and rays can be; the plan says which it is.",
+        "where light enters bodies and where it leaves them, in screen space (quicker). front: only where light enters "
+        "(quickest). Default: traced for solid bodies, if rays can be traced; the plan states the choice.",
     )
     interface_depth: int | None = option(
         metavar="N", help="Of --interfaces traced: interfaces that a ray may hit, 1 to 64. Default: 24."
     )
     interface_forks: int | None = option(
         metavar="N",
-        help="Of --interfaces traced: how often rays go on as the weaker of reflected and refracted light. Default: 2.",
+        help="Of --interfaces traced: how often both the reflected and the refracted ray are followed. Default: 2.",
     )
     interface_hits: str | None = option(
         type=NamesOf("translucent.planning.hits", "HITS"),
-        help="Of --interfaces traced: what finds the surfaces that rays hit, Embree or shaders. Default: Embree "
-        "where OpenGL draws on the processors, too.",
+        help="Of --interfaces traced: ray caster that finds the surfaces that rays hit, Embree or shaders (gl). "
+        "Default: "
+        "Embree if OpenGL is a software rasterizer.",
     )
     scattering: str | None = option(
         type=NamesOf("translucent.planning.scattering", "SCATTERINGS"),
-        help="Light that media scatter many times. diffusion: it spreads in the body (wax, milk, jade). layer: it "
-        "leaves where it entered, as from a flat layer (quicker where the light or the medium changes all the time). "
+        help="How to render light that media scatter many times. diffusion: light spreads in the body (wax, milk, "
+        "jade). "
+        "layer: light leaves where it entered, as from a flat layer (quicker if lights or media change all the time). "
         "single: only light that is scattered once is rendered (smoke, clear drinks). Default: diffusion in closed "
         "bodies with an interface, layer in sheets and open meshes, single where there is no interface or little "
         "scatters.",
     )
     diffusion_resolution: int | None = option(
-        metavar="N", help="Of --scattering diffusion: a body gets about N^3 / 4 cells, 8 to 128. Default: 32."
+        metavar="N",
+        help="Of --scattering diffusion: resolution, 8 to 128; a body gets about N^3 / 4 cells. Default: 32.",
     )
     caustics: int | None = option(
         is_flag=False,
         flag_value=1_000_000,
         metavar="[N]",
-        help="Let N photons carry the light of point, spot and directional lights through interfaces onto opaque "
-        "objects, into fog, wax and milk. Default: some where a clear body gathers light on something opaque, if they "
-        "take less than a third of the time; 0: none; without N: a million; at most 2^30. Four times as many halve "
-        "the noise.",
+        help="Render caustics: N photons carry light of point, spot and directional lights through interfaces onto "
+        "opaque objects and into fog, wax and milk. Default: some photons if a clear body gathers light on an opaque "
+        "object, and they take less than a third of the time. 0: none; without N: a million; at most 2^30. Four "
+        "times as "
+        "many photons halve the noise.",
     )
     shadow_size: int | None = option(
         metavar="N",
-        help="Texels along a side of each light's shadow map, 64 to 8192. Default: 1024. More make edges sharper.",
+        help="Texels along a side of each light's shadow map, 64 to 8192. Default: 1024. More texels make edges "
+        "sharper.",
     )
     environment_shadows: int | None = option(
         metavar="N",
-        help="Directions of the environment that throw shadows onto opaque objects, 0 to 256. Default: 128 on a stage, "
+        help="Number of directions of the environment that throw shadows onto opaque objects, 0 to 256. Default: 128 "
+        "on a stage, "
         "else none.",
     )
-    thickness: str | None = option(metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
+    thickness: str | None = option(
+        metavar="D", help="Thickness of the sheets of --method thin-layer, such as 0.3mm. Default: 1mm."
+    )
 
     flags: Flags = group(Flags)
 
@@ -687,7 +704,7 @@ def overwrite_option() -> Any:
         context.meta[_OVERWRITE] = given
         return given
 
-    return option(False, callback=note, help="Write the output even where that replaces a file that is read.")
+    return option(False, callback=note, help="Allow the output to replace a file that the command reads.")
 
 
 def refuse_overwriting(output: Path, *inputs: str | Path | None) -> None:

@@ -114,15 +114,15 @@ class RenderOptions:
         (),
         names=("--object",),
         metavar="NAME",
-        help="The medium that follows, as --preset P or --color C --distance D, is for the object of this name alone; "
-        "may be repeated.",
+        help="Give the next medium (--preset P, or --color C --distance D) only to the object of this name; may be "
+        "repeated.",
     )
     variant: str | None = option(
         metavar="NAME", help="Materials of this variant of a glTF file (KHR_materials_variants)."
     )
     time: float | None = option(
         metavar="S",
-        help="Animate nodes, skins and morph targets of a glTF file to S seconds. Default: as the file has them.",
+        help="Show the animations of a glTF file after S seconds. Default: nodes, skins and morph targets as stored.",
     )
     file: FileOptions = group(FileOptions)
     size: str = option("1280x720", metavar="WxH", help="Size of the picture in pixels.")
@@ -134,21 +134,20 @@ class RenderOptions:
     samples: int = option(16, metavar="N", help="Samples per pixel, for smooth edges.")
     denoise: bool = option(
         False,
-        help="Take noise out of the picture, where rough surfaces or random paths leave some: by Open Image Denoise, "
-        "whose error is unknown. Then 4 samples of frosted glass look like 64.",
+        help="Remove the noise of rough surfaces and random paths, by Open Image Denoise, whose error is unknown. 4 "
+        "denoised samples of frosted glass look like 64.",
     )
     opaque_with: str | None = option(
         type=click.Choice(["pyrender"]), help="Let another renderer draw the opaque objects of a glTF file."
     )
     transparent: bool = option(
         False,
-        help="Leave out what is behind: a picture with alpha, and of the stage no more than shadows (a shadow "
-        "catcher).",
+        help="Make the background transparent, by an alpha channel. The ground of a stage then shows only shadows.",
     )
     turntable: int | None = option(
         type=click.IntRange(2, 3600),
         metavar="N",
-        help="N pictures from all around, into a .webp, .gif, .mp4, or a folder of numbered .png files.",
+        help="Write N pictures from all around, as a .webp, .gif, .mp4, or a folder of numbered .png files.",
     )
     fps: float | None = option(metavar="N", help=f"Pictures per second of a --turntable. Default: {FPS:g}.")
     aov: Path | None = option(
@@ -158,7 +157,9 @@ class RenderOptions:
     )
     overwrite: bool = overwrite_option()
     verbose: bool = verbose_option()
-    backend: str | None = option(metavar="B", help="egl, window, osmesa or cpu. Default: what works here.")
+    backend: str | None = option(
+        metavar="B", help="egl, window, osmesa or cpu. Default: one that works on this machine."
+    )
 
 
 @click.command(
@@ -169,13 +170,14 @@ class RenderOptions:
 @models_argument()
 @takes(RenderOptions)
 def render(model: str, given: RenderOptions, as_json: bool) -> None:
-    """Render MODEL, a file or one of the toolkit's own meshes, to a picture with its physical quantities.
+    """Render a picture of MODEL, a file or one of the toolkit's own meshes, with its physical quantities.
 
     The model stands on a ground with its shadow; see --stage. A .glb or .gltf file keeps its camera, lights and media;
-    --color, --preset or --scattering-color replaces the media. All other files are one mesh.
+    --color, --preset or --scattering-color replaces the media. All other files hold one mesh.
 
     Several models, each with its material: translucent render goblet:crystal wine:red_wine -o wine.png
-    A medium behind an --object is for the object of that name: --object Wine --preset merlot.
+
+    To fill only one object of a file, name it before the medium: --object Wine --preset merlot.
     """
     import translucent as tl
     from translucent.frames.animation import framed_all_around
@@ -291,14 +293,14 @@ def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pict
         return
     interfaces = request.interfaces
     clashes = {
-        "--transparent": (given.transparent, "which draws what is behind"),
-        "--denoise": (given.denoise, "whose picture is made of two"),
+        "--transparent": (given.transparent, "which draws the background"),
+        "--denoise": (given.denoise, "which combines two pictures"),
         f"--interfaces {interfaces and interfaces.name}": (
             interfaces is not None and not interfaces.finds_exits,
-            "whose interfaces are those of the screen",
+            "which finds interfaces in screen space",
         ),
-        f"--stage {given.stage}": (given.stage not in (None, NO_STAGE), "which throws no such shadows"),
-        "--caustics": (request.caustics is not None, "which draws what light lands on"),
+        f"--stage {given.stage}": (given.stage not in (None, NO_STAGE), "which draws no shadows of a stage"),
+        "--caustics": (request.caustics is not None, "which draws the objects that light lands on"),
         f"--size {given.size}": (pictures.tiled, "which draws all of it at once"),
     }
     for requested, (clash, why) in clashes.items():
