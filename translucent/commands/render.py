@@ -300,7 +300,7 @@ def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pict
             "which finds interfaces in screen space",
         ),
         f"--stage {given.stage}": (given.stage not in (None, NO_STAGE), "which draws no shadows of a stage"),
-        "--caustics": (request.caustics is not None, "which draws the objects that light lands on"),
+        "--caustics": (request.caustics is not None, "which draws what light lands on"),
         f"--size {given.size}": (pictures.tiled, "which draws all of it at once"),
     }
     for requested, (clash, why) in clashes.items():
