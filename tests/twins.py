@@ -168,6 +168,13 @@ def _first_event_arguments(count: int) -> list[np.ndarray]:
     return [phases[number.astype(int)].astype(np.float32), _triples(scale), *cosines]
 
 
+def _ahead_arguments() -> list[np.ndarray]:
+    """Optical depths, fractions of events ahead, g, and cosines."""
+    grids = [0, 1e-3, 0.5, 3, 30, 1e4], [0.0, 0.3, 0.9], [0.05, 0.4, 0.9, 0.98], [-1.0, 0.0, 0.75, 1.0]
+    depth, ahead, anisotropy, cosine = _mixed(*map(np.array, grids))
+    return [_triples(depth), np.repeat(ahead[:, None], 3, axis=1), anisotropy, cosine]
+
+
 def _harmonic_arguments() -> list[np.ndarray]:
     """Transfer and light of both signs, some of whose products cancel or sum to less than nothing."""
     rng = np.random.default_rng(8)
@@ -349,6 +356,7 @@ ARGUMENTS = {
     "emergent_radiance": _emergent_arguments(),
     "first_events_excess": _first_event_arguments(1),
     "mean_first_events_excess": _first_event_arguments(2),
+    "scattered_ahead": _ahead_arguments(),
     "real_harmonics": [np.concatenate([_unit_vectors(), np.eye(3, dtype=np.float32), -np.eye(3, dtype=np.float32)])],
     "scattered_radiance": _harmonic_arguments(),
     "exit_lobe": _mixed(UNIT, np.array([1.0, 1.0001, 1.33, 1.5, 2.4]), np.array([0.5, 0.91, 1.0])),
@@ -379,10 +387,12 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
     "first_events_excess": 64.0,
     "mean_first_events_excess": 64.0,
     "phase_after_scattering": 256.0,  # the same, 16 times
+    "scattered_ahead": 256.0,
     "equirectangular_uv": 4096.0,
     "tone_agx": 64.0,  # powers
 }
 FLOOR = {
+    "scattered_ahead": 2e-5,  # differences of moments of order 0
     "first_events_excess": 1e-5,  # less 1
     "mean_first_events_excess": 1e-5,
     "filmed_reflectance": 4e-5,  # as thin_film_reflectance

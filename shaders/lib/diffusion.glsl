@@ -33,3 +33,22 @@ vec3 mean_first_events_excess(vec4 phase, vec3 scale, float down, float up) {
     }
     return sum / float(AZIMUTHS);
 }
+
+// Radiance times 4 pi of directed light with unit irradiance, behind a path on which it has been scattered ahead alone: diffusion
+// counts it as unscattered. depth: optical depth of its path; ahead: fraction of the extinction by such events.
+vec3 scattered_ahead(vec3 depth, vec3 ahead, float anisotropy, float cos_scatter) {
+    float second = 1.5 * cos_scatter * cos_scatter - 0.5;
+    vec3 none = exp(-depth);
+    vec3 sum = (1.0 + 3.0 * cos_scatter) * (exp((ahead - 1.0) * depth) - none);
+    sum += 5.0 * second * (exp((anisotropy * ahead - 1.0) * depth) - none);
+    vec3 probability = none;
+    float power = 1.0;
+    for (int n = 1; n <= AHEAD_EVENTS; ++n) {
+        probability *= ahead * depth / (anisotropy * float(n));
+        power *= anisotropy;
+        if (power < LEAST_POWER) { break; }
+        float beyond = 4.0 * PI * henyey_greenstein(cos_scatter, power) - 1.0 - power * (3.0 * cos_scatter + 5.0 * power * second);
+        sum += probability * beyond;
+    }
+    return max(sum, vec3(0.0));
+}

@@ -1,4 +1,4 @@
-// Subsurface light: what leaves bodies in which light has diffused. Needs <ObjectRow>. DIFFUSED: there are such bodies.
+// Subsurface light: what leaves bodies in which light has diffused. Needs <ObjectRow> and interface_light.glsl. DIFFUSED: there are such bodies.
 
 #if DIFFUSED
 #include "lib/diffusion.glsl"
@@ -82,7 +82,25 @@ vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) {
     vec3 far = row.in_scattered_far * environment_light(direction, IN_SCATTERED_ROUGHNESS);
     return in_scattered * (far + row.in_scattered_near * environment_light(-direction, IN_SCATTERED_ROUGHNESS));
 }
+
+// The same of light of the lights, through a wall without an interface. normal: outwards where the ray begins inside.
+vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, vec3 optical_depth) {
+    ObjectRow row = object_table_row(object);
+    vec3 sum = vec3(0.0);
+    if (row.turned <= 0.0 || row.turned >= 1.0) { return sum; }
+    float leaving = -dot(normal, direction);
+    for (int light = 0; light < light_count; ++light) {
+        LightSample arriving = light_at(light, far_end);
+        float down = -dot(normal, arriving.towards);
+        if (leaving <= 0.0 || down <= 0.0) { continue; }
+        vec3 depth = optical_depth * (leaving / down);
+        vec3 part = scattered_ahead(depth, row.ahead, 1.0 - row.turned, dot(direction, arriving.towards)) / (4.0 * PI);
+        if (max(part.r, max(part.g, part.b)) > FAINTEST_HIGHLIGHT) { sum += part * irradiance_reaching(light, arriving, far_end, -normal); }
+    }
+    return sum;
+}
 #else
+vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
 vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, float cosine, vec3 optical_depth) { return vec3(0.0); }
 vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
 vec3 inclusion_exitance(int object, vec3 point, vec3 color) { return vec3(0.0); }

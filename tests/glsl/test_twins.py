@@ -14,7 +14,7 @@ from translucent.assets import shader_library
 
 #: Functions of these modules that are no formulas of light, and so have no twin.
 HOST_ONLY = {
-    "bsdf": {"below_coat", "sampled_branches"},
+    "bsdf": {"below_coat", "brdf_table", "sampled_branches"},
     "phase": {"parse_phase"},
     "color": {"to_hex"},
     "diffusion": {"in_scattered_shares"},

@@ -19,8 +19,9 @@ from translucent.formulas.diffuse_interface import (
     half_space_reflectance,
     half_space_reflectances,
 )
-from translucent.formulas.diffusion import UNIFORM_COSINE, emergent_radiance, mean_first_events_excess
+from translucent.formulas.diffusion import UNIFORM_COSINE, emergent_radiance, mean_first_events_excess, scattered_ahead
 from translucent.formulas.phase import HenyeyGreenstein
+from translucent.reference import slabs
 from translucent.reference.microfacets import scattered_at_interface
 
 Array = npt.NDArray[np.float64]
@@ -283,6 +284,35 @@ def test_first_events_have_the_phase_function(albedo: float, g: float, entering:
     excess = mean_first_events_excess(phase.parameters, albedo / reduced, down, cosine[:, None])[:, 0]
     found = alike + reduced / (cosine + down) * excess
     assert error(found) < max(0.5 * error(alike), 0.042)
+
+
+@pytest.mark.parametrize("g", [0.2, 0.4, 0.8])
+@pytest.mark.parametrize(("reduced", "depth"), [(0.98, 2.0), (0.75, 2.0), (0.75, 4.0)])
+def test_light_scattered_ahead_comes_through_slabs(g: float, reduced: float, depth: float) -> None:
+    """Against exact slabs in light from one direction: how much leaves at each cosine, as means over azimuths."""
+    scattering = reduced / (1 - g)
+    extinction = scattering + 1 - reduced
+    cosine, weight = slabs.cosines(1.0)
+    entering = int(np.abs(cosine - 0.75).argmin())
+    down, flux = cosine[entering], 2 * cosine * weight
+    straight = math.exp(-extinction * depth / down)
+    exact = slabs.bare(scattering / extinction, extinction * depth, cosine, weight, g)[1][:, entering]
+    exact[entering] -= straight
+    exact *= 0.5 / (weight[entering] * down)
+    azimuths = np.pi * (np.arange(16) + 0.5) / 16
+    turn = cosine[:, None] * down + np.sqrt((1 - cosine**2) * (1 - down**2))[:, None] * np.cos(azimuths)
+    path = np.full(3, extinction * depth / down)
+    found = scattered_ahead(path, g * scattering / extinction, g, turn[..., None]).mean(axis=(1, 2)) / (4 * down)
+    counted = math.exp(-depth / down) - straight
+    # The rest has been scattered to all sides.
+    rest = emergent_radiance(1.0, 0.0, reduced, diffuse_interface(1.0).conductance, UNIFORM_COSINE, cosine)
+    rest *= (flux @ exact - counted) / (flux @ rest)
+
+    def error(light: np.ndarray) -> float:
+        return math.sqrt(flux @ (light - exact) ** 2) / (flux @ exact)
+
+    assert flux @ found == pytest.approx(counted, rel=0.18)
+    assert error(rest + found) < min(0.1, 0.65 * error(rest))
 
 
 @pytest.mark.parametrize("ior", [1.0, 1.5])

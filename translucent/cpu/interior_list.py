@@ -145,6 +145,8 @@ class Branches:
         Differentials of origins and of directions; (n, 0, 2, 3) where nothing is averaged over footprints.
     diffused : (n, 3) float64
         Basic radiance along it of light that has diffused in the body where it begins, if all was scattered there.
+    outwards : (n, 3) float64
+        Normal of that body there, outwards; 0 where it has none.
     """
 
     origins: Array
@@ -159,6 +161,7 @@ class Branches:
     blur: Array
     footprint: Array
     diffused: Array
+    outwards: Array
 
     def __len__(self) -> int:
         return len(self.owner)

@@ -32,13 +32,13 @@ from translucent.cpu.threads import end_if_stopped
 from translucent.diffusion.field import DiffusionField
 from translucent.diffusion.interfaces import InterfaceTable
 from translucent.formulas import optics
-from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS
+from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS, scattered_ahead
 from translucent.formulas.interface import reflected_direction
 from translucent.geometry.ray_caster import dot, unit
 from translucent.reference.compositing import composite, emission_of_mixtures
 from translucent.reference.hits import Hits, Rays
 from translucent.reference.intervals import Intervals
-from translucent.reference.light_paths import SurfaceLight
+from translucent.reference.light_paths import SurfaceLight, direction_and_distance
 from translucent.reference.surfaces import OpaqueHits, reflected_radiance, scene_crossings
 from translucent.reference.volume import Volume, volume_segments
 
@@ -133,18 +133,24 @@ class DiffusionFields:
             found[body == number] = np.stack([field.ahead, *field.in_scattered])
         return found
 
+    def anisotropy(self, body: Integers) -> Array:
+        """(k,): g of bodies (k,) without an interface that scatter ahead, 0 of others."""
+        found = np.zeros(len(body))
+        for number, field in self._fields.items():
+            found[body == number] = 0.0 if field.travel is None else max(field.phase.mean_cosine, 0.0)
+        return found
+
     def radiance(self, body: Integers, points: Array, directions: Array, normals: Array) -> Array:
         """(k, 3): basic radiance against rays that start at points (k, 3) of surfaces, inside `body` (k,).
 
-        As if all light was scattered on the rest of their path through the body.
+        As if all light was scattered on the rest of their path through the body. `normals` (k, 3) look outwards.
         """
         found = np.zeros(points.shape)
-        along = dot(directions, normals)
-        outwards = np.where(along[:, None] < 0.0, normals, -normals)
+        cosine = np.abs(dot(directions, normals))
         for number, field in self._fields.items():
             own = np.flatnonzero(body == number)
             if own.size:
-                found[own] = field.scattered_radiance(points[own], outwards[own], directions[own], np.abs(along[own]))
+                found[own] = field.scattered_radiance(points[own], normals[own], directions[own], cosine[own])
         return found
 
 
@@ -276,6 +282,7 @@ class _Growth:
             np.zeros(count),
             self._pixel_footprints(rays.directions),
             np.zeros((count, 3)),
+            np.zeros((count, 3)),
         )
         while len(branches):
             branches = self._step(branches)
@@ -357,6 +364,7 @@ class _Growth:
             self._add(own, emitted)
         if self.tree.diffused:
             self._add_diffused(own, passed)
+            self._add_ahead_from_lights(own, length[inside] * self.caster.radius, passed)
         throughput = branches.throughput.copy()
         with np.errstate(under="ignore"):
             throughput[inside] *= passed
@@ -383,6 +391,28 @@ class _Growth:
                 for sign in (1.0, -1.0)
             )
             self._add(own, (through - passed[in_scattered]) * (far * behind + near * before))
+
+    def _add_ahead_from_lights(self, branches: Branches, length: Array, passed: Array) -> None:
+        """Add light of the lights that is scattered ahead in walls without an interface; length (n,) in metres."""
+        body = self.media.effective(branches.interior)
+        anisotropy, leaving = self.tree.diffused.anisotropy(body), -dot(branches.outwards, branches.directions)
+        walls = np.flatnonzero((anisotropy > 0.0) & (leaving > 0.0))
+        if not walls.size:
+            return
+        branches, anisotropy, leaving = branches.where(walls), anisotropy[walls], leaving[walls]
+        rays, ahead = self._rays(branches), self.tree.diffused.in_scattered(body[walls])[:, 0]
+        ends = rays.origins + length[walls, None] * rays.directions
+        depth = -np.log(np.maximum(passed[walls], np.finfo(np.float64).tiny))
+        found = np.zeros(ends.shape)
+        for light in self.tree.light.paths.lights:
+            travel, _ = direction_and_distance(light, ends)
+            down, turn = dot(branches.outwards, travel), dot(branches.directions, -travel)
+            lit = np.flatnonzero(down > 0.0)
+            along = depth[lit] * (leaving[lit] / down[lit])[:, None]
+            part = scattered_ahead(along, ahead[lit], anisotropy[lit, None], turn[lit, None]) / (4.0 * np.pi)
+            arriving = light.irradiance_on(ends[lit], -travel[lit])
+            found[lit] += part * arriving * self.tree.light.to_interfaces(light, ends[lit])
+        self._add(branches, found)
 
     def _at_surfaces(self, branches: Branches) -> Branches:
         """Interact branches with the surfaces at their origins, and return the branches that continue."""
@@ -471,7 +501,10 @@ class _Growth:
         """Branches that start inside bodies, with the subsurface light there."""
         points = self._rays(branches).origins + self.scene.camera.eye
         body = self.media.effective(branches.interior)
-        return replace(branches, diffused=self.tree.diffused.radiance(body, points, branches.directions, normals))
+        along = dot(branches.directions, normals)
+        outwards = np.where(along[:, None] < 0.0, normals, -normals)
+        diffused = self.tree.diffused.radiance(body, points, branches.directions, outwards)
+        return replace(branches, diffused=diffused, outwards=outwards)
 
     def _add_coats(self, branches: Branches, found: BranchInteractions) -> None:
         """Add the environment's reflection in clear coats whose roughness differs from that of the interface below."""

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.formulas.phase import phase_value
+from translucent.formulas import optics
+from translucent.formulas.phase import AHEAD_EVENTS, LEAST_POWER, henyey_greenstein, phase_value
 
 #: Roughness of the mirror that blurs the environment as media blur what they scatter ahead: half of the directions are
 #: within 40 degrees, as after one to three events with g = .8.
@@ -117,6 +118,44 @@ def mean_first_events_excess(
     return np.asarray(
         np.mean([first_events_excess(phase, scale, level * np.cos(angle) - down * up) for angle in azimuths], axis=0)
     )
+
+
+def scattered_ahead(
+    depth: npt.ArrayLike, ahead: npt.ArrayLike, anisotropy: npt.ArrayLike, cos_scatter: npt.ArrayLike
+) -> Array:
+    """Radiance times 4 pi of directed light with unit irradiance, behind a path on which it has been scattered ahead.
+
+    Diffusion counts that light as unscattered. Similarity splits the phase function into g of a peak ahead and 1 - g
+    that goes to all sides alike (Wiscombe 1977, "The delta-M method"), so events ahead have the Legendre moments
+    g^(l - 1), l > 0. On a path t with scattering g s t to the peak the light then has exp(-t) (exp(g^l s t) - 1)
+    (Goudsmit & Saunderson 1940), and in total as much as of order 1: what crosses a slab is the difference of
+    exp(-t') and exp(-t). Orders 1 and 2 are in closed form here, and others the sum over a Poisson number of events.
+    Negative values, which no light has, count as 0.
+
+    Parameters
+    ----------
+    depth : array_like (..., 3)
+        t: optical depth of the path.
+    ahead : array_like (..., 3)
+        Fraction of the extinction by events ahead, g sigma_s / sigma_t.
+    anisotropy : array_like (..., 1)
+        g, more than 0 and at most 1.
+    cos_scatter : array_like (..., 1)
+        Between the directions of travel of the light, before and behind.
+    """
+    t, part, g, cosine = (np.asarray(x, np.float64) for x in (depth, ahead, anisotropy, cos_scatter))
+    second = 1.5 * cosine * cosine - 0.5
+    with np.errstate(under="ignore"):
+        none = optics.transmittance(t)
+        total = (1.0 + 3.0 * cosine) * (optics.transmittance((1.0 - part) * t) - none)
+        total = total + 5.0 * second * (optics.transmittance((1.0 - g * part) * t) - none)
+        probability, power = none, np.ones_like(g)
+        for n in range(1, AHEAD_EVENTS + 1):
+            probability, power = probability * part * t / (g * n), power * g
+            lower = 1.0 + power * (3.0 * cosine + 5.0 * power * second)
+            beyond = 4.0 * np.pi * henyey_greenstein(cosine, power) - lower
+            total = total + np.where(power < LEAST_POWER, 0.0, probability * beyond)
+    return np.maximum(total, 0.0)
 
 
 def in_scattered_shares(reflected: npt.ArrayLike, passed: npt.ArrayLike) -> tuple[Array, Array]:
