@@ -19,7 +19,7 @@ HOST_ONLY = {
     "color": {"to_hex"},
     "diffusion": {"in_scattered_shares"},
     "light": {"light_cone"},
-    "camera": {"check_size", "direction_from", "framing_directions"},
+    "camera": {"aperture_point", "check_size", "direction_from", "framing_directions"},
     "tone": {"tone_curve"},
     "environment": {"filtered", "ggx_lobe", "parse_radiance", "radiance_harmonics"},
 }
