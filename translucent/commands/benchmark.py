@@ -32,9 +32,9 @@ def benchmark() -> None:
     """Thirty scenes with truth, to score any renderer of translucent things.
 
     \b
-    list     scenes and renderers that can be driven here
+    list     scenes, and renderers that can run on this machine
     export   write the scenes as glTF, JSON and EXR files
-    run      render them by a renderer that is installed here, and score it
+    run      render the scenes by an installed renderer, and score its pictures
     score    score pictures that you rendered
     page     one self-contained page of results
     merge    join results of several renderers or machines
@@ -45,7 +45,7 @@ def benchmark() -> None:
 @_JSON
 @_DEBUG
 def list_scenes(as_json: bool, debug: bool) -> None:
-    """List the scenes, what each tests, and the renderers that can be driven here."""
+    """List the scenes with what each tests, and the renderers that can run on this machine."""
     from translucent.benchmark.adapters import adapters
     from translucent.benchmark.scenes import SCENES
     from translucent.benchmark.truth import read_records
@@ -90,7 +90,8 @@ def export(folder: Path, only: str | None, debug: bool) -> None:
 def run(names: tuple[str, ...], output: Path, only: str | None, as_json: bool, debug: bool) -> None:
     """Render the scenes by renderers that are installed here, and score them.
 
-    Each writes DIR/ADAPTER/ and DIR/ADAPTER.zip, the one file to send. `all` stands for every one that is here.
+    Results of each renderer are in DIR/ADAPTER/, and packed in DIR/ADAPTER.zip, the file to send. `all` stands for all
+    installed renderers.
     """
     from translucent.benchmark.adapters import adapter_named, adapters, run_adapter
     from translucent.benchmark.results import pack
@@ -122,12 +123,14 @@ def run(names: tuple[str, ...], output: Path, only: str | None, as_json: bool, d
 
 @benchmark.command(epilog='Example: translucent benchmark score my-pictures --name "My renderer" --version 1.2')
 @click.argument("folder", type=_FOLDER)
-@click.option("--name", help="Of the renderer. Default: what results.json says, or the name of the folder.")
-@click.option("--version", help="Of the renderer.")
-@click.option("--settings", help="What it was asked for, such as samples.")
-@click.option("--device", help="What it rendered on, such as a graphics card.")
+@click.option("--name", help="Name of the renderer. Default: that in results.json, or the name of the folder.")
+@click.option("--version", help="Version of the renderer.")
+@click.option("--settings", help="Settings of the renderer, such as samples.")
+@click.option("--device", help="Device that rendered the pictures, such as a graphics card.")
 @click.option(
-    "--elsewhere", is_flag=True, help="It was rendered on another machine: no floor of time is measured here."
+    "--elsewhere",
+    is_flag=True,
+    help="The pictures were rendered on another machine, so the floor of time is not measured.",
 )
 @_JSON
 @_DEBUG
@@ -143,7 +146,8 @@ def score(
 ) -> None:
     """Score pictures SCENE.exr or SCENE.npy in FOLDER: linear radiance at the size of the scene.
 
-    It writes results.json there, and FOLDER.zip, the one file to send. Scenes without a picture are not counted.
+    Scores are written to FOLDER/results.json, and packed in FOLDER.zip, the file to send. Scenes without a picture are
+    not counted.
     """
     from translucent.benchmark.results import floor_seconds, pack, read_results, scored, this_machine, today
     from translucent.benchmark.scenes import scene_named

@@ -55,9 +55,9 @@ class ExplainOptions:
 @models_argument()
 @takes(ExplainOptions)
 def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
-    """Say what is known about MODEL, which passes would render it, and why.
+    """Print facts about MODEL, and the plan: the passes that would render MODEL, each with its reason.
 
-    A .glb or .gltf file keeps its camera, lights and media. Several models have a material each: goblet:crystal
+    A .glb or .gltf file keeps its camera, lights and media. Several models, each with its material: goblet:crystal
     wine:red_wine.
     """
     from translucent.planning.plan import plan_scene
@@ -172,7 +172,7 @@ def _traffic(scene: Scene, chosen: RenderPlan) -> FrameTraffic:
 @click.command(epilog="Example: translucent doctor")
 @common_options
 def doctor(as_json: bool) -> None:
-    """Explain this machine: its OpenGL, its packages, and what each missing one is needed for."""
+    """Print facts about this machine: its OpenGL, its packages, and the use of each missing package."""
     from translucent import doctor as examination
 
     facts = examination.examine()

@@ -55,42 +55,43 @@ MOST_THIN_SHARE = 0.5
 class ExtinctionOptions:
     """Options of ``translucent extinction``."""
 
-    unit: str = option("m", help="Unit of distances that name none, and of MODEL.")
-    unit_out: str = option("m", metavar="U", help="Give the extinction per this unit, too.")
+    unit: str = option("m", help="Unit of distances without one, and of MODEL.")
+    unit_out: str = option("m", metavar="U", help="Also print the extinction per this unit.")
     clamp: bool | None = clamp_option()
     target: str | None = option(
         names=("--as",),
         type=NamesOf("translucent.materials", "TARGETS"),
-        help="Print the material for an engine, to paste.",
+        help="Print the material for an engine, ready to paste.",
     )
     ior: float | None = option(
-        metavar="N", help="Of --as and of photographs: index of refraction. Default: the medium's, or 1."
+        metavar="N", help="Of --as and --fit PHOTO: index of refraction. Default: that of the medium, or 1."
     )
     roughness: float | None = option(
         type=click.FloatRange(0.0, 1.0),
         metavar="R",
-        help="Of --as: of its surface, 0 (polished) to 1. Default: that of --preset or --from, or 0.",
+        help="Of --as: roughness of the surface, 0 (polished) to 1. Default: that of --preset or --from, or 0.",
     )
-    batch: Path | None = option(metavar="FILE", help="Convert rows of name,color,distance.")
-    output: Path | None = option(names=("-o", "--output"), help="Of --batch: a .json or .csv file.")
+    batch: Path | None = option(metavar="FILE", help="Convert a table with rows name,color,distance.")
+    output: Path | None = option(names=("-o", "--output"), help="Output of --batch: a .json or .csv file.")
     fit: tuple[Path, ...] = option(
         (),
         metavar="FILE",
-        help="Fit to rows of distance,color[,weight] in a .csv; to photographs of steps before a light, with --white "
-        "and --patch, repeated for other exposures; or to a .toml of such photographs.",
+        help="Fit a medium to a .csv with rows distance,color[,weight]; or to a photograph of plates before a light, "
+        "with "
+        "--white and --patch (repeat for more exposures); or to a .toml that lists such photographs.",
     )
-    white: str | None = option(
-        metavar="X,Y,W,H", help="Of --fit PHOTO: a place where nothing is in front of the light, in pixels."
-    )
+    white: str | None = option(metavar="X,Y,W,H", help="Of --fit PHOTO: a rectangle of bare light, in pixels.")
     patch: tuple[str, ...] = option(
         (),
         metavar="X,Y,W,H=D",
-        help="Of --fit PHOTO: a patch and its thickness; equal steps side by side, X,Y,W,H=1mm,2mm,4mm; or a wedge, "
-        "X,Y,W,H=1mm..8mm. Repeated for more.",
+        help="Of --fit PHOTO: a rectangle and the thickness of its plate; of equal steps, X,Y,W,H=1mm,2mm,4mm; or of a "
+        "wedge, X,Y,W,H=1mm..8mm. May be repeated.",
     )
     preset: str | None = option(metavar="NAME", help="A named medium instead of a color at a distance.")
     source: str | None = option(
-        names=("--from",), metavar="FILE", help="The medium of a .mtlx or .usda file, or of what --as printed."
+        names=("--from",),
+        metavar="FILE",
+        help="Read the medium from a .mtlx or .usda file, or from the output of --as.",
     )
     td: str | None = option(metavar="D", help="Transmission distance of a filament for 3D printers instead: 4mm, or 4.")
     td_transmittance: float | None = option(
@@ -98,7 +99,7 @@ class ExtinctionOptions:
         help="Fraction of light that is left after --td, and after the printed TD. Default: 0.1, T = 10^(-d/TD).",
     )
     model: str | None = option(
-        names=("--on",), metavar="MODEL", help="A file, or a mesh of the toolkit: its color, see above."
+        names=("--on",), metavar="MODEL", help="Print colors on this model, a file or a mesh of the toolkit; see above."
     )
     eye: str | None = option(metavar="X,Y,Z", help="Of --on: position of the eye, in metres. Default: that of render.")
     overwrite: bool = overwrite_option()
@@ -121,14 +122,15 @@ def extinction(
 
     COLOR is '#7b1e3a', 7b1e3a, teal, 'srgb(.5,.1,.2)', 'linear(.2,.6,.3)' or a pixel of an image, photo.png@120,45.
 
-    With --on MODEL and no DISTANCE, the medium in which that model shows COLOR on average, over the pixels that it
-    covers before white light; with a DISTANCE, --preset or --from, the average color that this medium shows on it.
+    With --on MODEL and no DISTANCE, the result is the medium in which MODEL has COLOR on average, over its pixels in
+    front of white light. With a DISTANCE, --preset or --from, it is the average color of MODEL in that medium.
 
-    With --td D, the gray medium of a filament with this transmission distance: translucent extinction --td 4mm. Makers
-    agree that next to no light passes there, not on the share: it is --td-transmittance, and told with every result.
+    With --td D, the result is the gray medium of a filament with this transmission distance: translucent extinction
+    --td 4mm. Next to no light passes D, but makers differ on the fraction: --td-transmittance sets it.
 
-    With --fit PHOTO, the medium of plates photographed before a light, with error bars; --ior says what their faces
-    reflect: translucent extinction --fit steps.jpg --white 10,10,60,60 --patch 90,10,400,60=1mm,2mm,4mm,8mm
+    With --fit PHOTO, the result is the medium of plates in front of a light, with error bars. The reflection of their
+    faces is computed from --ior: translucent extinction --fit steps.jpg --white 10,10,60,60 --patch
+    90,10,400,60=1mm,2mm,4mm,8mm
     """
     from translucent.frames.appearance import appearance_of
     from translucent.media.colors import QUOTE_HINT
@@ -179,7 +181,7 @@ def _check_usage(given: ExtinctionOptions, color: str | None, as_json: bool) -> 
     ):
         both = [name for name, value in rivals.items() if value is not None]
         if len(both) > 1:
-            raise InputError(f"{both[1]} with {both[0]}", "each asks for something else", "give one of them")
+            raise InputError(f"{both[1]} with {both[0]}", "they ask for different results", "give one of them")
     of_photographs = bool(given.fit) and not _is_table(given.fit)
     for name, value in (("--ior", None if of_photographs else given.ior), ("--roughness", given.roughness)):
         if value is not None and given.target is None:

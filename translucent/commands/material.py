@@ -44,7 +44,7 @@ class ShowOptions:
 @click.argument("model")
 @takes(ShowOptions)
 def show(model: str, given: ShowOptions, as_json: bool) -> None:
-    """List the materials of MODEL, a .glb or .gltf file, with the volume that each of them states."""
+    """List the materials of MODEL, a .glb or .gltf file, with the volume of each material."""
     from translucent.gltf.materials import read_materials
 
     found = read_materials(model, draft_extensions=given.file.draft_extensions)
@@ -93,16 +93,17 @@ class ApplyOptions:
     output: Path = option(names=("-o", "--output"), required=True, help="A .glb or .gltf file.")
     medium: MediumOptions = group(MediumOptions)
     object: str | None = option(
-        metavar="NAME", help="Only the objects of this name. Default: all that light enters, or all."
+        metavar="NAME",
+        help="Change only the objects of this name. Default: all translucent objects; if there are none, all.",
     )
     thickness: str | None = option(
-        metavar="T", help="In the mesh's own units, as glTF has it. Default: the smallest side."
+        metavar="T", help="Thickness, in the units of the mesh, as in glTF. Default: the smallest side."
     )
     draft_extensions: str | None = option(
         is_flag=False,
         flag_value="scatter",
         type=click.Choice(["scatter", "volume-scatter"]),
-        help="Write scattering as well, by a draft extension: KHR_materials_scatter or KHR_materials_volume_scatter.",
+        help="Also write scattering, in a draft extension: KHR_materials_scatter or KHR_materials_volume_scatter.",
     )
     overwrite: bool = overwrite_option()
     allow_outside: bool = outside_option()
@@ -114,7 +115,7 @@ class ApplyOptions:
 @click.argument("model")
 @takes(ApplyOptions)
 def apply(model: str, given: ApplyOptions, as_json: bool) -> None:
-    """Write a medium into MODEL's materials; a color leaves them their index of refraction, a preset brings its own."""
+    """Write a medium into MODEL's materials; a color keeps the index of refraction, and a preset replaces it."""
     from translucent.gltf.write import write_medium
     from translucent.units import parse_length
 
@@ -144,9 +145,9 @@ def apply(model: str, given: ApplyOptions, as_json: bool) -> None:
 class CheckOptions:
     """Options of ``translucent material check``."""
 
-    fix: bool = option(False, help="Bake the thickness where it is wrong, into OUTPUT, and check that.")
-    output: Path | None = option(names=("-o", "--output"), help="Of --fix: a .glb file.")
-    size: int = option(512, metavar="N", help="Of --fix: texels along a side.")
+    fix: bool = option(False, help="Bake wrong thicknesses anew into OUTPUT, and check OUTPUT.")
+    output: Path | None = option(names=("-o", "--output"), help="Output of --fix: a .glb file.")
+    size: int = option(512, metavar="N", help="Of --fix: texels along each side of a map.")
     rays: int = option(64, metavar="N", help="Of --fix: rays from each texel.")
     overwrite: bool = overwrite_option()
     allow_outside: bool = outside_option()
@@ -156,13 +157,14 @@ class CheckOptions:
 @click.argument("model")
 @takes(CheckOptions)
 def check(model: str, given: CheckOptions, as_json: bool) -> None:
-    """Check whether the thickness and attenuation that MODEL, a .glb or .gltf file, states are those of its meshes.
+    """Check the thickness and attenuation in MODEL, a .glb or .gltf file, against the thickness of its meshes.
 
-    Told are errors, warnings and notes, each with what to change, and the color that passes each body in truth and in
-    known viewers. The exit code is 1 if there is an error (with --fix: in OUTPUT), and else 0.
+    Errors, warnings and notes are printed, each with what to change. For each body, the true color of the light that
+    passes is printed next to the colors that known viewers show. The exit code is 1 if there is an error (with --fix:
+    in OUTPUT), else 0.
 
-    --fix bakes thickness maps, sets metallicFactor of what transmits to 0 and removes doubleSided of volumes. Meshes,
-    units and attenuations are reported, and not changed.
+    --fix bakes thickness maps, sets metallicFactor of transmitting materials to 0 and removes doubleSided of volumes.
+    Errors of meshes, units and attenuations are only reported.
     """
     from translucent.bake.audit.check import check_materials, fix_materials
 

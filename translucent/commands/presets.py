@@ -26,11 +26,11 @@ _LISTED = ("name", "kind", "group", "regime", "colors", "diffuse_color", "source
 @common_options
 @click.pass_context
 def presets(context: click.Context, group: str | None, search: str | None, as_json: bool) -> None:
-    """List the named media: what they do to light, and their colors.
+    """List the named media: how they change light, and their colors.
 
-    Three are what is left of white light after 1 mm, 1 cm and 10 cm; the next is what a thick slab of a medium that
-    scatters looks like in white light. Terminals with colors show slabs of 1, 5 and 20 mm on a white and a black card.
-    Your own, .toml files that the previewer saves, come last.
+    The first three colors are those of white light after 1 mm, 1 cm and 10 cm in the medium. The fourth is the color of
+    a thick slab in white light, if the medium scatters. Terminals with colors also show slabs of 1, 5 and 20 mm on a
+    white and a black card. Presets of your own, .toml files that the previewer saves, come last.
     """
     if context.invoked_subcommand is not None:
         return
@@ -71,7 +71,7 @@ def _listed(group: str | None, search: str | None) -> list[Preset]:
 @common_options
 @click.pass_context
 def show(context: click.Context, name: str, as_json: bool) -> None:
-    """Print everything about the medium NAME: coefficients, colors, source, and what absorption alone is worth."""
+    """Print everything about the medium NAME: coefficients, colors, source, and the colors by absorption alone."""
     from translucent.media.presets import preset
 
     one = preset(name)

@@ -36,15 +36,19 @@ class ReportOptions:
     )
     quick: bool = option(
         False,
-        help="About a minute, more where nothing is compiled yet: fewer scenes, methods, pixels and repetitions.",
+        help="Measure roughly, in about a minute: fewer scenes, methods, pixels and repetitions.",
     )
     size: str | None = option(metavar="WxH", help="Size of the timed frames in pixels.")
-    methods: str | None = option(metavar="NAME,...", help="Only these: signed-depth, k-buffer, ray-marched, ...")
-    only: str | None = option(metavar="PART,...", help="Only these: scenes, scaling, slabs, shadows, hard-cases.")
+    methods: str | None = option(
+        metavar="NAME,...", help="Measure only these methods: signed-depth, k-buffer, ray-marched, ..."
+    )
+    only: str | None = option(
+        metavar="PART,...", help="Measure only these parts: scenes, scaling, slabs, shadows, hard-cases."
+    )
     source: Path | None = option(
         names=("--from",),
         metavar="JSON",
-        help="Measure nothing: take the report of this file; with --only, measure these parts of it anew.",
+        help="Write the report of this file again, without measuring; with --only, measure these parts anew.",
     )
     limit: float | None = option(
         metavar="SECONDS", help="Stop measuring after this time; the report names the scenes that are missing."
@@ -54,7 +58,7 @@ class ReportOptions:
     )
     medium: MediumOptions = group(MediumOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
-    backend: str | None = option(metavar="B", help="egl, window or osmesa. Default: what works here.")
+    backend: str | None = option(metavar="B", help="egl, window or osmesa. Default: one that works on this machine.")
 
 
 @click.command(epilog="Example: translucent report model.stl --unit mm -o out/report --quick")
@@ -63,9 +67,9 @@ class ReportOptions:
 def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None:
     """Measure what each method costs and how wrong it is, on the toolkit's scenes and on each MODEL.
 
-    A MODEL is a file, or a mesh of the toolkit by name; --color or --preset fills it with a medium, and the report says
-    whether anybody would see there what a method gets wrong. Opaque parts are staging. Interrupted with Ctrl-C, the
-    finished scenes are written. Without -o and --compare, all numbers are printed, and nothing is kept.
+    A MODEL is a file, or a mesh of the toolkit by name. --color or --preset fills it with a medium, and the report says
+    whether the error of each method would be visible. Opaque parts are not measured. Ctrl-C stops measuring, and the
+    finished scenes are written. Without -o and --compare, all numbers are printed, and no file is written.
     """
     from translucent.bench.judgement import agreement, compare_reports, machines_differ
     from translucent.bench.output import checked_folder, read_report, table, write_outputs

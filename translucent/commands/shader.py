@@ -86,23 +86,26 @@ process.stdout.write(JSON.stringify(answer));
 
 @click.command(epilog="Example: translucent shader signed_depth --define OPAQUE=0 --define SPECTRAL=0 --target webgl2")
 @click.argument("name", required=False)
-@click.option("--define", "defines", multiple=True, metavar="X=1", help="Value of a switch, once for each that it has.")
+@click.option(
+    "--define", "defines", multiple=True, metavar="X=1", help="Value of a switch; repeat for each switch of the shader."
+)
 @click.option(
     "--target",
     type=click.Choice(["glsl", "webgl2", "vulkan", "hlsl", "msl", "wgsl"]),
     default="glsl",
     show_default=True,
-    help="Language to write it in.",
+    help="Language of the output.",
 )
 @common_options
 def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Language, as_json: bool) -> None:
-    """Print the shader NAME as one text, with its constants and includes in place and without what it does not use.
+    """Print the shader NAME as one text, with its constants and includes in place and without unused code.
 
-    NAME is a file under shaders/, or its name alone where no other has it. Without NAME, all are listed, with the
-    switches that they ask for; --json adds sets of values that each accepts.
+    NAME is a file under shaders/; the file's name is enough if only one file has it. Without NAME, all shaders are
+    listed with their switches; --json adds the sets of values that each shader accepts.
 
-    glsl is that of OpenGL 3.3, webgl2 that of WebGL2 and OpenGL ES 3.0, vulkan that of Vulkan. hlsl, msl (Metal) and
-    wgsl (WebGPU) are made from the last by translators, which have to be installed: glslang and SPIRV-Cross, or naga.
+    glsl is the GLSL of OpenGL 3.3, webgl2 that of WebGL2 and OpenGL ES 3.0, and vulkan that of Vulkan. Translators make
+    hlsl, msl (Metal) and wgsl (WebGPU) from the GLSL of Vulkan. They have to be installed: glslang and SPIRV-Cross, or
+    naga for wgsl.
     """
 
     from translucent.gpu.lifting import find_shader, lift

@@ -48,8 +48,9 @@ def _stage_words() -> str:
     from translucent.scene.stages import STAGES
 
     return (
-        f"What the model stands on: {', '.join(STAGES)}, none, or auto, as render. Default: that of the last window; "
-        "at first auto; with a script none."
+        f"Ground, backdrop and lights of the model: {', '.join(STAGES)}, none, or auto (as render). Default: the "
+        f"stage of "
+        "the last window, at first auto; with a script, none."
     )
 
 
@@ -58,22 +59,22 @@ class PreviewOptions:
     """Options of ``translucent preview``."""
 
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
-    session: Path | None = option(metavar="FILE", help="Begin with a session, a .toml file.")
+    session: Path | None = option(metavar="FILE", help="Open this session, a .toml file.")
     stage: str | None = option(metavar="S", help=_stage_words)
     size: str = option("1600x1000", metavar="WxH", help="Size of the window.")
     scale: float = option(1.0, help="Size of letters and fields, 0.5 to 4.")
     script: Path | None = option(metavar="FILE", help="Run the actions of a .toml file, then close the window.")
-    screenshot: Path | None = option(metavar="PNG", help="Save a picture of the window at the end, as this .png.")
+    screenshot: Path | None = option(metavar="PNG", help="Save a picture of the window as this .png before it closes.")
 
 
 @click.command(epilog="Example: translucent preview goblet")
 @models_argument(required=False)
 @takes(PreviewOptions)
 def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
-    """Open MODEL, a file or one of the toolkit's own meshes, in a window. Without it: a goblet.
+    """Open MODEL, a file or one of the toolkit's own meshes, in a window. Without MODEL, it opens a goblet.
 
-    With --script, the window does what the script says, and closes; --screenshot keeps a picture of it. An action that
-    fails does not stop the others; the exit code is then 1, or 2 where it asked for what cannot be.
+    With --script, the window runs the actions of the script, and closes; --screenshot saves a picture of the window. If
+    an action fails, the next ones still run; the exit code is then 2 for a wrong request, and 1 for any other failure.
     """
     from translucent.preview.document import AUTO, Document, Look, Model
     from translucent.preview.script import Script, read_script
@@ -147,18 +148,19 @@ class PageOptions:
     output: Path = option(names=("-o", "--output"), required=True, help="An .html file.")
     medium: BodyOptions = group(BodyOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
-    size: str = option("1280x800", metavar="WxH", help="Of the poster, and of the framed view.")
+    size: str = option("1280x800", metavar="WxH", help="Size of the poster and of the framed view in pixels.")
     camera: CameraOptions = group(CameraOptions)
     stage: str | None = stage_option()
     ground: str | None = ground_option()
     look: LookOptions = group(LookOptions)
     choices: ChoiceOptions = group(ChoiceOptions, without=("paths", "caustics", "adaptive"))
     samples: int = option(16, metavar="N", help="Samples per pixel while nothing moves.")
-    title: str | None = option(metavar="TEXT", help="Of the page. Default: the name of the model.")
+    title: str | None = option(metavar="TEXT", help="Title of the page. Default: the name of the model.")
     poster: str = option(
         RENDERED,
         metavar="PICTURE",
-        help="Shown until the scene is loaded, and without WebGL2: a .png, .jpg or .webp, rendered, or none.",
+        help="Picture that the page shows until the scene is loaded, and without WebGL2: a .png, .jpg or .webp, "
+        "rendered, or none.",
     )
     simplify: int | None = option(metavar="N", help="Show a copy of the model with about N triangles.")
     overwrite: bool = overwrite_option()
@@ -175,8 +177,9 @@ class PageOptions:
 def page(model: str, given: PageOptions, as_json: bool) -> None:
     """Write MODEL, a file or one of the toolkit's own meshes, as a page that any browser with WebGL2 shows.
 
-    One file, which fetches nothing: to turn around, with the material on a panel, the thickness in false colors, and a
-    probe. It runs the passes of the renderer; what it leaves out is printed here and stands on the page.
+    The page is one file, which fetches nothing from the network. It shows the model to turn around, with the material
+    on a panel, the thickness in false colors, and a probe. It runs the passes of the renderer. Effects that it leaves
+    out are printed, and named on the page.
     """
     from translucent.files.paths import write_text_atomically
     from translucent.page.plans import plan_page, simplified, triangles
