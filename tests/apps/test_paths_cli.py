@@ -31,7 +31,7 @@ def test_the_plan_of_paths_is_explained(run: Run) -> None:
     done = run("explain", *JADE[:5], "--paths", 8)
     assert done.code == 0
     assert "path_trace: requested: 8 random paths for each pixel" in done.out
-    assert "limit: radiance is a mean over 8 random paths: it has noise" in done.out
+    assert "limit: radiance is a mean over 8 random paths: its noise is in standard_error" in done.out
 
 
 @pytest.mark.parametrize(
@@ -39,8 +39,8 @@ def test_the_plan_of_paths_is_explained(run: Run) -> None:
     [
         (("bear", "--paths", 4), "--paths; only --method path-traced takes it; add --method path-traced"),
         ((*JADE, "--paths", 1), "PathTraced paths 1; not a whole number in 2 to 1048576"),
-        ((*JADE, "--interfaces", "traced"), "paths take the place of interfaces; give one of the two"),
-        ((*JADE, "--scattering", "single"), "paths take the place of scattering; give one of the two"),
+        ((*JADE, "--interfaces", "traced"), "random paths replace interfaces; give one of the two"),
+        ((*JADE, "--scattering", "single"), "random paths replace scattering; give one of the two"),
         ((*JADE, "--backend", "cpu"), "use tl.reference.path_trace(scene, size, paths), or an OpenGL backend"),
     ],
 )

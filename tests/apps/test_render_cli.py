@@ -466,7 +466,7 @@ def test_scattering_is_shown_and_not_warned_of(run: Run, tmp_path: Path) -> None
 
 def test_a_preset_brings_its_roughness_unless_one_is_given(run: Run, tmp_path: Path) -> None:
     command = ["render", "bear", "-o", tmp_path / "a.png", "--verbose", "--preset"]
-    rough = "rough ones blur both"
+    rough = "rough interfaces blur both"
     assert rough in run(*command, "jade", *SMALL).out
     assert rough not in run(*command, "jade", "--roughness", "0", *SMALL).out
     assert rough in run("explain", "bear", "--preset", "jade").out

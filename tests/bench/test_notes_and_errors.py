@@ -36,11 +36,11 @@ def test_no_error_is_larger_than_the_notes_say(one: Case, renderer: tl.Renderer)
 def test_notes_name_what_they_are_about() -> None:
     """A matched body on a ground, a leaf, a glow, and opaque objects in bodies: each has its words, and no other."""
     words = {
-        "matched wax in the sun": "light that grounds reflect into it",
+        "matched wax in the sun": "light that grounds reflect into the medium",
         "thin leaf": "leaves and edges are",
-        "neon": "light that they emit and scatter is",
-        "ball in soap": "the light around 'sphere' in them",
-        "cubes in and behind glass": "light that interfaces bend on its way to 'cube'",
+        "neon": "light that the bodies emit and scatter is",
+        "ball in soap": "the light around 'sphere' inside the bodies",
+        "cubes in and behind glass": "light that interfaces refract on its way to 'cube'",
     }
     texts = {one.name: str(tl.plan(one.scene((0, 0)))) for one in SCENES}
     for name, word in words.items():

@@ -179,7 +179,7 @@ def test_what_cannot_be_had_is_refused_or_told(renderer: tl.Renderer, monkeypatc
     told = tl.plan(scene, capabilities=software)
     assert told.hits == "gl"
     assert "embreex cannot be imported" in str(told)
-    assert "OpenGL finds what rays hit, in about twice the time" in str(told)
+    assert "OpenGL finds the surfaces that rays hit, in about twice the time" in str(told)
     with pytest.raises(tl.InputError, match=r"embreex cannot be imported .*; pip install -U embreex, or leave"):
         rendered(renderer, scene, "embree")
     monkeypatch.undo()

@@ -322,7 +322,7 @@ def test_numbers_at_the_limits_stay_finite(renderer: tl.Renderer) -> None:
 def test_a_method_that_leaves_scattered_light_out_says_so(renderer: tl.Renderer) -> None:
     scene = ball_scene(LIGHTS["side"], 3.0)
     for method in (tl.SignedDepth(), tl.DepthPeeling()):
-        with pytest.warns(tl.TranslucentWarning, match="this method leaves out what lights send into media"):
+        with pytest.warns(tl.TranslucentWarning, match="this method leaves out light that media scatter into rays"):
             renderer.render(scene, SIZE, method)
 
 

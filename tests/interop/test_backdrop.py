@@ -173,8 +173,8 @@ def test_the_plan_says_where_opaque_objects_come_from(renderer: tl.Renderer) -> 
     chosen = renderer.plan(scene, over_backdrop=True)
     assert [step.name for step in chosen.passes] == ["shadow_maps", "backdrop", "signed_depth", "transmittance"]
     assert "1. shadow_maps: 1 light on the picture drawn elsewhere" in str(chosen)
-    assert "2. backdrop: opaque objects come as a picture drawn elsewhere" in str(chosen)
-    assert "not modelled: shadows of what is drawn elsewhere on the media" in str(chosen)
+    assert "2. backdrop: opaque objects are a picture drawn elsewhere" in str(chosen)
+    assert "not modelled: shadows that the objects of the backdrop throw onto media" in str(chosen)
     assert chosen == plan_over_backdrop(scene)
     assert "backdrop" not in str(renderer.plan(scene))
 

@@ -191,8 +191,8 @@ def test_labels_of_swatches_are_escaped() -> None:
         ((0.5, 0.5, 5e-4), 0.02, ["blue 0.0005 is near black"]),
         ((0.2, 0.5, 0.9), 2e-6, ["the distance 2e-06 m is outside 1e-05 to 100 m"]),
         ((0.2, 0.5, 0.9), 101, ["outside"]),
-        ((1e-30,) * 3, 1, ["red", "green", "blue", "all but black at a tenth"]),
-        ((0.995,) * 3, 1, ["red", "green", "blue", "all but clear at ten times"]),
+        ((1e-30,) * 3, 1, ["red", "green", "blue", "nearly black at a tenth"]),
+        ((0.995,) * 3, 1, ["red", "green", "blue", "nearly clear even at ten times"]),
     ],
 )
 def test_doubts_are_named(color: tuple[float, ...], distance: float, words: list[str]) -> None:

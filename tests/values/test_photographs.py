@@ -121,13 +121,13 @@ def test_dust_counts_for_nothing_and_light_that_falls_off_is_no_noise() -> None:
 def test_what_is_no_line_and_photographs_that_differ_are_told() -> None:
     picture = photograph(np.random.default_rng(3))
     flare = Photograph(picture + 0.05, WHITE, PATCHES)
-    assert "red dies away less than exponentially, as where light is scattered" in fit_photographs([flare]).warnings[0]
+    assert "red falls off less than exponentially, as if light is scattered" in fit_photographs([flare]).warnings[0]
     darker = Photograph(picture - 0.1, WHITE, PATCHES[:3])
     assert any("more than exponentially" in line for line in fit_photographs([darker]).warnings)
     curved = Photograph(picture**1.2, WHITE, PATCHES)
     told = fit_photographs([Photograph(picture, WHITE, PATCHES), curved]).warnings
     assert "red differs by 18 % between photograph 1 and photograph 2: is a camera's tone curve" in told[0]
-    for count, words in ((1, "one thickness: what its faces reflect"), (2, "two thicknesses")):
+    for count, words in ((1, "one thickness: the reflection of its faces"), (2, "two thicknesses")):
         few = fit_photographs([Photograph(picture, WHITE, PATCHES[:count])])
         assert len(few.warnings) == 1
         assert words in few.warnings[0]

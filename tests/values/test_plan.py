@@ -161,8 +161,8 @@ def test_convex_is_what_back_face_depth_is_exact_for() -> None:
         ),
         ([body(), body(None), body(None)], None, 0, "2 opaque objects: depth and color of the nearest"),
         ([body()], tl.BackFaceDepth(), 0, "requested: nearest front face, then farthest back face"),
-        ([body(mesh=OPEN), body()], None, 2, "closed bodies, in those pixels, too"),
-        ([body(FIRE), body(WINE)], None, 0, "emission among several media: what is in front dims what is behind; one "),
+        ([body(mesh=OPEN), body()], None, 2, "closed bodies, in the same pixels"),
+        ([body(FIRE), body(WINE)], None, 0, "emission among several media: a medium dims the emission behind it; one "),
         ([body()], tl.FragmentLists(), 0, "requested; one draw into a list for each pixel, sorted afterwards"),
         ([body()], tl.KBuffer(5), 0, "requested; one draw; each pixel keeps the 5 nearest surfaces"),
         ([body()], tl.DepthPeeling(), 0, "requested; two layers with each draw, until all are found"),
@@ -289,7 +289,7 @@ def test_a_plan_prints_a_line_for_each_thing_to_know() -> None:
         *["limit"] * len(found.limits),
         *["not modelled"] * len(found.unmodelled),
     ]
-    text = "shadows of the environment: its light reaches opaque objects through everything"
+    text = "shadows of the environment: its light reaches opaque objects as if nothing was in the way"
     assert lines[-1] == f"  not modelled: {text}"
     assert str(plan(scene(body()))).startswith("SignedDepth(anchored=True): exact, at about the cost of ")
 

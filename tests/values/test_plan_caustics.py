@@ -93,7 +93,7 @@ def test_without_opengl_photons_land_where_opaque_objects_are_shaded() -> None:
     found = plan(scene(), capabilities=Capabilities(shader_storage=False, opengl=False), caustics=FEW)
     assert "photons from 1 light" in found.passes[-1].reason
     assert "followed on the processor" in found.passes[-1].reason
-    assert not [note for note in found.unmodelled if "receivers that interfaces alone show" in note]
+    assert not [note for note in found.unmodelled if "objects that are seen only through interfaces" in note]
 
 
 def test_fog_that_photons_do_not_light_is_told() -> None:
@@ -105,12 +105,14 @@ def test_fog_that_photons_do_not_light_is_told() -> None:
     assert old.treated(Treatment.DIFFUSION) == (1,)
     assert "bends into 'box'" in str(old)
     ahead = plan(scene(body(), body(tl.Medium(scattering=2.0, anisotropy=0.5), 1.0)), caustics=FEW)
-    assert "directions in which 'box' scatters caustics: alike in all" in str(ahead)
+    assert "directions in which 'box' scatters caustics: equally bright in all directions" in str(ahead)
 
 
 def test_a_plan_names_the_option_that_shows_the_light_in_a_shadow() -> None:
     """The plan names `--caustics` for a light, a clear refracting body and a receiver, as long as photons are off."""
-    offered = "the bright spot in the shadow of 'box', several times as bright as the ground, and the dark around it"
+    offered = (
+        "the bright spot in the shadow of 'box', several times as bright as the ground, and the dark around the spot"
+    )
     assert any(offered in note and "--caustics" in note for note in plan(scene()).unmodelled)
     others = [
         scene(lights=()),
@@ -167,9 +169,9 @@ def test_what_bends_light_stops_it_on_its_straight_way() -> None:
             "caustics; the scene has no lights; add a tl.PointLight, tl.SpotLight or tl.DirectionalLight",
         ),
         (scene(body(tl.Medium(1.0)), body(None, 3.0)), {}, "caustics; no interface of 'box' bends or mirrors light"),
-        (scene(body()), {}, "caustics; no opaque object that light could land on, and no other body in which"),
+        (scene(body()), {}, "caustics; no opaque object receives the light, and no other body scatters it"),
         (scene(), {"method": tl.PathTraced()}, "leave out one of the two"),
-        (scene(), {"method": tl.ThinLayer()}, "it takes every face for a sheet, which bends nothing"),
+        (scene(), {"method": tl.ThinLayer()}, "it treats every face as a sheet, which refracts no light"),
         (
             scene(body(density=tl.LinearDensity(1, 0.0, 1.0)), body(None, 3.0)),
             {},

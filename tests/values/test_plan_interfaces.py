@@ -298,7 +298,7 @@ def test_bodies_that_a_picture_cuts_do_not_matter_as_sheets_or_without_interface
 
 def test_nothing_is_traced_before_a_backdrop() -> None:
     asked = scene(body(DIAMOND))
-    with pytest.raises(tl.InputError, match=r"has no mesh that a ray could meet; use ScreenInterfaces\(\)$"):
+    with pytest.raises(tl.InputError, match=r"have no mesh that a ray could meet; use ScreenInterfaces\(\)$"):
         plan_over_backdrop(asked, interfaces=TRACED)
     assert plan_over_backdrop(asked).interfaces == SCREEN
     assert plan_over_backdrop(asked, interfaces=FRONT).interfaces == FRONT

@@ -28,7 +28,10 @@ BENT = "refracted and reflected light"
         ([body()], []),
         ([body(MILK)], ["in-scattered light: scattering only removes light"]),
         ([body(DIAMOND)], [BENT]),
-        ([body(), body(None)], ["shadows of the environment: its light reaches opaque objects through everything"]),
+        (
+            [body(), body(None)],
+            ["shadows of the environment: its light reaches opaque objects as if nothing was in the way"],
+        ),
         ([body(MILK), body(DIAMOND, x=9), body(None)], ["in-scattered light", BENT, "shadows"]),
     ],
 )
@@ -114,10 +117,10 @@ def test_an_open_mesh_drawn_as_a_sheet_needs_no_fallback() -> None:
         ([body(mesh=TORUS)], tl.BackFaceDepth(), ["'torus' not convex: pixels with more than one entry are marked in"]),
         ([body(), body(x=3)], tl.BackFaceDepth(), ["several bodies: pixels that cross more than one are marked inval"]),
         ([body(mesh=OPEN)], tl.BackFaceDepth(), ["'open box': 3 open edges", "'open box' not convex: pixels with"]),
-        ([body()], tl.ThinLayer(), ["'box' closed, but drawn as sheets: what is inside is left out"]),
+        ([body()], tl.ThinLayer(), ["'box' closed, but drawn as sheets: the inside is left out"]),
         ([sheet(), body(), body(mesh=TORUS), body(mesh=OPEN)], tl.ThinLayer(), ["'box', 'torus' closed, but drawn as"]),
-        ([body(mesh=DOUBLED)], None, ["'walls': 12 duplicated faces, which count twice or cancel"]),
-        ([sheet(mesh=DOUBLED)], None, ["'walls': 12 duplicated faces, which count twice or cancel"]),
+        ([body(mesh=DOUBLED)], None, ["'walls': 12 duplicated faces, whose distances count twice or cancel"]),
+        ([sheet(mesh=DOUBLED)], None, ["'walls': 12 duplicated faces, whose distances count twice or cancel"]),
         ([body(mesh=INSIDE_OUT)], None, ["'half flipped': 1 closed parts inside out: their pixels are marked invalid"]),
         ([body(mesh=INSIDE_OUT)], tl.FragmentLists(), ["'half flipped': 1 closed parts inside out: their pixels are"]),
         ([body(mesh=INSIDE_OUT)], tl.ThinLayer(), ["'half flipped' closed, but drawn as sheets"]),
@@ -142,6 +145,6 @@ def test_without_shader_storage_what_scatters_is_marked(method: tl.SignedDepth |
     assert "unlit" not in names(here)
     assert names(there)[-2:] == ["unlit", "transmittance"]
     assert there.passes[-2].objects == (1,)
-    assert any("marked invalid: their light takes OpenGL 4.3" in limit for limit in there.limits)
+    assert any("marked invalid: to render their light needs OpenGL 4.3" in limit for limit in there.limits)
     for other in (scene(body(dye), body(wax)), scene(body(dye), lights=[light])):
         assert "unlit" not in names(plan(other, method, NO_STORAGE, scattering=once))

@@ -122,8 +122,8 @@ def test_what_an_ordered_method_makes_of_a_scene(kind: str, method: Any, name: s
 def test_sheets_among_intervals_that_emit_are_a_limit(medium: tl.Medium, other: tl.Medium) -> None:
     found = plan(scene(body(medium), sheet(other)), tl.FragmentLists())
     assert found.limits == (
-        "declared sheets among media that emit: they dim all light on a ray, also light in front of them, and their "
-        "own emission is left out",
+        "declared sheets among media that emit: sheets dim all light on a ray, even light in front of them, and the "
+        "emission of sheets is left out",
     )
     # Without emission the order of sheets matters to nothing, and without sheets there is none.
     assert plan(scene(body(GLASS), sheet(WINE)), tl.FragmentLists()).exact

@@ -56,8 +56,8 @@ def test_nobody_gets_paths_unasked() -> None:
 @pytest.mark.parametrize(
     ("objects", "kind", "words"),
     [
-        ([body()], NoteKind.LIGHTS_LEFT_OUT, "polished interfaces bend"),
-        ([body(surface=Surface(dispersion=1.0))], NoteKind.REFRACTION, "bend all colors alike"),
+        ([body()], NoteKind.LIGHTS_LEFT_OUT, "polished interfaces refract"),
+        ([body(surface=Surface(dispersion=1.0))], NoteKind.REFRACTION, "refract all colors alike"),
         ([body(surface=Surface(clearcoat=0.5, clearcoat_roughness=0.2))], NoteKind.COATS, "roughness of clear coats"),
         ([body(surface=Surface(emissive=(1, 1, 1)))], NoteKind.GLOW, "surfaces that emit"),
     ],
@@ -127,9 +127,9 @@ def test_what_paths_cannot_follow_is_refused(objects: list[tl.Object], options: 
 
 
 def test_what_paths_take_the_place_of_cannot_be_asked_for() -> None:
-    with pytest.raises(tl.InputError, match=r"interfaces=TracedInterfaces\(.*; paths take the place of interfaces"):
+    with pytest.raises(tl.InputError, match=r"interfaces=TracedInterfaces\(.*; random paths replace interfaces"):
         plan(scene(), METHOD, interfaces=tl.TracedInterfaces())
-    with pytest.raises(tl.InputError, match=r"scattering=Diffusion\(.*; paths take the place of scattering"):
+    with pytest.raises(tl.InputError, match=r"scattering=Diffusion\(.*; random paths replace scattering"):
         plan(scene(), METHOD, scattering=tl.Diffusion())
     with pytest.raises(tl.InputError, match=r"before a backdrop; .* no mesh that a path could meet"):
         plan_over_backdrop(scene(), METHOD)

@@ -40,7 +40,7 @@ def test_sheets_of_several_media_that_emit_are_refused(method: Any) -> None:
             [body(FIRE), body(WINE)],
             {},
             tl.SignedDepth(),
-            "SignedDepth; emission among several media: what is in front dims what is behind; use FragmentLists, or "
+            "SignedDepth; emission among several media: a medium dims the emission behind it; use FragmentLists, or "
             "leave the choice to the planner",
         ),
         ([body(FIRE), body(WINE)], {}, tl.ThinLayer(), "ThinLayer; emission among several media"),

@@ -48,7 +48,7 @@ def test_light_diffuses_in_closed_bodies_with_an_interface(lights: list[tl.Point
         (body(WAX, INSIDE_OUT), "its mesh is inside out"),
         (
             body(tl.Medium(scattering=5e3, ior=1.4), THIN),
-            "it is thinner than 0.25 cells everywhere, of 0.005 m at this",
+            "it is thinner than 0.25 cells everywhere; a cell is 0.005 m at this",
         ),
     ],
     ids=["open", "inside out", "thin"],
@@ -301,7 +301,7 @@ def test_more_fogs_than_winding_numbers_give_back_light_through_their_surfaces()
 @pytest.mark.parametrize(
     ("asked", "bodies", "capabilities", "message"),
     [
-        (tl.Diffusion(), body(MILK, density=VARYING), Capabilities(opengl=False), "no steps of a ray gather its light"),
+        (tl.Diffusion(), body(MILK, density=VARYING), Capabilities(opengl=False), "its light needs ray marching"),
         (tl.ScatteringLayer(), body(WAX), Capabilities(opengl=False), "'box': this renderer draws no layers"),
     ],
 )

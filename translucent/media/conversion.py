@@ -233,9 +233,9 @@ def doubts(color: npt.ArrayLike, distance: float) -> tuple[str, ...]:
         lines.append(f"the distance {distance:g} m is outside {low:g} to {high:g} m; check the unit")
     near, far = (color_at_distance(extinction_from_colors(t, 1.0), factor) for factor in (FACTORS[0], FACTORS[-1]))
     if near.max() < 0.01:
-        lines.append("all but black at a tenth of the distance already; check the unit, or give a lighter color")
+        lines.append("nearly black at a tenth of the distance already; check the unit, or give a lighter color")
     if far.min() > 0.9 and t.min() < 1:
-        lines.append("all but clear at ten times the distance still; check the unit, or give a darker color")
+        lines.append("nearly clear even at ten times the distance; check the unit, or give a darker color")
     return tuple(lines)
 
 
@@ -285,7 +285,7 @@ def _channel_doubt(name: str, value: float) -> str | None:
         percent = 100 * 0.5 * 2.4 / 1.055 / 255 * float(condition_number(value))
         return f"{name} {value:g} is near white: rounding it to 8 bits changes its extinction by up to {percent:.0f} %"
     if value < NEAR_BLACK:
-        return f"{name} {value:g} is near black: 8 bits hardly tell it from 0, which no extinction makes"
+        return f"{name} {value:g} is near black: 8 bits hardly distinguish it from 0, which no finite extinction gives"
     return None
 
 

@@ -224,7 +224,7 @@ def _channel(photographs: Sequence[PatchTransmittances], channel: int, ior: floa
     kept = [np.isfinite(one.depth[:, channel]) for one in photographs]
     counts = [int(use.sum()) for use in kept]
     if not sum(counts):
-        do = "expose so that neither is, or photograph thinner steps"
+        do = "change the exposure, or photograph thinner steps"
         raise InputError(f"fit of {CHANNELS[channel]}", "every patch is too dark or saturated", do)
     pairs = list(zip(photographs, kept, strict=True))
     depth = np.concatenate([one.depth[use, channel] for one, use in pairs])
@@ -261,10 +261,10 @@ def _inside(depth: Array, ior: float | None) -> Array:
 
 def _few(steps: int, ior: float | None) -> str:
     if ior is not None:
-        return "one thickness: nothing tells whether light dies away exponentially; photograph more"
+        return "one thickness cannot show whether light falls off exponentially; photograph more thicknesses"
     if steps == 1:
-        return "one thickness: what its faces reflect, 8 % at ior 1.5, counts as absorbed; tell its ior, or take more"
-    return "two thicknesses: nothing tells whether light dies away exponentially; photograph a third"
+        return "one thickness: the reflection of its faces (8 % at ior 1.5) counts as absorbed; give its ior, or more"
+    return "two thicknesses cannot show whether light falls off exponentially; photograph a third"
 
 
 def _bent(samples: _ChannelSamples, fixed: bool, channel: int, slope: float) -> list[str]:
@@ -278,11 +278,11 @@ def _bent(samples: _ChannelSamples, fixed: bool, channel: int, slope: float) -> 
     if abs(curve.best[0]) <= limit * curve.scale * curve.errors[0] or abs(change) <= BEND * abs(slope):
         return []
     why = (
-        "less than exponentially, as where light is scattered many times or strays into the lens"
+        "less than exponentially, as if light is scattered many times or strays into the lens"
         if change < 0
-        else "more than exponentially, as where dark values are cut off or thicknesses are wrong"
+        else "more than exponentially, as if dark values are cut off or thicknesses are wrong"
     )
-    return [f"{CHANNELS[channel]} dies away {why}: the extinction is right only about the steps photographed"]
+    return [f"{CHANNELS[channel]} falls off {why}: the extinction is right only near the photographed thicknesses"]
 
 
 def _disagreeing(

@@ -114,7 +114,9 @@ def _unlit_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
     """Pass that marks the pixels in which media scatter light that this OpenGL version cannot follow."""
     media = ((i, scene.objects[i].medium) for i in solids_of(scene))
     scattering = tuple(i for i, medium in media if medium is not None and medium.scatters)
-    reason = "paths in media that scatter: this OpenGL cannot follow lights there, so their pixels are marked invalid"
+    reason = (
+        "paths in media that scatter: this OpenGL cannot follow lights into media, so their pixels are marked invalid"
+    )
     cost = SignedDepth.cost_for(spectral=spectral)
     return (PassSpec(PassName.UNLIT, reason, scattering, 1, target="unlit", cost=cost),)
 
@@ -153,7 +155,7 @@ def _touching(scene: Scene, method: Method, interfaces: InterfaceMode) -> tuple[
         return ()
     if (touching := touching_interfaces(scene)) is None:
         return ()
-    text = f"{touching}; {type(method).__name__} does not find it, and takes the interface between them for the last"
+    text = f"{touching}; {type(method).__name__} lacks this order, and takes the interface between them for the last"
     return (Note(NoteKind.TOUCHING_INTERFACES, text),)
 
 
@@ -161,10 +163,10 @@ def _through_bodies(scene: Scene, interfaces: InterfaceMode) -> tuple[Note, ...]
     """Notes on shadows on interfaces that are not rendered: maps have what is on the path to opaque objects alone."""
     notes = []
     if not interfaces.traced and dims_interfaces(scene):
-        notes.append("lights reach their highlights and diffuse reflection through bodies")
+        notes.append("bodies in front of a light do not dim its highlights and diffuse reflection")
     reflects = (body.surface is not None and body.surface.transmission < 1 for body in scene.bodies if not body.covers)
     if scene.environment_shadows and any(reflects):
-        notes.append("light of the environment reaches what they reflect diffusely through everything")
+        notes.append("diffuse reflection of the environment is not dimmed by objects in the way")
     return tuple(Note(NoteKind.SHADOWS, f"shadows on bodies: {text}") for text in notes)
 
 
@@ -197,7 +199,7 @@ def _fallback_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
     closed = tuple(i for i in solids_of(scene) if i not in leaky)
     if not closed:
         return (as_sheets,)
-    reason = "closed bodies, in those pixels, too"
+    reason = "closed bodies, in the same pixels"
     cost = SignedDepth.cost_for(spectral=spectral)
     return (as_sheets, PassSpec(PassName.SIGNED_DEPTH_FALLBACK, reason, closed, 1, "fallback", cost))
 

@@ -209,14 +209,14 @@ def unread_at_hits(scene: Scene) -> list[Note]:
     """Notes on what rays do not read of surfaces."""
     if not (bodies := [body for body in scene.objects if has_more(body)]):
         return []
-    text = f"normal maps, occlusion and holes by alpha: rays find {object_names(bodies)} without"
+    text = f"normal maps, occlusion and holes by alpha: rays meet {object_names(bodies)} without them"
     return [Note(NoteKind.TEXTURES, text)]
 
 
 def untextured_rays(scene: Scene) -> list[Note]:
     """Notes on textures where rays have the values of a surface where a pixel shows it first, or without textures."""
     names = object_names(body for body in scene.objects if varies_at_hits(body))
-    text = f"textures and vertex colors behind the first surface of a ray: {names} are even there"
+    text = f"textures and vertex colors behind the first surface of a ray: {names} have one color for these rays"
     return [Note(NoteKind.TEXTURES, text)]
 
 
@@ -226,7 +226,9 @@ def reduced_at_hits(scene: Scene) -> list[Note]:
     bodies = [body for body in scene.objects if halved.intersection(filter(None, textures_at_hits(body)))]
     if not bodies:
         return []
-    text = f"fine texels: textures of {object_names(bodies)} are halved for rays, {MOST_TEXELS:,} texels fit in all"
+    text = (
+        f"fine texels: textures of {object_names(bodies)} are halved for rays, which have {MOST_TEXELS:,} texels in all"
+    )
     return [Note(NoteKind.TEXTURES, text)]
 
 

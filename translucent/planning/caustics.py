@@ -143,9 +143,9 @@ def check_caustics(scene: Scene, method: Method | None, lit: tuple[int, ...]) ->
     """
     if method is not None and (method.follows_paths or method.makes_sheets):
         found = (
-            "its paths meet opaque objects behind interfaces without the caustics on them"
+            "its paths do not see the caustics on opaque objects behind interfaces"
             if method.follows_paths
-            else "it takes every face for a sheet, which bends nothing"
+            else "it treats every face as a sheet, which refracts no light"
         )
         raise InputError(f"caustics with {method}", found, "leave out one of the two")
     _check_paths(scene, lit)
@@ -217,7 +217,7 @@ def _check_paths(scene: Scene, lit: tuple[int, ...]) -> None:
         found = f"no interface of {object_names(scene.bodies)} bends or mirrors light"
         raise InputError("caustics", found, "give a medium an index of refraction: ior=1.5")
     if not scene.opaque and not lit:
-        found = "no opaque object that light could land on, and no other body in which light is scattered on"
+        found = "no opaque object receives the light, and no other body scatters it"
         raise InputError("caustics", found, "add a ground: tl.Object(mesh)")
     if uneven := [body for body in scene.bodies if body.density is not None]:
         found = f"the density of {object_names(uneven)} varies, and photons follow even media"
@@ -253,7 +253,7 @@ def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
         return ()
     text = (
         f"the bright spot in the shadow of {object_names(clear)}, several times as bright as the ground, and the dark "
-        "around it: --caustics (tl.Caustics()) shows both"
+        "around the spot: --caustics (tl.Caustics()) shows both"
     )
     return (Note(NoteKind.CAUSTICS, text),)
 
@@ -262,8 +262,8 @@ def caustics_left_out(scene: Scene, lit: tuple[int, ...], fogs: tuple[int, ...],
     """Notes on light that photons do not carry."""
     texts = ["caustics of light of the environment"]
     if opengl:
-        hidden = "which are out of the picture or hidden by what is opaque"
-        texts.append(f"caustics on receivers that interfaces alone show, {hidden}")
+        hidden = "which are outside the picture or hidden by opaque objects"
+        texts.append(f"caustics on objects that are seen only through interfaces, {hidden}")
     dark = indices(scene, lambda body: body.medium is not None and body.medium.scatters)
     uneven = indices(scene, lambda body: body.medium is not None and body.medium.phase_function != ISOTROPIC)
     if others := tuple(i for i in dark if i not in lit):
@@ -271,7 +271,7 @@ def caustics_left_out(scene: Scene, lit: tuple[int, ...], fogs: tuple[int, ...],
     if dark:
         texts.append("photons that media scatter")
     if aside := tuple(i for i in fogs if i in uneven):
-        texts.append(f"directions in which {_names(scene, aside)} scatters caustics: alike in all")
+        texts.append(f"directions in which {_names(scene, aside)} scatters caustics: equally bright in all directions")
     textured = indices(scene, lambda body: body.has_interface and varies_at_hits(body))
     if textured and (fogs or not opengl):
         texts.append(f"textures of interfaces, where the CPU follows photons: {_names(scene, textured)}")

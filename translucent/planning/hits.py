@@ -46,4 +46,4 @@ def chosen_hits(what: str, requested: str | None, software: bool, shader_storage
     if requested is not None:
         do = "pip install -U embreex, or leave hits out" if shader_storage else "leave hits out"
         raise InputError(f'{what}(hits="embree")', refusal, do)
-    return "gl", f"{refusal}: OpenGL finds what rays hit, in about twice the time; pip install -U embreex"
+    return "gl", f"{refusal}: OpenGL finds the surfaces that rays hit, in about twice the time; pip install -U embreex"

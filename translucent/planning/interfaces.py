@@ -35,7 +35,7 @@ ONE_SHADED = 0.45
 LATER_REFRACTION = Note(
     NoteKind.LATER_REFRACTION,
     "refraction and reflection beyond the first interval of a ray: from there on rays go straight, and interfaces "
-    "reflect the environment alone",
+    "reflect only the environment",
 )
 
 
@@ -126,21 +126,21 @@ def effects_of(scene: Scene, *, bends: bool = True, mirrored: str = "the environ
     if any(body.medium is not None and body.medium.ior > 1 for body in bodies):
         effects.append(f"interfaces mirror {mirrored}{' and bend rays' if bends else ''} (ior above 1)")
     if any(surface.roughness > 0 for surface in surfaces):
-        effects.append("rough ones blur both")
+        effects.append("rough interfaces blur both")
     if bends and any(surface.dispersion > 0 for surface in surfaces):
         effects.append("dispersion bends each channel on its own")
     if any(surface.iridescence for surface in surfaces):
-        effects.append("thin films color what is mirrored")
+        effects.append("thin films color the reflection")
     if any(surface.clearcoat for surface in surfaces):
-        effects.append("clear coats mirror over them")
+        effects.append("clear coats reflect above the interfaces")
     if any(surface.transmission < 1 for surface in surfaces):
-        effects.append("a diffuse base reflects what does not enter")
+        effects.append("a diffuse base reflects light that does not enter")
     if any((np.asarray(surface.color) != 1).any() or surface.color_texture for surface in surfaces):
-        effects.append("colors tint what enters")
+        effects.append("colors tint light that enters")
     if any(treatment_of(body) is Treatment.LAYER for body in bodies):
         effects.append("light that scatters many times leaves as from a layer (Kubelka and Munk, Saunderson)")
     if any(treatment_of(body) is Treatment.DIFFUSION for body in bodies):
-        effects.append("light that scatters many times leaves as it has diffused in the body")
+        effects.append("light that scatters many times diffuses in the body and leaves through the surface")
     return "; ".join(effects) or "interfaces"
 
 
@@ -319,7 +319,7 @@ class TracedInterfaces(InterfaceMode):
         often = f" more often than {self._times}" if self.forks else ""
         text = (
             f"rays that cross more than {self._count}, or that follow the weaker of the reflected and the refracted "
-            f"ray{often}: they see the environment, as if nothing was in front of it"
+            f"ray{often}: these rays see the environment, as if nothing was in front of it"
         )
         return [Note(NoteKind.CUT_OFF_PATHS, text)]
 

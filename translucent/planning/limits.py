@@ -30,7 +30,8 @@ SHEET_ON_OPAQUE = 1e-6
 
 #: Note of a plan for an OpenGL version that cannot follow lights into media.
 UNLIT = Note(
-    NoteKind.UNLIT, "pixels with media that scatter are marked invalid: their light takes OpenGL 4.3, or the reference"
+    NoteKind.UNLIT,
+    "pixels with media that scatter are marked invalid: to render their light needs OpenGL 4.3, or the reference",
 )
 
 
@@ -54,9 +55,13 @@ def hole_limits(scene: Scene, method: Method) -> list[Note]:
     for i in open_bodies(scene):
         mesh, name = scene.objects[i].mesh, type(method).__name__
         if i in around:
-            text = f"the eye is within its bounds: {name} cannot say which pixels show two holes, and marks all invalid"
+            text = (
+                f"the eye is within its bounds: {name} cannot tell which pixels show two holes, and marks all invalid"
+            )
         elif mesh.diagnosis.holes > 1:
-            text = f"{mesh.diagnosis.holes} holes: {name} may miss that a ray passes two, whose errors cancel"
+            text = (
+                f"{mesh.diagnosis.holes} holes: {name} may not notice rays through two holes, since their errors cancel"
+            )
         else:
             continue
         notes.append(Note(NoteKind.OPEN_MESH, f"{mesh.name!r}: {text}; FragmentLists can tell"))
@@ -81,7 +86,7 @@ def mesh_limits(scene: Scene, method: Method) -> list[Note]:
     for body in scene.bodies:
         diagnosis = body.mesh.diagnosis
         if found := diagnosis.duplicate_faces:
-            text = f"{body.mesh.name!r}: {found.count} duplicated faces, which count twice or cancel"
+            text = f"{body.mesh.name!r}: {found.count} duplicated faces, whose distances count twice or cancel"
             limits.append(Note(NoteKind.DUPLICATED_FACES, text))
         if diagnosis.inside_out and body.sheet_thickness is None and not method.makes_sheets:
             parts = diagnosis.inside_out_parts
@@ -116,8 +121,8 @@ def sheet_limits(scene: Scene) -> list[Note]:
     if not sheets_of(scene) or not any(body.medium is not None and body.medium.emits for body in scene.bodies):
         return []
     text = (
-        "declared sheets among media that emit: they dim all light on a ray, also light in front of them, and their "
-        "own emission is left out"
+        "declared sheets among media that emit: sheets dim all light on a ray, even light in front of them, and the "
+        "emission of sheets is left out"
     )
     return [Note(NoteKind.SHEETS_WITHOUT_ORDER, text)]
 
@@ -127,14 +132,14 @@ def layer_effects(scene: Scene, *, interfaces: bool) -> list[Note]:
     effects = []
     if layers := object_names(item for item in scene.bodies if item.covers):
         text = (
-            f"{layers}: layers cast no shadows, rays that bend do not meet them, all media on a ray dim those behind "
-            "its first body, and they are drawn object by object, far ones first, also where they cross"
+            f"{layers}: layers cast no shadows, refracted rays do not meet layers, all media on a ray dim the layers "
+            "behind its first body, and layers are drawn object by object, the farthest first, even where they cross"
             if interfaces
             else f"what layers mirror: {layers} show diffuse light alone"
         )
         effects.append(Note(NoteKind.LAYERS, text))
     if emitting := object_names(scene.objects[i] for i in emitting_bodies(scene)):
-        what = "add it where a ray first enters a body, and nowhere behind" if interfaces else "not at all"
+        what = "add it only where a ray first enters a body" if interfaces else "not at all"
         effects.append(Note(NoteKind.GLOW, f"light of surfaces that emit: {emitting} {what}"))
     if cut := object_names(item for item in scene.bodies if _wants_holes(item)):
         text = f"holes by alpha_cutoff: {cut} drawn closed, since a solid with a hole has no inside"
@@ -151,7 +156,7 @@ def _wants_holes(item: Object) -> bool:
 
 #: Note of a plan in which interfaces do nothing to light.
 STRAIGHT = Note(
-    NoteKind.REFRACTION, "refraction and reflection: rays go straight, though interfaces bend and mirror them"
+    NoteKind.REFRACTION, "refraction and reflection: rays go straight, though interfaces would refract and reflect them"
 )
 
 #: How a plan with ambient radiance shades pixels, beside what it does without.
@@ -208,7 +213,7 @@ def shadow_effects(scene: Scene) -> list[Note]:
     """Notes on missing shadows on opaque objects, or on a picture of them that is drawn elsewhere."""
     notes = []
     if not scene.environment_shadows and scene.environment.mean.any():
-        text = "shadows of the environment: its light reaches opaque objects through everything"
+        text = "shadows of the environment: its light reaches opaque objects as if nothing was in the way"
         notes.append(Note(NoteKind.SHADOWS, text))
     layers = [body for body in scene.bodies if body.covers]
     if layers and (scene.lights or scene.environment_shadows):
@@ -223,8 +228,8 @@ def reflected_effects(scene: Scene) -> list[Note]:
     if not (held := [item for item in scene.opaque if any(_may_hold(body, item) for body in clear)]):
         return []
     text = (
-        f"light that interfaces bend on its way to {object_names(held)}, and that opaque objects reflect onto each "
-        "other: these are up to 20 % dark; random paths have it (--method path-traced)"
+        f"light that interfaces refract on its way to {object_names(held)}, and light that opaque objects reflect onto "
+        "each other: these objects are up to 20 % too dark; random paths include this light (--method path-traced)"
     )
     return [Note(NoteKind.REFLECTED_LIGHT, text)]
 
@@ -235,30 +240,29 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
     bodies = [body for body in scene.bodies if body.medium is not None and body.medium.scatters]
     if any(treatment_of(body) is Treatment.VOLUME for body in bodies):
         text = (
-            "light that is scattered more than once: shadows that opaque objects and other bodies throw into it, and "
-            "light of these objects that is scattered ahead on its way to the eye"
+            "light that is scattered more than once: shadows that opaque objects and other bodies throw into the "
+            "medium, "
+            "and light of these objects that the medium scatters forward on its way to the eye"
         )
         if scene.opaque:
-            text += "; light that grounds reflect into it, up to 30 % of the light of a body on a bright ground"
+            text += "; light that grounds reflect into the medium, up to 30 % of the light of a body on a bright ground"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     rendered = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
     if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in rendered]:
         if followed:
             densest = max(float(np.max(np.asarray(medium.scattering))) for medium in media)
             text = (
-                "light that is scattered more than once, much in bodies that are thicker than a mean free path, here "
+                "light that is scattered more than once: much of the light in bodies thicker than a mean free path, "
                 f"{1 / densest:.2g} m; and light of the environment that is scattered"
             )
             return [*notes, Note(NoteKind.SCATTERED_AGAIN, text)]
         if not scene.lights:
             return [*notes, Note(NoteKind.ONLY_REMOVES, "in-scattered light: scattering only removes light")]
-        text = (
-            "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
-        )
+        text = "in-scattered light: this method leaves out light that media scatter into rays; FragmentLists renders it"
         return [*notes, Note(NoteKind.LIGHTS_LEFT_OUT, text)]
     lit = scene.opaque or any(body.covers or (interfaces and body.has_interface) for body in scene.bodies)
     if not notes and scene.lights and not lit:
-        text = "lights: they shine on nothing, since no medium scatters and nothing is opaque"
+        text = "lights have no effect, since no medium scatters and nothing is opaque"
         return [Note(NoteKind.UNUSED_LIGHTS, text)]
     return notes
 
@@ -278,28 +282,29 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
     notes = []
     if any(treatment_of(body) is Treatment.LAYER for body in scene.bodies):
         text = (
-            "sideways spread of light that is scattered many times: it leaves as from a flat layer, as thick as the "
+            "sideways spread of light that is scattered many times: light leaves as from a flat layer, as thick as the "
             "path of the ray, so edges and folds are wrong"
         )
         notes.append(Note(NoteKind.SPREAD_INSIDE, text))
     if bodies := [body for body in scene.bodies if treatment_of(body) is Treatment.DIFFUSION]:
         text = (
-            f"{object_names(bodies)}: light of the environment that other bodies scatter onto them, and details that "
-            "are smaller than a cell: spikes and edges are up to 15 % dark"
+            f"{object_names(bodies)}: light of the environment that other bodies scatter onto these bodies, and "
+            f"details "
+            "smaller than a cell of the diffusion grid: spikes and edges are up to 15 % too dark"
         )
         if len(scene.bodies) > 1:
-            text += "; one beside another is up to 10 % dark"
+            text += "; a body next to another is up to 10 % too dark"
         ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
         if any(ahead) and scene.environment.kind == "image":
-            text += "; bright parts of the environment that they scatter ahead are up to 30 % dark"
+            text += "; bright parts of the environment, scattered forward by the bodies, are up to 30 % too dark"
         if any(body.medium is not None and body.medium.emits for body in bodies):
-            text += "; light that they emit and scatter is up to 10 % dark"
+            text += "; light that the bodies emit and scatter is up to 10 % too dark"
         if held := [item for item in scene.opaque if any(_may_hold(body, item) for body in bodies)]:
-            text += f"; the light around {object_names(held)} in them is up to 25 % off"
+            text += f"; the light around {object_names(held)} inside the bodies is wrong by up to 25 %"
         ground = ground_below(scene, [i for i, body in enumerate(scene.objects) if body in bodies])
         beside = [item for item in scene.opaque if not any(_may_hold(body, item) for body in bodies)]
         if others := [item for item in beside if ground is None or item is not ground.ground]:
-            text += f"; their light does not reach {object_names(others)}"
+            text += f"; light of the bodies does not reach {object_names(others)}"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes
 

@@ -182,8 +182,8 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
 
 
 def _denoised_note(found: RenderPlan) -> Note:
-    text = "denoised: a network (Open Image Denoise) puts what it expects in place of noise, with an error nobody knows"
-    return Note(NoteKind.DENOISED, text if found.has_noise else "not denoised: nothing is drawn at random here")
+    text = "denoised: a network (Open Image Denoise) replaces noise by its estimate, whose error is not known"
+    return Note(NoteKind.DENOISED, text if found.has_noise else "not denoised: this picture has no random noise")
 
 
 def _with_point_lights(scene: Scene, rendered: Scene) -> tuple[Scene, tuple[Note, ...]]:
@@ -262,7 +262,9 @@ def _method(
     if scene.varies:
         return marching_method(scene, method, machine), "the density varies from place to place"
     if method is None and any(treatment_of(body) is Treatment.VOLUME for body in scene.bodies):
-        return scattered_again_method(scene, caustics), "light scattered again into the rays: steps look it up"
+        return scattered_again_method(
+            scene, caustics
+        ), "light scattered many times into the rays: ray marching looks it up at each step"
     if method is not None and method.ordered:
         return method, "requested"
     if (why := why_order_matters(scene, method, interfaces)) is not None:
@@ -270,10 +272,10 @@ def _method(
     if method is not None:
         return method, "requested"
     if scatters(scene) and machine.shader_storage:
-        return FragmentLists(), "light scattered into the rays: each interval looks at the lights"
+        return FragmentLists(), "light scattered into the rays: each interval gathers light of the lights"
     if not solids_of(scene):
         return ThinLayer(), "all bodies are declared sheets"
-    return SignedDepth(), "a sum over each ray gives its picture"
+    return SignedDepth(), "a sum over each ray suffices"
 
 
 #: Smallest number of steps through an interval of varying density, unless requested otherwise.
@@ -305,7 +307,7 @@ def marching_method(scene: Scene, method: Method | None, capabilities: Capabilit
     if not method.marches:
         raise InputError(
             type(method).__name__,
-            f"{names}: the density varies, and only steps through the intervals find how deep they are",
+            f"{names}: the density varies, and only steps through the intervals find the optical depth",
             "use RayMarched, or leave the choice to the planner",
         )
     return method
@@ -333,7 +335,7 @@ def why_order_matters(scene: Scene, method: Method | None, interfaces: Interface
     """Reason why this scene needs ordered surfaces rather than a sum over each ray; None if a sum suffices."""
     bodies = scene.bodies
     if media_differ(scene) and any(body.medium is not None and body.medium.emits for body in bodies):
-        return "emission among several media: what is in front dims what is behind"
+        return "emission among several media: a medium dims the emission behind it"
     if method is None and interfaces.finds_exits and (touching := touching_interfaces(scene)) is not None:
         return touching
     if method is None and (why := _undecided_by_sums(scene)) is not None:
@@ -362,12 +364,12 @@ def _undecided_by_sums(scene: Scene) -> str | None:
         return None
     for body in scene.bodies:
         if body.sheet_thickness is None and body.mesh.diagnosis.inside_out:
-            return f"{body.mesh.name!r} is inside out in places, and a sum does not say which pixels show one"
+            return f"{body.mesh.name!r} is inside out in places, and a sum cannot tell which pixels show such a place"
     around = open_around_eye(scene)
     for index in open_bodies(scene):
         mesh = scene.objects[index].mesh
         if mesh.diagnosis.holes > 1 or index in around:
-            return f"{mesh.name!r} is open, and a sum does not say which pixels show two holes, whose errors may cancel"
+            return f"{mesh.name!r} is open, and a sum cannot tell which pixels show two holes, whose errors may cancel"
     return None
 
 
@@ -478,9 +480,9 @@ def _with_shadows(found: RenderPlan, scene: Scene, machine: Capabilities) -> Ren
         return found  # paths find shadows by themselves
     unmodelled: list[Note] = []
     if found.request.over_backdrop:
-        reason = "opaque objects come as a picture drawn elsewhere: rays through the media end at its depth"
+        reason = "opaque objects are a picture drawn elsewhere (a backdrop): rays through the media end at its depth"
         behind = (PassSpec(PassName.BACKDROP, reason, cost=COSTS["resolve"]),)
-        drawn_elsewhere = Note(NoteKind.SHADOWS, "shadows of what is drawn elsewhere on the media")
+        drawn_elsewhere = Note(NoteKind.SHADOWS, "shadows that the objects of the backdrop throw onto media")
         unmodelled = [*shadow_effects(scene), drawn_elsewhere]
     elif before and found.has(PassName.TRACED, PassName.SURFACES, PassName.PATH_TRACE):
         unmodelled = [*shadows_left_out(machine.texture_units)]
@@ -523,9 +525,7 @@ def _check_paths(scene: Scene, request: RenderRequest, method: PathTraced, machi
     """Raise `InputError` if paths cannot render a scene, or something is requested that they take the place of."""
     for what, requested in (("interfaces", request.interfaces), ("scattering", request.scattering)):
         if requested is not None:
-            raise InputError(
-                f"{method} with {what}={requested}", f"paths take the place of {what}", "give one of the two"
-            )
+            raise InputError(f"{method} with {what}={requested}", f"random paths replace {what}", "give one of the two")
     if not machine.opengl:
         found = "paths are followed by OpenGL, and this renderer works on the CPU"
         raise InputError(str(method), found, "use tl.reference.path_trace(scene, size, paths), or an OpenGL backend")
@@ -538,11 +538,11 @@ def _check_backdrop(scene: Scene, request: RenderRequest) -> None:
         raise InputError(
             "a backdrop",
             f"the scene has opaque objects of its own: {object_names(scene.opaque)}",
-            "leave them out, or to whoever draws the backdrop",
+            "leave them out, or draw them in the backdrop",
         )
     if isinstance(request.method, PathTraced):
-        found = "what is drawn elsewhere has no mesh that a path could meet"
+        found = "the objects of a backdrop have no mesh that a path could meet"
         raise InputError(f"{request.method} before a backdrop", found, "leave out one of the two")
     if request.interfaces is not None and request.interfaces.traced:
-        found = "what is drawn elsewhere has no mesh that a ray could meet"
+        found = "the objects of a backdrop have no mesh that a ray could meet"
         raise InputError(f"{request.interfaces} before a backdrop", found, "use ScreenInterfaces()")

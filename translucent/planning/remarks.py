@@ -114,7 +114,7 @@ def _unseen_bodies(scene: Scene) -> tuple[Note, ...]:
             NoteKind.UNSEEN_BODIES,
             f"{object_names(body for _, body in bodies)}: invisible: light goes "
             f"{short_length(_size(first) / times)} through this medium before it is scattered or absorbed (the "
-            f"mean free path), and the body is {short_length(_size(first))}; "
+            f"mean free path), and the size of the body is only {short_length(_size(first))}; "
             f"{other_size(scene.shown_bounds, CLOUDY / times)} it shows",
         ),
     )

@@ -83,7 +83,7 @@ class RenderRequest(Flags):
         if self.denoise and (self.transparent or self.over_backdrop):
             what = "a transparent frame" if self.transparent else "a backdrop"
             do = "leave out one of the two"
-            raise InputError("denoise", f"{what}: denoisers cannot take the difference of two pictures", do)
+            raise InputError("denoise", f"{what}: a denoiser cannot denoise the difference of two pictures", do)
         if self.over_backdrop and self.caustics is not None:
-            found = "what is drawn elsewhere has no mesh that light could land on"
+            found = "the objects of a backdrop have no mesh that light could land on"
             raise InputError("caustics before a backdrop", found, "leave out one of the two")

@@ -114,7 +114,7 @@ class Diffusion(Scattering):
         # Rays that gather light on their path find it in cells alone.
         least = 1.0 if body.density is not None or (body.medium is not None and _is_volume(body, self)) else LEAST_WALL
         if body.mean_thickness < least * step:
-            return f"it is thinner than {least:g} cells everywhere, of {step:.2g} m at this resolution"
+            return f"it is thinner than {least:g} cells everywhere; a cell is {step:.2g} m at this resolution"
         return None
 
 
@@ -180,7 +180,7 @@ MOST_CELL_DEPTH = 1.0
 MOST_DIFFUSED = 32
 
 #: Reason against light scattered again where density varies.
-_NO_STEPS = "its density varies, and no steps of a ray gather its light: that takes OpenGL 4.3 and RayMarched"
+_NO_STEPS = "its density varies, and its light needs ray marching: OpenGL 4.3 and RayMarched"
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ class PathTraced(Method):
     def check(self, scene: Scene) -> None:
         """Refuse open bodies, layers, densities that vary, and sheets that scatter or are rough."""
         if scene.scatters_ambient:
-            found = "it represents what paths find by themselves: light of the environment, and light scattered often"
+            found = "it represents light that paths find anyway: light of the environment, and light scattered often"
             raise InputError("PathTraced with ambient radiance", found, "leave ambient out")
         for bodies, found, do in _refusals(scene):
             if bodies:
@@ -86,7 +86,7 @@ class PathTraced(Method):
 
     def limits(self, scene: Scene) -> list[Note]:
         """Note that radiance has noise."""
-        text = f"radiance is a mean over {self.paths} random paths: it has noise, given by standard_error"
+        text = f"radiance is a mean over {self.paths} random paths: its noise is in standard_error"
         return [Note(NoteKind.NOISE, text)]
 
     def unmodelled(self, scene: Scene) -> tuple[Note, ...]:
@@ -96,13 +96,14 @@ class PathTraced(Method):
         # `plan` has points in place of spheres, each a part of one.
         if any(not isinstance(light, PositionalLight) or light.disc[3] == 0.0 for light in scene.lights) and bending:
             text = (
-                "light of point, spot and directional lights that polished interfaces bend, in media and as caustics: "
-                "no path finds lights without a size; a tl.SphereLight has one"
+                "light of point, spot and directional lights that polished interfaces refract, in media and as "
+                "caustics: "
+                "no random path hits a light without a size; use a tl.SphereLight"
             )
             notes.append(Note(NoteKind.LIGHTS_LEFT_OUT, text))
         surfaces = [(body, body.surface) for body in scene.bodies if body.surface is not None]
         if dispersive := [body for body, surface in surfaces if surface.dispersion > 0.0]:
-            text = f"dispersion: {object_names(dispersive)} bend all colors alike"
+            text = f"dispersion: {object_names(dispersive)} refract all colors alike"
             notes.append(Note(NoteKind.REFRACTION, text))
         if rough := [body for body, one in surfaces if one.clearcoat > 0.0 and one.clearcoat_roughness > 0.0]:
             text = f"roughness of clear coats: {object_names(rough)} have polished ones"
@@ -138,12 +139,12 @@ def _refusals(scene: Scene) -> tuple[tuple[list[Object], str, str], ...]:
     return (
         (
             [scene.objects[i] for i in open_bodies(scene)],
-            "not closed, so that paths do not know what they are in",
+            "not closed, so that a path cannot tell which medium it is in",
             "close it, or declare it a sheet (sheet_thickness=...)",
         ),
         (
             [body for body in scene.bodies if body.density is not None],
-            "the density varies, and free flights are drawn for even media",
+            "the density varies, and distances between scattering events are drawn for constant density",
             "use tl.reference.path_trace(scene, size)",
         ),
         (

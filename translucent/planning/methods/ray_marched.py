@@ -83,7 +83,7 @@ class RayMarched(Method):
         if self.jitter and self.quadrature in ("jittered", "gauss"):
             raise InputError(
                 f"RayMarched quadrature {self.quadrature!r} with jitter",
-                "its samples have no fixed place in a step",
+                "its samples have no fixed position in a step",
                 "leave jitter out, or use midpoint",
             )
         if not isinstance(self.seed, int) or not 0 <= self.seed < 1 << 32:

@@ -58,7 +58,7 @@ class ThinLayer(Method):
         solid = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.solid]
         if not solid:
             return []
-        text = f"{object_names(solid)} closed, but drawn as sheets: what is inside is left out"
+        text = f"{object_names(solid)} closed, but drawn as sheets: the inside is left out"
         return [Note(NoteKind.CLOSED_AS_SHEETS, text)]
 
 
