@@ -37,7 +37,7 @@ def test_notes_name_what_they_are_about() -> None:
     """A matched body on a ground, a leaf, a glow, and opaque objects in bodies: each has its words, and no other."""
     words = {
         "matched wax in the sun": "light that grounds reflect into the medium",
-        "thin leaf": "leaves and edges are",
+        "thin leaf": "spikes and edges are",
         "neon": "light that the bodies emit and scatter is",
         "ball in soap": "the light around 'sphere' inside the bodies",
         "cubes in and behind glass": "light that interfaces refract on its way to 'cube'",

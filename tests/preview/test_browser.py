@@ -15,7 +15,18 @@ from translucent.assets import shader_path
 from translucent.planning.flags import Flags
 from translucent.preview import library
 from translucent.preview.dialogs import Browser
-from translucent.preview.document import SURFACE_FIELDS, TIPS, Display, Look, Material, Orbit, camera_of
+from translucent.preview.document import (
+    SURFACE_FIELDS,
+    TIPS,
+    AddedLight,
+    Display,
+    Export,
+    Look,
+    Material,
+    Orbit,
+    Placed,
+    camera_of,
+)
 from translucent.preview.library import EnvironmentFolder, draw_panorama, model_key, model_picture, panorama_key, title
 from translucent.preview.session import Preferences, put_first
 from translucent.preview.workspace import Workspace
@@ -180,8 +191,10 @@ def test_every_knob_is_explained() -> None:
     silent = {"material.source", "material.preset", "material.phase"}  # set by presets and sessions
     silent |= {"orbit.target", "orbit.yaw", "orbit.pitch", "orbit.distance"}
     sections = {"material": Material, "look": Look, "display": Display, "flags": Flags, "orbit": Orbit}
+    sections |= {"placed": Placed, "light": AddedLight, "export": Export}
+    silent.add("placed.object")
     fields = {f"{section}.{one.name}" for section, kind in sections.items() for one in dataclasses.fields(kind)}
-    assert set(TIPS) == (fields - silent) | {"model.unit"}
+    assert set(TIPS) == (fields - silent) | {"model.unit", "model.up", "model.time"}
     for name in ("ior", "color", "distance", "thickness", *SURFACE_FIELDS):
         assert "glTF" in TIPS[f"material.{name}"]
         if name != "color":

@@ -273,7 +273,7 @@ def test_a_shader_that_does_not_compile_leaves_the_last_good_one(
 def test_a_picture_that_is_too_large_is_told_and_the_stage_goes_on(view: ViewportRenderer, work: Workspace) -> None:
     finish(view, work)
     assert not view.draw(work, (1 << 20, 8))
-    assert "this OpenGL ends at" in view.problem
+    assert "this OpenGL allows at most" in view.problem
     finish(view, work)
     assert view.problem == ""
 

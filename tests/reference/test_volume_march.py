@@ -207,7 +207,7 @@ def test_sheets_and_arguments_that_cannot_be() -> None:
         (lambda: march(slab(), (2, 2), termination=0.1, compositing="back-to-front"), "from back to front"),
         (lambda: march(slab(), (2, 2), "midpoint"), "marching by 'midpoint'"),  # type: ignore[arg-type]
         (lambda: march(slab(), (0, 2)), "size"),
-        (lambda: march(glowing, (2, 2), associated=False), "unassociated colors; a step that shines"),
+        (lambda: march(glowing, (2, 2), associated=False), "unassociated colors; a step emits light"),
         (lambda: RayMarched(0), "RayMarched steps 0"),
         (lambda: RayMarched(-4), "RayMarched steps -4"),
         (lambda: RayMarched(2.5), "RayMarched steps 2.5"),  # type: ignore[arg-type]

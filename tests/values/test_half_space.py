@@ -21,14 +21,14 @@ LEFT = 4 * diffuse.H_TOLERANCE
 @pytest.mark.parametrize("albedo", [1.0, 0.999999, 0.99, 0.5, 0.01])
 def test_h_has_its_exact_mean(albedo: float) -> None:
     """2 / w (1 - sqrt(1 - w)): Chandrasekhar 1960, V 11."""
-    cosine, weight = diffuse._nodes(1.0)
+    cosine, weight = diffuse.interface_nodes(1.0)
     found = diffuse._chandrasekhar_h(albedo, cosine, weight)
     assert (found * weight).sum() == pytest.approx(2 / albedo * (1 - math.sqrt(1 - albedo)), abs=LEFT)
 
 
 def test_h_of_a_lossless_half_space() -> None:
     """The first moment is 2 / sqrt(3), and at the zenith H is 2.90781 (Chandrasekhar 1960, V, tables)."""
-    cosine, weight = diffuse._nodes(1.0)
+    cosine, weight = diffuse.interface_nodes(1.0)
     found = diffuse._chandrasekhar_h(1.0, cosine, weight)
     assert (found * cosine * weight).sum() == pytest.approx(2 / math.sqrt(3), abs=LEFT)
     assert 1 / (0.5 * (cosine * weight * found / (1 + cosine)).sum()) == pytest.approx(2.90781, abs=5e-6)
@@ -54,7 +54,7 @@ MODES = 1e-5
 
 def bare(albedo: float, anisotropy: float, ior: float = 1.0) -> tuple[Array, Array, Array]:
     """Cosines, weights, and the matrix of a half-space."""
-    cosine, weight = diffuse._nodes(ior, diffuse.MODE_NODES)
+    cosine, weight = diffuse.interface_nodes(ior, diffuse.MODE_NODES)
     return cosine, weight, bare_half_space(albedo, HenyeyGreenstein(anisotropy), cosine, weight, 2 * diffuse.MODE_NODES)
 
 
