@@ -105,7 +105,7 @@ class BakeOptions:
         1024, metavar="N", help=f"Texels along each side of the map; default with --mode scatter: {SIZE}."
     )
     resolution: int = option(
-        32, metavar="N", help="Of --mode scatter: resolution, 8 to 128; a body gets about N^3 / 4 cells."
+        32, metavar="N", help="With --mode scatter: resolution, 8 to 128; a body gets about N^3 / 4 cells."
     )
     rays: int = option(64, metavar="N", help="Rays per point of the surface.")
     spread: float = option(180.0, metavar="DEG", help="Full angle of the cone of rays.")
@@ -126,9 +126,10 @@ class BakeOptions:
     tile: int | None = option(metavar="N", help="Bake this UDIM tile, such as 1001. Default: UVs repeat.")
     high: str | None = option(metavar="MESH", help="Detailed mesh whose thickness is baked onto the coarser MODEL.")
     cage: str | None = option(
-        metavar="MESH", help="Of --high: a copy of MODEL, moved outwards, from which rays search for the detailed mesh."
+        metavar="MESH",
+        help="With --high: a copy of MODEL, moved outwards, from which rays search for the detailed mesh.",
     )
-    high_distance: str | None = _length("Of --high: largest distance between its surface and that of MODEL.")
+    high_distance: str | None = _length("With --high: largest distance between its surface and that of MODEL.")
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
     medium: AnyMediumOptions = group(AnyMediumOptions)
     unwrap: bool = option(False, help="Make new UVs, even if MODEL has some.")
@@ -136,7 +137,7 @@ class BakeOptions:
     normalize: bool = option(False, help="Store fractions of the largest value instead of metres.")
     invert: bool = option(False, help="Store 1 - t / max, the translucency that some engines expect.")
     max_escaped: str | None = option(
-        metavar="%", help="Of --out-dir: share of rays without an exit above which a map is suspect. [5%]"
+        metavar="%", help="With --out-dir: share of rays without an exit above which a map is suspect. [5%]"
     )
     resume: bool = option(False, help="Store finished parts next to the output, and continue from them.")
     check: bool = option(False, help="Compare a picture by the map with an exact one; write OUTPUT.check.png.")
@@ -151,9 +152,10 @@ class BakeOptions:
         help="Instead of -o: a .usda or .usdc stage with meshes, OpenPBR materials, and thickness per vertex.",
     )
     format: str = option("exr", type=click.Choice(FORMATS), help="Format of the files in --out-dir.")
-    jobs: int | None = option(metavar="N", help="Of --out-dir: number of processes. Default: one per processor.")
+    jobs: int | None = option(metavar="N", help="With --out-dir: number of processes. Default: one per processor.")
     dask: str | None = option(
-        metavar="ADDRESS", help="Of --out-dir: bake on a Dask scheduler, such as tcp://farm:8786."
+        metavar="ADDRESS",
+        help="With --out-dir: bake on the workers of the Dask scheduler at this address, such as tcp://farm:8786.",
     )
     overwrite: bool = overwrite_option()
 

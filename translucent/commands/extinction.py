@@ -64,12 +64,12 @@ class ExtinctionOptions:
         help="Print the material for an engine, ready to paste.",
     )
     ior: float | None = option(
-        metavar="N", help="Of --as and --fit PHOTO: index of refraction. Default: that of the medium, or 1."
+        metavar="N", help="With --as and --fit PHOTO: index of refraction. Default: that of the medium, or 1."
     )
     roughness: float | None = option(
         type=click.FloatRange(0.0, 1.0),
         metavar="R",
-        help="Of --as: roughness of the surface, 0 (polished) to 1. Default: that of --preset or --from, or 0.",
+        help="With --as: roughness of the surface, 0 (polished) to 1. Default: that of --preset or --from, or 0.",
     )
     batch: Path | None = option(metavar="FILE", help="Convert a table with rows name,color,distance.")
     output: Path | None = option(names=("-o", "--output"), help="Output of --batch: a .json or .csv file.")
@@ -80,11 +80,11 @@ class ExtinctionOptions:
         "with "
         "--white and --patch (repeat for more exposures); or to a .toml that lists such photographs.",
     )
-    white: str | None = option(metavar="X,Y,W,H", help="Of --fit PHOTO: a rectangle of bare light, in pixels.")
+    white: str | None = option(metavar="X,Y,W,H", help="With --fit PHOTO: a rectangle of bare light, in pixels.")
     patch: tuple[str, ...] = option(
         (),
         metavar="X,Y,W,H=D",
-        help="Of --fit PHOTO: a rectangle and the thickness of its plate; of equal steps, X,Y,W,H=1mm,2mm,4mm; or of a "
+        help="With --fit PHOTO: a rectangle and the thickness of its plate; of equal steps, X,Y,W,H=1mm,2mm,4mm; of a "
         "wedge, X,Y,W,H=1mm..8mm. May be repeated.",
     )
     preset: str | None = option(metavar="NAME", help="A named medium instead of a color at a distance.")
@@ -101,7 +101,9 @@ class ExtinctionOptions:
     model: str | None = option(
         names=("--on",), metavar="MODEL", help="Print colors on this model, a file or a mesh of the toolkit; see above."
     )
-    eye: str | None = option(metavar="X,Y,Z", help="Of --on: position of the eye, in metres. Default: that of render.")
+    eye: str | None = option(
+        metavar="X,Y,Z", help="With --on: position of the eye, in metres. Default: that of render."
+    )
     overwrite: bool = overwrite_option()
     allow_outside: bool = outside_option()
 

@@ -147,8 +147,8 @@ class CheckOptions:
 
     fix: bool = option(False, help="Bake wrong thicknesses anew into OUTPUT, and check OUTPUT.")
     output: Path | None = option(names=("-o", "--output"), help="Output of --fix: a .glb file.")
-    size: int = option(512, metavar="N", help="Of --fix: texels along each side of a map.")
-    rays: int = option(64, metavar="N", help="Of --fix: rays from each texel.")
+    size: int = option(512, metavar="N", help="With --fix: texels along each side of a map.")
+    rays: int = option(64, metavar="N", help="With --fix: rays from each texel.")
     overwrite: bool = overwrite_option()
     allow_outside: bool = outside_option()
 

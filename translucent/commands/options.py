@@ -289,7 +289,7 @@ class AnyMediumOptions(MediumOptions):
         f"{SCATTERING_IOR:g}. For wax: --scattering-color '#f2e0b8' --mean-free-path 2mm.",
     )
     mean_free_path: str | None = option(
-        metavar="L", help="Of --scattering-color: mean distance after which light is scattered or absorbed, as 0.5mm."
+        metavar="L", help="With --scattering-color: mean distance after which light is scattered or absorbed, as 0.5mm."
     )
 
     def read(self, *, shows_scattering: bool = True) -> Medium | None:
@@ -555,7 +555,7 @@ class ChoiceOptions:
     method: str | None = option(metavar="NAME", help=_method_words)
     paths: int | None = option(
         metavar="N",
-        help="Of --method path-traced: random paths per pixel. Default: 64. Four times as many paths halve the noise.",
+        help="With --method path-traced: random paths per pixel. Default: 64. Four times as many halve the noise.",
     )
     interfaces: str | None = option(
         type=NamesOf("translucent.planning.interfaces", "INTERFACES"),
@@ -564,15 +564,15 @@ class ChoiceOptions:
         "(quickest). Default: traced for solid bodies, if rays can be traced; the plan states the choice.",
     )
     interface_depth: int | None = option(
-        metavar="N", help="Of --interfaces traced: interfaces that a ray may hit, 1 to 64. Default: 24."
+        metavar="N", help="With --interfaces traced: interfaces that a ray may hit, 1 to 64. Default: 24."
     )
     interface_forks: int | None = option(
         metavar="N",
-        help="Of --interfaces traced: how often both the reflected and the refracted ray are followed. Default: 2.",
+        help="With --interfaces traced: how often both the reflected and the refracted ray are followed. Default: 2.",
     )
     interface_hits: str | None = option(
         type=NamesOf("translucent.planning.hits", "HITS"),
-        help="Of --interfaces traced: ray caster that finds the surfaces that rays hit, Embree or shaders (gl). "
+        help="With --interfaces traced: ray caster that finds the surfaces that rays hit, Embree or shaders (gl). "
         "Default: "
         "Embree if OpenGL is a software rasterizer.",
     )
@@ -587,7 +587,7 @@ class ChoiceOptions:
     )
     diffusion_resolution: int | None = option(
         metavar="N",
-        help="Of --scattering diffusion: resolution, 8 to 128; a body gets about N^3 / 4 cells. Default: 32.",
+        help="With --scattering diffusion: resolution, 8 to 128; a body gets about N^3 / 4 cells. Default: 32.",
     )
     caustics: int | None = option(
         is_flag=False,

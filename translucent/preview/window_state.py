@@ -591,7 +591,11 @@ class WindowState:
         if (scene := work.picture()) is None or work.loaded is None:
             return None
         if work.shown_bake is not None:
-            work.refuse(InputError("a recipe", "the model is painted with a map", "clear 'show on the model' first"))
+            work.refuse(
+                InputError(
+                    "copy a recipe", "the picture shows a baked map on the model", "clear 'show on the model' first"
+                )
+            )
             return None
         recipe = Recipe(work.document, work.loaded, scene, self.view.viewport.size, self._caustics(scene))
         text, left_out = (python_code(recipe), []) if kind == "python" else command_line(recipe)
