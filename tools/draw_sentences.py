@@ -29,7 +29,7 @@ SHORTEST = 5
 
 
 def pages() -> list[Path]:
-    """Files of prose: the README and the pages of the site, without those that the build makes."""
+    """Handwritten prose files: the README and the pages of the site."""
     docs = (ROOT / "docs").rglob("*.md")
     return [ROOT / "README.md", *sorted(page for page in docs if page.relative_to(ROOT).parts[1] not in MADE)]
 

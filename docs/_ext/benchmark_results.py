@@ -34,7 +34,7 @@ def number(value: float | None) -> str:
 
 
 def machines(results: list[Results]) -> list[str]:
-    """What ran where."""
+    """Table of renderers, versions, settings and machines."""
     lines = ["| renderer | settings | device | machine | date |", "|---|---|---|---|---|"]
     for one in results:
         texts = (f"{one['name']} {one['version']}", one["settings"], one["device"], one["machine"], one["date"])

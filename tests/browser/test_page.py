@@ -174,7 +174,7 @@ PROBED = """(places) => {
 
 
 def test_the_probe_is_exact_by_edges_of_faces(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
-    """Where WebGL draws in software, edges in pictures are off by up to 1/32 of a pixel; those of the probe are not."""
+    """A software WebGL moves edges in pictures by up to 1/32 of a pixel; the probe is exact there."""
     mesh = rounded(tl.load_mesh(mesh_path("knot")))
     camera = tl.Camera.look_at(1.2 * mesh.diagonal * np.array((0.5, 0.35, 1.0)), (0, 0, 0), fov_y=45)
     opened(web_page, scene_of(tl.Object(mesh, RED), camera=camera), tmp_path, tools)

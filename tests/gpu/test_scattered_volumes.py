@@ -204,7 +204,7 @@ def test_only_what_changes_the_light_is_solved_for_again(
 def test_glowing_bodies_vanish_in_the_light_of_their_like(
     renderer: tl.Renderer, solid: Sphere | Torus, scattering: float, absorption: float
 ) -> None:
-    """What emits as much as it absorbs of light of 1 is invisible in it (Kirchhoff): with an interface, too.
+    """A body that emits as much as it absorbs is invisible in uniform light (Kirchhoff), also behind an interface.
 
     Measured: at most .015.
     """

@@ -259,6 +259,6 @@ def job_for(name: str, job: dict[str, Any]) -> dict[str, Any]:
 
 
 def recipe_for(name: str, largest: float) -> str:
-    """What to set when a program imports a map with this largest thickness in metres."""
+    """Import settings of a program for a map with this largest thickness in metres."""
     program = PROGRAMS[name]
     return program.recipe.replace("{largest}", f"{program.per_metre * largest:.4g}")

@@ -105,7 +105,7 @@ def run_adapter(
     folder: Path,
     said: Callable[[str], None] | None = None,
 ) -> Results:
-    """Render scenes by an adapter into a folder, score them, and write results.json; a scene that fails is told of.
+    """Render scenes by an adapter into a folder, score them, and write results.json, which holds failures too.
 
     Raises
     ------

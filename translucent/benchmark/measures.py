@@ -13,6 +13,7 @@ from translucent.arrays import Array, Mask
 from translucent.bench.judgement import JUST_NOTICEABLE, lab
 from translucent.bench.truth import noise_free_square
 from translucent.benchmark.truth import TruthPicture
+from translucent.errors import RenderError
 from translucent.extras import require_package
 
 #: Width and height of the blocks over whose means errors are taken, in pixels.
@@ -139,7 +140,7 @@ def flip(picture: Array, right: Array, used: Mask) -> float:
     """Mean FLIP of HDR pictures (Andersson et al. 2021) over some pixels; NaN where the package is not installed."""
     try:
         package = require_package("flip_evaluator", "FLIP")
-    except Exception:  # noqa: BLE001 - without the extra there is a page all the same, which says so
+    except RenderError:  # without the extra, tables and pages say that FLIP is missing
         return math.nan
     pair = [np.ascontiguousarray(np.clip(each, 0.0, 1e4), np.float32) for each in (right, picture)]
     found, _, _ = package.evaluate(*pair, "HDR", inputsRGB=False, applyMagma=False, computeMeanError=False)
@@ -225,7 +226,7 @@ _SUSPECTS = (
 
 
 def suspicions(picture: Array, truth: TruthPicture) -> list[str]:
-    """What a picture seems to be, if undoing a usual mistake halves its error; the strongest sign alone.
+    """Most likely mistake in a picture: the one whose correction reduces the error most, and at least halves it.
 
     Undone are flips, exchanged channels, transfer functions, a wrong exposure, a shift and a zoom (a crop).
     """

@@ -21,7 +21,7 @@ from translucent.benchmark.results import FLOOR, Results, SceneResult, picture_p
 from translucent.benchmark.scenes import FEATURES, SCENES, BenchmarkScene
 from translucent.benchmark.truth import AGREEING, TruthPicture, read_records, stored_truth_of, truth_path
 from translucent.errors import InputError
-from translucent.extras import require_package
+from translucent.extras import install_command, require_package
 from translucent.files.paths import require_output, write_text_atomically
 from translucent.formulas.color import linear_to_srgb
 
@@ -53,7 +53,7 @@ def table_of(results: Results) -> str:
     for name, one in results.scenes.items():
         lines.append(f"{name:<16}{_line(one)}")
     if any(one.score is not None and math.isnan(one.score.flip) for one in results.scenes.values()):
-        lines.append("FLIP is not measured: pip install 'translucent[benchmark]'")
+        lines.append(f"FLIP is not measured: {install_command('benchmark')}")
     for said in results.suspicions:
         lines.append(f"warning: most pictures look wrong: {said}")
     return "\n".join(lines)
@@ -107,7 +107,7 @@ class PageRow:
 
 @dataclass(frozen=True)
 class ScenePart:
-    """A scene on the page: its truth, rows in the order of their errors, those that cannot, and a drawing."""
+    """Section of one scene: truth, renderers by increasing error, renderers that cannot draw it, and a plot."""
 
     scene: BenchmarkScene
     truth: str

@@ -61,7 +61,7 @@ _RESULTS = "results.json"
 
 @dataclass(frozen=True)
 class SceneResult:
-    """What came of one scene.
+    """Result of one scene.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Results:
 
     @property
     def suspicions(self) -> list[str]:
-        """What its pictures seem to be, where that holds for most of them."""
+        """Mistakes that most of its pictures seem to share."""
         return common_suspicions([one.score for one in self.scenes.values() if one.score is not None])
 
     def write(self, folder: Path) -> None:

@@ -134,7 +134,7 @@ def geometry_truth(scene: BenchmarkScene) -> tuple[Mask, Array | None]:
 
 @dataclass(frozen=True)
 class TruthAgreement:
-    """How far another renderer agrees with the stored truth of a scene.
+    """Agreement of another renderer with the stored truth of a scene.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ def agreement_with(
 
 @dataclass(frozen=True)
 class TruthRecord:
-    """What is known of the truth of a scene, beside its picture.
+    """Metadata of the stored truth of a scene: noise, number of paths, agreement with other renderers.
 
     Attributes
     ----------

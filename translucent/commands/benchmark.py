@@ -240,7 +240,7 @@ def _chosen(only: str | None) -> list[BenchmarkScene]:
 
 
 def _summary(results: Results) -> dict[str, object]:
-    """What ``--json`` prints about results."""
+    """Results as the object that ``--json`` prints."""
     from translucent.benchmark.results import plain_results
 
     return plain_results(results)

@@ -265,7 +265,7 @@ def _variable(albedo: Array) -> Array:
 
 
 def _tried() -> Array:
-    """Albedos halfway between those that are solved for, every other one."""
+    """Every second midpoint between neighboring solved albedos."""
     at = _variable(np.array(SOLVED))
     return np.asarray(1.0 - np.square(0.5 * (at[1:] + at[:-1])))[1::2]
 

@@ -241,7 +241,7 @@ def has_more(body: Object) -> bool:
 
 
 def halvings(scene: Scene) -> dict[Texture, int]:
-    """How often each texture that rays read is halved, so that all of them fit: the largest one first."""
+    """Number of halvings of each ray-traced texture until all fit into the limit; the largest is halved first."""
     found = dict.fromkeys((one for body in scene.objects for one in textures_at_hits(body) if one is not None), 0)
 
     def texels(texture: Texture) -> int:

@@ -264,7 +264,7 @@ def _ground(scene: Scene) -> dict[str, Any]:
 
 
 def _ground_shadows(job: FrameJob, switches: Mapping[str, bool | int]) -> dict[str, Any]:
-    """Where the map of shadows on the ground lies."""
+    """Uniforms that place the shadow map of the ground."""
     ground = job.resources.shadows.ground
     if not switches["GROUND_SHADOWS"] or ground is None:
         return {}
