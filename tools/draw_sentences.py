@@ -1,7 +1,8 @@
 """Sentences to paraphrase: drawn at random from the README, the docs, the help texts and the messages.
 
 ``python tools/draw_sentences.py 60 --seed 1`` prints 60 of them, each with its place, for a reader who knows graphics
-and not this project. ``--lengths`` prints how long sentences and pages are instead.
+and not this project. ``--context`` prints before each what a reader of the page has just read: its headings and the two
+sentences before. ``--lengths`` prints how long sentences and pages are instead.
 """
 
 from __future__ import annotations
@@ -99,11 +100,30 @@ def written() -> Iterator[tuple[str, str]]:
             yield f"{page.relative_to(ROOT)}:{line}", one
 
 
+def context(place: str, sentence: str) -> str:
+    """Headings above a sentence of a page and the two sentences before it in its section; empty for a message."""
+    name = place.split(":")[0]
+    if not name.endswith(".md"):
+        return ""
+    headings: list[str] = []
+    for section in re.split(r"(?m)^(?=#+ )", prose((ROOT / name).read_text(encoding="utf-8"))):
+        first, _, body = section.partition("\n")
+        if first.startswith("#"):
+            depth, title = first.split(" ", 1)
+            headings = [*headings[: len(depth) - 1], title]
+        found = sentences(body)
+        if sentence in found:
+            at = found.index(sentence)
+            return f"   [{' > '.join(headings)}] {' '.join(found[max(0, at - 2) : at])}\n"
+    return ""
+
+
 def main() -> int:
     """Draw sentences, or measure them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("count", nargs="?", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--context", action="store_true", help="headings and two sentences before each as well")
     parser.add_argument("--lengths", action="store_true", help="words of sentences and pages instead")
     given = parser.parse_args()
     if given.lengths:
@@ -114,7 +134,7 @@ def main() -> int:
         return 0
     everything = [*written(), *helps(), *messages()]
     for number, (place, one) in enumerate(random.Random(given.seed).sample(everything, given.count), 1):
-        print(f"{number}. {one}\n   {place}")
+        print(f"{number}. {one}\n{context(place, one) if given.context else ''}   {place}")
     return 0
 
 
