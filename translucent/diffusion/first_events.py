@@ -78,10 +78,6 @@ def joined_rays(rays: Sequence[EnteringRays]) -> EnteringRays:
     return EnteringRays(*map(np.concatenate, parts))
 
 
-#: Fraction of the fluence below a surface that the spread of what is read leaves at least.
-LEAST_LEFT = 0.5
-
-
 @dataclass(frozen=True, eq=False)
 class LayerSolution:
     """One-dimensional solutions between the surface (depth 0) and the depth at which the fluence is read, per sample.
@@ -121,9 +117,7 @@ class LayerSolution:
         scale = optics.transmittance(attenuation * depth)
         even, rise = 0.5 * (1.0 + scale * scale), depth * optics.mean_transmittance(2.0 * attenuation * depth)
         slope = attenuation**2 * rise + condition * even
-        # The spread is a correction of first order: where it would take most of u away, and more, it is none.
-        u = even + condition * rise
-        u = np.maximum(u + spread * slope, LEAST_LEFT * u)
+        u = even + condition * rise + spread * slope
         return cls(depth, attenuation, condition, spread, scale, even, rise, u, slope)
 
     def events(self, samples: Integers, rate: Array) -> tuple[Array, Array]:

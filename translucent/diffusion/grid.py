@@ -249,24 +249,16 @@ class BodyGrid:
 
         The cells that a sample reads lie at several depths, and each gives a part of the flux: above the deepest one
         not all of it flows, and the fluence falls less towards the surface than it should. With weights that sum to
-        A(z) down to a depth z it is too high by the flux over D times the integral of A (1 - A). In a wall of few cells
-        the cells that the other side reads, with weights that sum to B(z), give some of it where it is taken, and the
-        difference between both sides is that over (A - B)^2: of 2 B (1 - A) less each side has half.
+        A(z) down to a depth z it is too high by the flux over D times the integral of A (1 - A).
         """
         weights, heights = self._reading[2:]
 
-        def later(one: Integers, first: Array, other: Integers, second: Array) -> Array:
-            """Mean over the cells of both by how much the second is deeper, where it is."""
-            deeper = np.maximum(second[:, None, :] - first[:, :, None], 0.0)
-            return np.asarray(np.einsum("si,sj,sij->s", weights[one], weights[other], deeper))
+        def later(other: Integers) -> Array:
+            """Mean over the cells of both by how much those of other samples are deeper, where they are."""
+            deeper = np.maximum(heights[other][:, None, :] - heights[:, :, None], 0.0)
+            return np.asarray(np.einsum("si,sj,sij->s", weights, weights[other], deeper))
 
-        samples = np.arange(len(weights))
-        found = np.mean([later(samples, heights, other, heights[other]) for other in self.nearest.T], axis=0)
-        thin, across = self.across
-        normal = self.face_normals
-        aside = (self.points[thin] - self.points[across]) / self.cells.step
-        found[thin] -= later(across, (aside * normal[thin]).sum(axis=1)[:, None] - heights[across], thin, heights[thin])
-        return np.asarray(found * self.cells.step)
+        return np.asarray(np.mean([later(other) for other in self.nearest.T], axis=0) * self.cells.step)
 
     @cached_property
     def thickness(self) -> Array:
