@@ -269,6 +269,18 @@ def test_lossless_bodies_give_back_what_enters(mesh: tl.Mesh, scattering: float)
             np.testing.assert_allclose(exit_share * found, scattered, rtol=5e-3)
 
 
+def test_edges_of_dense_cubes_are_no_darker_than_their_faces() -> None:
+    """In uniform light, before anything is corrected: where the surface leaves little of the cells around a sample.
+
+    Measured: 0.55 % rms and 6 % at most, where edges were up to 29 % off.
+    """
+    grid = grid_of(Box().tessellate(), 16)
+    system = BodySystem(grid, tl.Medium(scattering=75.0, ior=1.35), 0.0)
+    off = 1.0 / system._channels[0]._correction - 1.0
+    assert np.sqrt(np.average(off**2, weights=grid.areas)) < 0.01
+    assert np.abs(off).max() < 0.1
+
+
 @pytest.mark.parametrize(("ior", "off"), [(1.0, 0.05), (1.5, 0.08)])
 def test_lamps_in_lossless_hollows_light_the_outside(ior: float, off: float) -> None:
     """Light goes around in the hollow until it has found its way out, through however thick a wall.

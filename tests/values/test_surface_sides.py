@@ -72,3 +72,6 @@ def test_a_spread_beyond_its_first_order_takes_no_more_than_half_of_the_fluence(
     plain = LayerSolution.of(depth, 30.0, 400.0, np.zeros(5))
     assert (layer.u >= 0.5 * plain.u).all()
     np.testing.assert_allclose(layer.u[3:], (plain.u + spread * plain.slope)[3:])
+    # The events above the depth of reading are those of the same solution.
+    near, _ = layer.events(np.arange(5), np.full(5, 300.0))
+    assert (near > 0.0).all()

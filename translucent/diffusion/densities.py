@@ -23,6 +23,9 @@ _PLACES = (0.25, 0.75)
 #: Points on a path through the body at which the density is read.
 _PATH_POINTS = (np.arange(12) + 0.5) / 12
 
+#: Relative difference of densities that are alike.
+_ROUNDING = 1e-9
+
 #: Pieces of each path of entering light, from the surface to the end of the grid.
 _PIECES = 48
 
@@ -47,6 +50,11 @@ class Densities:
     longest: float
     _grid: BodyGrid
     _means: Array | None = None
+
+    @property
+    def is_even(self) -> bool:
+        """True if the density is the same everywhere, but for rounding."""
+        return bool(np.ptp(self.cells) <= _ROUNDING * self.cells.max())
 
     def diffusion_coefficients(self, d: float) -> Array:
         """(cells,): diffusion coefficients in m of a medium that has `d` where the density is 1."""

@@ -78,6 +78,10 @@ def joined_rays(rays: Sequence[EnteringRays]) -> EnteringRays:
     return EnteringRays(*map(np.concatenate, parts))
 
 
+#: Fraction of the fluence below a surface that the spread of what is read leaves at least.
+LEAST_LEFT = 0.5
+
+
 @dataclass(frozen=True, eq=False)
 class LayerSolution:
     """One-dimensional solutions between the surface (depth 0) and the depth at which the fluence is read, per sample.
@@ -117,7 +121,11 @@ class LayerSolution:
         scale = optics.transmittance(attenuation * depth)
         even, rise = 0.5 * (1.0 + scale * scale), depth * optics.mean_transmittance(2.0 * attenuation * depth)
         slope = attenuation**2 * rise + condition * even
-        u = even + condition * rise + spread * slope
+        # The spread is a correction of first order: it takes no more of u away than half.
+        u = even + condition * rise
+        too_far = spread * slope < -(1.0 - LEAST_LEFT) * u
+        spread = np.where(too_far, -(1.0 - LEAST_LEFT) * u / np.where(too_far, slope, 1.0), spread)
+        u = u + spread * slope
         return cls(depth, attenuation, condition, spread, scale, even, rise, u, slope)
 
     def events(self, samples: Integers, rate: Array) -> tuple[Array, Array]:
@@ -247,8 +255,8 @@ class Events:
     counted: Array
     slab: tuple[Array, Array]
 
-    def scaled(self, factor: float) -> Events:
-        """More events, or fewer, by a factor."""
+    def scaled(self, factor: Array) -> Events:
+        """More events, or fewer, by factors (k,)."""
         below = [(cell, factor * weight) for cell, weight in self.below]
         return replace(self, near=factor * self.near, above=factor * self.above, below=below)
 

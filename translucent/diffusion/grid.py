@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +30,9 @@ SAMPLES = 3.0
 
 #: Least area around a sample, as a fraction of the mean.
 LEAST_AREA = 0.1
+
+#: Cosine between the normals of both sides, up to which a wall is one, and from which on it is none.
+PARALLEL, ASLANT = -0.95, -0.8
 
 #: Half the thickness of walls, in cells, up to which the fluence is read halfway through.
 MIDDLE = 1.25
@@ -249,16 +253,25 @@ class BodyGrid:
 
         The cells that a sample reads lie at several depths, and each gives a part of the flux: above the deepest one
         not all of it flows, and the fluence falls less towards the surface than it should. With weights that sum to
-        A(z) down to a depth z it is too high by the flux over D times the integral of A (1 - A).
+        A(z) down to a depth z it is too high by the flux over D times the integral of A (1 - A). In a wall of few cells
+        with parallel sides the cells that the other side reads, with weights that sum to B(z), give some of it where it
+        is taken, and the difference between both sides is that over (A - B)^2: of 2 B (1 - A) less each side has half.
         """
         weights, heights = self._reading[2:]
 
-        def later(other: Integers) -> Array:
-            """Mean over the cells of both by how much those of other samples are deeper, where they are."""
-            deeper = np.maximum(heights[other][:, None, :] - heights[:, :, None], 0.0)
-            return np.asarray(np.einsum("si,sj,sij->s", weights, weights[other], deeper))
+        def later(one: Integers, first: Array, other: Integers, second: Array) -> Array:
+            """Mean over the cells of both by how much the second is deeper, where it is."""
+            deeper = np.maximum(second[:, None, :] - first[:, :, None], 0.0)
+            return np.asarray(np.einsum("si,sj,sij->s", weights[one], weights[other], deeper))
 
-        return np.asarray(np.mean([later(other) for other in self.nearest.T], axis=0) * self.cells.step)
+        samples = np.arange(len(weights))
+        found = np.mean([later(samples, heights, other, heights[other]) for other in self.nearest.T], axis=0)
+        thin, across = self.across
+        normal = self.face_normals
+        aside = (self.points[thin] - self.points[across]) / self.cells.step
+        below = (aside * normal[thin]).sum(axis=1)[:, None] - heights[across]
+        found[thin] -= self.parallel * later(across, below, thin, heights[thin])
+        return np.asarray(found * self.cells.step)
 
     @cached_property
     def thickness(self) -> Array:
@@ -275,6 +288,13 @@ class BodyGrid:
         return thin, nearest_samples(self.points, self.face_normals, self.area, ends, -self.face_normals[thin])
 
     @cached_property
+    def parallel(self) -> Array:
+        """(k,): how much each sample of `across` and the one on the other side are those of one wall, 0 to 1."""
+        thin, other = self.across
+        cosine = (self.face_normals[thin] * self.face_normals[other]).sum(axis=1)
+        return np.asarray(np.clip((ASLANT - cosine) / (ASLANT - PARALLEL), 0.0, 1.0))
+
+    @cached_property
     def _reading(self) -> tuple[sparse.csr_array, Array, Array, Array]:
         """See `below`; and weights and depths in cells (s, 8) of the cells that are read."""
         cells, weights = np.zeros((len(self.points), 8), np.int64), np.zeros((len(self.points), 8))
@@ -284,7 +304,8 @@ class BodyGrid:
         # Halfway through walls of few cells, for both sides in the same place: so the one-dimensional solutions below
         # both meet there, and are that of a slab.
         deepest = np.where(middle < MIDDLE, middle, np.maximum(2.0 * MIDDLE - middle, PROBE_DEPTHS[0]))
-        for target in PROBE_DEPTHS:
+        # At sharp edges no point has enough cells around it: there, some will do.
+        for least, target in product((LEAST_AROUND, 0.0), PROBE_DEPTHS):
             below = np.minimum(target, middle) if target < PROBE_DEPTHS[0] else deepest
             probe = self.probe(
                 self.points[missing] - (below[missing] * self.cells.step)[:, None] * self.face_normals[missing]
@@ -292,7 +313,7 @@ class BodyGrid:
             every = self._depths(probe, missing)
             found = (probe.weights * every).sum(axis=1)
             halfway = below[missing] == middle[missing]
-            taken = (probe.around > np.where(halfway, 0.0, LEAST_AROUND)) & (found > 0.3 * below[missing])
+            taken = (probe.around > np.where(halfway, 0.0, least)) & (found > 0.3 * below[missing])
             at = missing[taken]
             cells[at], weights[at], depth[at] = probe.cells[taken], probe.weights[taken], found[taken]
             heights[at] = every[taken]

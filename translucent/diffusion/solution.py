@@ -452,8 +452,12 @@ class _ChannelSystem:
         slab = SlabSolution(walls.thickness, ior, absorption, scattering, phase) if walls.any else None
         self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord, slab)
         diffuse, self._paths, self._all = self._first.of(paths), paths, paths.samples
-        # Cells that the surface cuts count a little too many events, or too few. The lengths of paths say how many.
-        self._diffuse = diffuse.scaled(float(grid.areas @ scattered) / max(float(grid.areas @ diffuse.counted), _TINY))
+        # Cells that the surface cuts count a little too many events, or too few. The lengths of paths say how many: at
+        # edges, where many leave the body on another side, and in all.
+        around = np.maximum(diffuse.counted[grid.nearest].mean(axis=1), _TINY)
+        fewer = np.minimum(scattered / around, 1.0) if dense.is_even else np.ones(len(around))
+        total = max(float(grid.areas @ (fewer * diffuse.counted)), _TINY)
+        self._diffuse = diffuse.scaled(fewer * (float(grid.areas @ scattered) / total))
         reflected = np.zeros(0) if reflected is None else reflected
         self._inclusions = _InclusionLosses.of(grid, absorption, d, reflected)
         lost = grid.areas * d * layer.slope * self._relative

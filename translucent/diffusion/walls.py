@@ -24,9 +24,6 @@ from translucent.formulas.slab import slab_fluxes
 #: Thickness of walls, in cells, up to which they are slabs; from `THIN` on cells are enough.
 SLAB = 2.0
 
-#: Cosine between the normals of both sides, up to which a wall is one, and from which on it is none.
-_PARALLEL, _ASLANT = -0.95, -0.8
-
 #: Ratio of the areas of both sides, the smaller one over the other, from which on a wall is flat, and up to which it is
 #: no slab.
 _FLAT, _CURVED = 0.8, 0.5
@@ -78,13 +75,11 @@ class Walls:
         if grid.inclusions is not None or grid.body.density is not None or not len(thin):
             return cls(part, across, thickness, np.ones(count))
         across[thin] = other
-        cosine = (normals[thin] * normals[other]).sum(axis=1)
-        parallel = np.clip((_ASLANT - cosine) / (_ASLANT - _PARALLEL), 0.0, 1.0)
         # Next to a rim there may be no sample on the other side.
         ends = grid.points[thin] - thickness[thin, None] * normals[thin]
         near = ((grid.points[other] - ends) ** 2).sum(axis=1) < _NEAR * grid.area
         cells = thickness[thin] / grid.cells.step
-        part[thin] = near * parallel * np.clip((THIN - cells) / (THIN - SLAB), 0.0, 1.0)
+        part[thin] = near * grid.parallel * np.clip((THIN - cells) / (THIN - SLAB), 0.0, 1.0)
         area = _area_ratios(grid, thickness)
         flat = np.minimum(area, 1.0 / area)
         return cls(part * np.clip((flat - _CURVED) / (_FLAT - _CURVED), 0.0, 1.0), across, thickness, area)
