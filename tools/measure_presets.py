@@ -5,8 +5,8 @@
 ``--drawn`` pictures alone are made anew, and compared with the truths that it holds. Each is rendered on the toolkit's
 ball (4 cm) in the environments of three stages, without their ground and their lights. The truth is `PathTraced`, with
 as many paths as it takes until the standard error of the mean color of each channel is at most a fiftieth of it, or for
-half a minute. Both see the ball at the same points, the centers of the pixels; but the picture sees the environment
-averaged over their footprints, as far as it is mirrored or refracted.
+a minute of the processor. Both see the ball at the same points, the centers of the pixels; but the picture sees the
+environment averaged over their footprints, as far as it is mirrored or refracted.
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ ENVIRONMENTS = ("studio", "daylight", "night")
 #: Pixels along a side, of the picture and of the truth.
 SIDE = 24
 
-#: Paths of a pixel in a round of the truth; the standard error at which no more are needed, and the seconds.
-PATHS, ENOUGH, SECONDS = 16, 0.02, 30.0
+#: Paths of a pixel in a round of the truth; the standard error at which no more are needed, and the seconds of the
+#: processor.
+PATHS, ENOUGH, SECONDS = 16, 0.02, 60.0
 
 
 def scene_of(preset: Preset, environment: str) -> tl.Scene:
@@ -50,14 +51,14 @@ def scene_of(preset: Preset, environment: str) -> tl.Scene:
 def truth_of(renderer: tl.Renderer, scene: tl.Scene, mask: npt.NDArray[np.bool_]) -> tuple[Any, Any, int]:
     """Mean color (3,) of the pixels of a mask by random paths, its standard error (3,), and paths of each pixel."""
     means, errors = [], []
-    began = time.perf_counter()
+    began = time.process_time()
     for seed in count():
         frame = renderer.render(scene, (SIDE, SIDE), tl.PathTraced(PATHS, seed))
         assert frame.standard_error is not None
         means.append(frame.radiance[mask].mean(axis=0, dtype=np.float64))
         errors.append((frame.standard_error[mask].astype(np.float64) ** 2).sum(axis=0) / mask.sum() ** 2)
         mean, error = np.mean(means, axis=0), np.sqrt(np.sum(errors, axis=0)) / len(errors)
-        if (error <= ENOUGH * mean).all() or (len(means) > 1 and time.perf_counter() - began > SECONDS):
+        if (error <= ENOUGH * mean).all() or (len(means) > 1 and time.process_time() - began > SECONDS):
             return mean, error, PATHS * len(means)
     raise AssertionError
 
@@ -115,7 +116,10 @@ def main() -> None:
     with tl.Renderer() as renderer:
         for one in wanted:
             old = known[one.name]["colors"] if asked.drawn else None
-            known[one.name] = {"numbers": numbers_of(one), "colors": measure(renderer, one, environments, old)}
+            before, numbers = known.get(one.name, {}), numbers_of(one)
+            kept_colors = before["colors"] if before.get("numbers") == numbers else {}
+            colors = {**kept_colors, **measure(renderer, one, environments, old)}
+            known[one.name] = {"numbers": numbers, "colors": colors}
             kept = {name: known[name] for name in tl.presets() if name in known}
             day = date.today().isoformat()
             data = {"written": day, "renderer": renderer.provenance["renderer"], "side": SIDE, "presets": kept}

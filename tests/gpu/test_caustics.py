@@ -282,7 +282,7 @@ def test_few_photons_are_spread_and_none_of_their_light_is_lost(
         hidden = (dark == 0.0) & (truth == 0.0)  # the fence, and the middle of the shadow if nothing lights it
         assert np.count_nonzero(hidden[14:22]) > 200
         assert np.abs(added[14:22][hidden[14:22]]).max() == 0.0
-    assert errors[0] < 0.8 * errors[1]
+    assert errors[0] < 0.72 * errors[1]  # .74 where each pixel's own number decides alone
 
 
 def test_interfaces_show_caustics_behind_them(renderer: tl.Renderer) -> None:
