@@ -166,8 +166,8 @@ class Renderer:
             Sub-pixel samples over which radiance and transmittance are averaged, for smooth edges. The other arrays
             belong to the ray through the pixel center, as all do with 1.
         adaptive : bool
-            Trace rays from smooth interfaces for all samples of a pixel where they or neighbors differ, elsewhere for
-            one or a few; not for a transparent frame. False: for all everywhere.
+            Trace rays from interfaces for more samples of a pixel where they or neighbors differ, up to twice
+            `samples`, elsewhere for one or a few; not for a transparent frame. False: for all everywhere.
         backdrop : Backdrop or TextureBackdrop, optional
             A picture of everything opaque, drawn elsewhere. The same for all samples of a pixel.
         transparent : bool

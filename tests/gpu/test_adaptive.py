@@ -11,6 +11,7 @@ import pytest
 import translucent as tl
 import translucent.gpu.renderer as renderer_module
 from translucent.geometry.solids import Box, Sphere
+from translucent.gpu.adaptive import wanted_samples
 from translucent.gpu.job import FrameJob
 from translucent.gpu.targets import read_floats
 
@@ -43,8 +44,8 @@ def test_the_picture_is_that_of_all_samples(renderer: tl.Renderer, scene: tl.Sce
         np.testing.assert_array_equal(few.arrays[name], every.arrays[name], err_msg=name)
     mean = every.radiance[every.coverage].mean()
     off = (few.radiance - every.radiance)[every.coverage]
-    # The standard error that ends sampling is 1 % in the worst pixel of 3 x 3.
-    assert np.sqrt(np.square(off, dtype=np.float64).mean()) < 0.005 * mean
+    # Both are 0.009 from the mean of 256 samples.
+    assert np.sqrt(np.square(off, dtype=np.float64).mean()) < 0.009 * mean
     assert abs(off.mean(dtype=np.float64)) < 0.002 * mean  # in pixels as coarse as these
     assert np.abs(off).max() < 0.1 * mean
     np.testing.assert_allclose(few.radiance[~every.coverage], every.radiance[~every.coverage], atol=1e-6)
@@ -115,8 +116,8 @@ def test_the_edge_of_a_body_takes_all_samples(renderer: tl.Renderer) -> None:
     edge = np.any(alone, axis=0) & ~np.all(alone, axis=0)
     assert 20 < edge.sum() < 300
     some = edge & (np.abs(every.transmittance - 1.0).max(axis=-1) > 0.0)
-    np.testing.assert_allclose(few.radiance[some], every.radiance[some], rtol=2e-2)
-    assert np.median(np.abs(few.radiance - every.radiance)[some]) < 1e-6
+    # Of these pixels a few show the body in every sample.
+    assert np.quantile(np.abs(few.radiance - every.radiance)[some], 0.9) < 1e-6
 
 
 def around(camera: tl.Camera) -> list[tl.Camera]:
@@ -135,13 +136,34 @@ def test_the_same_scene_makes_the_same_picture(renderer: tl.Renderer) -> None:
 @pytest.mark.parametrize(
     ("scene", "samples"),
     [
-        (ball(surface=tl.Surface(roughness=0.3)), 8),
         (dataclasses.replace(ball(), camera=tl.Camera.look_at((0, 0, 0), (0, 0, -1))), 8),
         (ball(), 2),
     ],
-    ids=["rough", "from inside", "two samples"],
+    ids=["from inside", "two samples"],
 )
-def test_what_is_noisy_or_starts_inside_takes_all_samples(renderer: tl.Renderer, scene: tl.Scene, samples: int) -> None:
+def test_views_from_inside_and_few_samples_take_all(renderer: tl.Renderer, scene: tl.Scene, samples: int) -> None:
     few, every = (renderer.render(scene, SIZE, samples=samples, adaptive=adaptive) for adaptive in (True, False))
     assert "traced_samples" not in few.provenance
     np.testing.assert_array_equal(few.radiance, every.radiance)
+
+
+def test_rough_interfaces_take_samples_where_they_are_noisy(renderer: tl.Renderer) -> None:
+    """The error of the picture is that of all samples, and its mean theirs."""
+    scene = ball(surface=tl.Surface(roughness=0.3))
+    few, every = (renderer.render(scene, SIZE, samples=16, adaptive=adaptive) for adaptive in (True, False))
+    truth = renderer.render(scene, SIZE, samples=128, adaptive=False)
+    inside = every.coverage
+    errors = [np.square(frame.radiance - truth.radiance, dtype=np.float64)[inside].mean() for frame in (few, every)]
+    assert errors[0] < 1.1 * errors[1]
+    assert traced(few) < 13.0
+    off = (few.radiance - every.radiance)[inside].mean(dtype=np.float64)
+    assert abs(off) < 0.003 * every.radiance[inside].mean()
+
+
+def test_wanted_samples_leave_the_error_of_the_same_number_everywhere() -> None:
+    """The mean square of sigma / n, with the next power of two half an octave off on average."""
+    deviations = np.exp(np.random.default_rng(3).normal(size=10_000)).astype(np.float32)
+    samples = np.sqrt(2.0) * wanted_samples(deviations, 16) * deviations ** (2 / 3)
+    assert np.mean((deviations / samples) ** 2) == pytest.approx(np.mean((deviations / 16) ** 2), rel=1e-4)
+    assert samples.mean() < 10.0
+    assert wanted_samples(np.zeros(4, np.float32), 16) == 0.0

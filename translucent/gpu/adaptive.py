@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.formulas.sampling import sample_shifts
+from translucent.formulas.sampling import sample_shifts, sobol_points
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, interior_at_eye, mirrored_part
 from translucent.gpu.passes.variants import Variants
@@ -20,13 +20,17 @@ from translucent.planning.passes import PassName
 
 Floats = npt.NDArray[np.float32]
 
-#: Of 16 samples: the largest range of light near a pixel that one sample is enough for, and the largest standard error
-#: that is as good as none, both as fractions of the light. With more samples they are smaller.
-CONTRAST, ERROR = 0.1, 0.01
+#: Of 16 samples: the largest range of light near a pixel that one sample is enough for, as a fraction of the light.
+#: With more samples it is smaller.
+CONTRAST = 0.05
 
-#: The same of the light that bodies add to what a ground mirrors, as fractions of all light of the ground: that is
+#: The same of the light that bodies add to what a ground mirrors, as a fraction of all light of the ground: that is
 #: smooth but for the mirror image, so that less of an error shows.
-MIRROR_CONTRAST, MIRROR_ERROR = 0.01, 0.003
+MIRROR_CONTRAST = 0.01
+
+#: Samples after which deviations are measured, and the most samples of a pixel, in those of the picture. Fewer of the
+#: picture are all taken.
+FIRST_LOOK, MORE = 4, 2
 
 #: Fractions of a pixel's light that rays lose, as in open meshes, from which on it is not worth more samples: of
 #: interfaces, so that one sample of 16 makes the pixel invalid (`renderer.MOST_LOST`) whatever the others find; and of
@@ -42,6 +46,12 @@ Run = Callable[[tuple[PassName, ...]], None]
 
 class AdaptiveSampling:
     """Averages over samples in two rounds: what is cheap for every sample, then rays from interfaces where it matters.
+
+    Of n samples at low-discrepancy points the error is about sigma / n, with the standard deviation sigma of a sample.
+    A picture with the error that N samples of each pixel leave takes least time if a pixel has samples in proportion to
+    sigma^(2/3), N (sum sigma^(2/3) / sum sigma^2)^(1/2) sigma^(2/3) (Neyman 1934, "On the two different aspects of the
+    representative method", for an error of sigma / n). Deviations are those of the first samples, relative to the root
+    of the light, between an error of the light and one of its logarithm.
 
     The first round finds for every sample which pixels show an interface, and sums up the light of all others:
     edges are as smooth as ever. The second traces rays; in each pixel, their mean replaces all of its
@@ -59,6 +69,7 @@ class AdaptiveSampling:
         self._unsettled = Variants(gl, vertex, "transport/unsettled.frag", "bent_light", "bent_spread", "average_light")
         self._part = Variants(gl, vertex, "shade/part_of_mean.frag", "sampled")
         self._left = gl.query(samples=True)
+        self._wanted = 0.0
 
     def run(self, job: FrameJob, samples: int, run_passes: Run) -> None:
         """Sum up the samples of a job; `run_passes` runs its passes, but for some."""
@@ -80,7 +91,8 @@ class AdaptiveSampling:
         job.bending = True
         leave_out = _left_out(job)
         # Settled pixels are left out after these; once a few are there, each time that their number has doubled.
-        looks = {1, 4} | {2**i for i in range(3, samples.bit_length())}
+        most = _most(samples)
+        looks = {1} | {2**i for i in range(2, most.bit_length()) if most > samples}
         for number, shift in enumerate(_central_first(samples)):
             if not number or number in looks:
                 left = self._find_unsettled(job, samples, number)
@@ -105,47 +117,67 @@ class AdaptiveSampling:
         """Mark the pixels that need more samples than these; returns how many there are."""
         if not job.covered:
             return 0
-        whole = Part(0, 0, *job.targets.size)
-        left = self._mark_unsettled(job, samples, taken, ("bent", "unsettled"), (CONTRAST, ERROR, MUCH_LOST), whole)
+        marked = [(("bent", "unsettled"), CONTRAST, MUCH_LOST, Part(0, 0, *job.targets.size))]
         if job.mirror is not None:
-            part, names = mirrored_part(job, job.mirror), ("mirrored", "mirror_unsettled")
-            left += self._mark_unsettled(job, samples, taken, names, (MIRROR_CONTRAST, MIRROR_ERROR, MIRROR_LOST), part)
+            part = mirrored_part(job, job.mirror)
+            marked.append((("mirrored", "mirror_unsettled"), MIRROR_CONTRAST, MIRROR_LOST, part))
+        finer = min(16.0 / samples, 1.0) ** 0.5
+        values = {"samples": samples, "most": _most(samples), "first": taken == 1, "wanted": 0.0, "measures": 1}
+        own = [{**values, "contrast": finer * contrast, "much_lost": lost} for _, contrast, lost, _ in marked]
+        if taken == FIRST_LOOK:
+            found = []
+            for (names, *_, part), uniforms in zip(marked, own, strict=True):
+                self._mark(job, *names, part, uniforms)
+                found.append(read_floats(job.targets[names[1]], 0, 1).ravel())
+            self._wanted = wanted_samples(np.concatenate(found), samples)
+        left = 0
+        for (names, *_, part), uniforms in zip(marked, own, strict=True):
+            left += self._mark(job, *names, part, {**uniforms, "wanted": self._wanted, "measures": 0})
         return left
 
-    def _mark_unsettled(
-        self,
-        job: FrameJob,
-        samples: int,
-        taken: int,
-        names: tuple[str, str],
-        most: tuple[float, float, float],
-        part: Part,
-    ) -> int:
-        """Mark the pixels of a part whose range or standard error is larger than that, unless more light is lost."""
-        source, mask = (job.targets[name] for name in names)
-        mask.clear()
-        light, spread = source.color_attachments
+    def _mark(self, job: FrameJob, source: str, mask: str, part: Part, values: dict[str, float]) -> int:
+        """Mark pixels of a part of a target by the uniforms; returns how many there are."""
+        job.targets[mask].clear()
+        light, spread = job.targets[source].color_attachments
         average = job.targets["average"].color_attachments[0]
         self._unsettled.bind(bent_light=light, bent_spread=spread, average_light=average)
-        program = self._unsettled.program(MIRROR=names[0] == "mirrored")
-        finer = min(16.0 / samples, 1.0) ** 0.5
-        values = {"samples": samples, "contrast": most[0] * finer, "error": most[1] * finer, "first": taken == 1}
-        values["much_lost"] = most[2]
+        program = self._unsettled.program(MIRROR=source == "mirrored")
         set_used(program, values)
         self._gl.enable_only(moderngl.NOTHING)
         with self._left:
-            self._unsettled.draw_part(part, program, mask)
+            self._unsettled.draw_part(part, program, job.targets[mask])
         return int(self._left.samples)
 
 
+def wanted_samples(deviations: Floats, samples: int) -> float:
+    """Samples of a pixel whose deviation is 1 where a picture has the error that so many of each pixel leave.
+
+    Parameters
+    ----------
+    deviations : array of float32
+        Standard deviation of a sample in each pixel; 0 where it is not known.
+    samples : int
+    """
+    found = deviations[deviations > 0].astype(np.float64)
+    if not found.size:
+        return 0.0
+    # Looks are at powers of two, the next of which is on average by the root of 2 more than what is wanted.
+    return float(samples * np.sqrt(0.5 * (found ** (2 / 3)).sum() / np.square(found).sum()))
+
+
+def _most(samples: int) -> int:
+    """Samples of a pixel at most."""
+    return MORE * samples if samples > FIRST_LOOK else samples
+
+
 def is_adaptive(job: FrameJob, samples: int) -> bool:
-    """True if rays need not be traced for every sample of a job: from smooth interfaces alone, and not from the eye."""
+    """True if rays need not be traced for every sample of a job: not from the eye, nor where a denoiser follows."""
     surfaces = [body.surface for body in job.scene.bodies if body.surface is not None]
     return (
         samples >= FEW_SAMPLES
         and job.features.last_pass == PassName.TRACED
         and not any(interior_at_eye(job))
-        and not any(surface.roughness > 0 for surface in surfaces)
+        and not (job.plan.request.denoise and any(surface.roughness > 0 for surface in surfaces))
     )
 
 
@@ -174,10 +206,15 @@ def traced_samples(job: FrameJob) -> float:
 
 
 def _central_first(samples: int) -> list[tuple[float, float]]:
-    """Sub-pixel shifts of the samples, the most central first: where surroundings are smooth, it is the only one."""
-    shifts = sample_shifts(samples)
+    """Sub-pixel shifts of the samples, the most central first: where surroundings are smooth, it is the only one.
+
+    Those of the pixels that take more follow, whose mean is in the middle, too.
+    """
+    shifts, more = sample_shifts(samples), sobol_points(_most(samples))[samples:]
     nearest = int(np.argmin(np.square(shifts).sum(axis=1)))
     shifts[[0, nearest]] = shifts[[nearest, 0]]
+    if len(more):
+        shifts = np.concatenate([shifts, more - more.mean(axis=0)])
     return [(right, down) for right, down in shifts.tolist()]
 
 

@@ -73,9 +73,9 @@ FORMATS = {
     "bent": Format((4, 4), with_depth=True),
     # The same of the light that bodies add to what a ground mirrors, in samples that hit no interface.
     "mirrored": Format((4, 4), with_depth=True),
-    # R8: pixels that need more samples.
-    "unsettled": Format((-1,)),
-    "mirror_unsettled": Format((-1,)),
+    # R32F: pixels that need more samples, with the standard deviation of a sample.
+    "unsettled": Format((1,)),
+    "mirror_unsettled": Format((1,)),
     # RGBA32F radiance of opaque surfaces, the mean of all samples, and the fraction of the pixel that they fill.
     "opaque_mean": Format((4,)),
     # RGBA32F means of random paths and how many were lost, and sums of squared differences from the means.

@@ -21,5 +21,5 @@ class Flags:
 
     adaptive: bool = _flag(
         True,
-        "Trace rays from smooth interfaces for as many samples as change the picture, or for all. Default: --adaptive.",
+        "Trace rays in each pixel for as many samples as change the picture, or for all. Default: --adaptive.",
     )
