@@ -23,7 +23,7 @@ def test_no_error_is_larger_than_the_notes_say(one: Case, renderer: tl.Renderer)
     """The largest percentage in the notes is that of what is left out."""
     scene, size = one.scene((0, 0)), (one.compared, one.compared)
     truth = CaseTruth.of_paths(scene, stored_truth(one.name, scene))
-    frame = renderer.render(scene, size)
+    frame = renderer.render(scene, size, shadows=tl.ShadowMaps(256))
     found = truth.light_errors(frame, None)
     assert found is not None
     off = max(found.block, *map(abs, found.bias))

@@ -27,7 +27,7 @@ def light_left(renderer: tl.Renderer, mesh: tl.Mesh, *, directions: int = 256, *
     """(h, w): fraction of the light that is left beside an opaque body, and points of the ground (h, w, 3)."""
     black = tl.Medium(absorption=(1e4, 1e4, 1e4))
     scene = tl.Scene([tl.Object(mesh, black), GROUND], ABOVE, [], EVEN, environment_shadows=directions)
-    frame = renderer.render(scene, SIZE, **options)
+    frame = renderer.render(scene, SIZE, **{"shadows": tl.ShadowMaps(512)} | options)
     origins, _ = ABOVE.rays(SIZE)
     points = np.broadcast_to(origins * (1.0, 0.0, 1.0), (*SIZE, 3))
     return np.where(frame.coverage, np.nan, frame.radiance.mean(axis=-1)), points
@@ -54,7 +54,7 @@ def test_a_ball_takes_its_solid_angle(renderer: tl.Renderer) -> None:
 
 def test_a_wall_takes_what_lambert_says(renderer: tl.Renderer) -> None:
     """A long wall takes (1 - cos(e)) / 2 of the irradiance, up to the elevation e of its upper edge."""
-    found, points = light_left(renderer, Box((-40, 0.001, -1.0), (40, 2.0, -0.9)).tessellate())
+    found, points = light_left(renderer, Box((-40, 0.001, -1.0), (40, 2.0, -0.9)).tessellate(), shadows=tl.ShadowMaps())
     beside = points[..., 2] + 0.9
     truth = np.where(beside > 0.05, 0.5 + 0.5 * beside / np.hypot(beside, 2.0), np.nan)
     rms, worst = errors_of(found, truth)

@@ -211,7 +211,7 @@ def shells(count: int) -> tl.Scene:
 
 def test_a_hundred_nested_shells(renderer: tl.Renderer) -> None:
     """Lists and buffers hold them at once; peeling holds no more than a batch, whatever their number."""
-    scene, size = shells(100), (48, 36)
+    scene, size = shells(100), (24, 18)
     for method in (tl.FragmentLists(), tl.KBuffer(k=200)):
         frame = assert_equal_to_reference(renderer, scene, size, method)
         assert frame.layers.max() == 200
@@ -228,7 +228,7 @@ def test_a_hundred_nested_shells(renderer: tl.Renderer) -> None:
     ids=str,
 )
 def test_more_layers_than_asked_for_are_marked_not_wrong(renderer: tl.Renderer, method: Any) -> None:
-    scene, size = shells(100), (48, 36)
+    scene, size = shells(100), (24, 18)
     counts = references.hit_counts(scene, size)
     truth = references.render(scene, size)
     with pytest.warns(tl.TranslucentWarning, match="more than 8 surfaces are marked invalid"):

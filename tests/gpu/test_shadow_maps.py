@@ -284,7 +284,8 @@ def test_32_directions_are_within_a_few_percent_of_256(renderer: tl.Renderer) ->
     """And errors fall faster than with the square root of the number of directions."""
     environment = tl.Environment.gradient((0.2, 0.2, 0.2), (1, 1, 1.2))
     shown = scene("two media and a stone", environment=environment)
-    many, *few = (renderer.render(replace(shown, environment_shadows=n), (48, 36)) for n in (256, 8, 32))
+    maps = tl.ShadowMaps(256)
+    many, *few = (renderer.render(replace(shown, environment_shadows=n), (48, 36), shadows=maps) for n in (256, 8, 32))
     floor = ~many.coverage
     coarse, fine = (
         np.sqrt(((frame.radiance - many.radiance)[floor] ** 2).mean()) / many.radiance[floor].mean() for frame in few
@@ -298,9 +299,9 @@ def test_few_of_the_directions_show_the_shadow_of_all(renderer: tl.Renderer) -> 
     scene = staged(tl.showcase(tl.load_mesh(mesh_path("bear")), tl.Medium((50.0, 20.0, 40.0)), stage="none"), "studio")
     assert scene.environment_shadows == 128
     every, eight, four = (
-        renderer.render(scene, (96, 96), shadows=tl.ShadowMaps(directions=count)).radiance for count in (None, 8, 4)
+        renderer.render(scene, (64, 64), shadows=tl.ShadowMaps(512, count)).radiance for count in (None, 8, 4)
     )
-    none = renderer.render(replace(scene, environment_shadows=0), (96, 96)).radiance
+    none = renderer.render(replace(scene, environment_shadows=0), (64, 64)).radiance
     errors = [np.sqrt(((found - every) ** 2).mean()) / every.mean() for found in (eight, four, none)]
     assert max(errors[:2]) < 0.02
     assert max(errors[:2]) < 0.8 * errors[2]

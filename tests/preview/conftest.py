@@ -12,8 +12,10 @@ from pathlib import Path
 import pytest
 
 from tests.preview.waiting import SIZE, environment, wait
+from translucent.planning.scattering import Diffusion
 from translucent.preview import worker
 from translucent.preview.document import Display, Document, Model
+from translucent.preview.quality import StepTimes
 from translucent.preview.worker import Pool
 from translucent.preview.workspace import Workspace
 
@@ -31,6 +33,14 @@ def pool() -> Iterator[Pool]:
     made = Pool()
     yield made
     made.close()
+
+
+@pytest.fixture
+def quick_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures at rest are drawn in one step, and not in up to 256; light diffuses in cells of a 16th of a body."""
+    monkeypatch.setattr(StepTimes, "stride", lambda *_: 1)
+    # What `checked` has wrapped: the wrapper has no defaults.
+    monkeypatch.setattr(Diffusion.__init__.__wrapped__, "__defaults__", (16,))  # type: ignore[attr-defined]
 
 
 @pytest.fixture

@@ -27,7 +27,6 @@ from translucent.planning.passes import PassName
 from translucent.preview import preparation
 from translucent.preview.actions import ChoosePreset, SetField
 from translucent.preview.preparation import Compiled, Compiler, stand_in
-from translucent.preview.quality import StepTimes
 from translucent.preview.tasks import Task
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.worker import Pool
@@ -50,7 +49,7 @@ METHODS = (
 
 
 @pytest.fixture
-def view(work: Workspace) -> Iterator[ViewportRenderer]:
+def view(work: Workspace, quick_pictures: None) -> Iterator[ViewportRenderer]:
     made = ViewportRenderer(compiler=work.compiler)
     yield made
     made.close()
@@ -289,7 +288,6 @@ def test_a_frame_that_takes_too_long_goes_on_in_the_next_one(
     finish(view, work)
     wait(work, lambda: work.compiler.budget.postpones and work.compiler.lane.task is None)
     view.budget = 0.0
-    monkeypatch.setattr(StepTimes, "stride", lambda *_: 1)  # not 256 steps for a picture: what is made is the same
     made: list[bool] = []
     draw = view._draw
 

@@ -29,7 +29,7 @@ from translucent.preview.workspace import Workspace
 
 
 @pytest.fixture
-def view() -> Iterator[ViewportRenderer]:
+def view(quick_pictures: None) -> Iterator[ViewportRenderer]:
     made = ViewportRenderer()
     yield made
     made.close()

@@ -6,7 +6,6 @@ light in both directions.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,10 +87,11 @@ def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> Landed
         for source in scene.lights:
             points = parts_of(source)
             each = max(photons // len(points), 1)
-            for point, first in itertools.product(points, range(0, each, BENT_BATCH)):
-                some = np.arange(first, min(first + BENT_BATCH, each))
-                rays, power = _emitted(scene, point, some, each, rng)
-                parts.append(paths.land(rays, power))
+            emitted = [_emitted(scene, point, each, rng) for point in points]
+            rays, power = Rays.joined([of for of, _ in emitted]), np.concatenate([of for _, of in emitted])
+            for first in range(0, len(rays), BENT_BATCH):
+                some = slice(first, first + BENT_BATCH)
+                parts.append(paths.land(rays.where(some), power[some]))
     return _joined(parts)
 
 
@@ -142,8 +142,9 @@ class PhotonPaths(InterfacePaths):
         return none
 
 
-def _emitted(scene: Scene, light: Light, some: Integers, photons: int, rng: np.random.Generator) -> tuple[Rays, Array]:
-    """Rays of `some` photons of a light towards the ball around all bodies, and their power (k, 3)."""
+def _emitted(scene: Scene, light: Light, photons: int, rng: np.random.Generator) -> tuple[Rays, Array]:
+    """Rays of a light's photons towards the ball around all bodies, and their power (k, 3)."""
+    some = np.arange(photons)
     points = np.concatenate([body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3] for body in scene.bodies])
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     radius = float(np.linalg.norm(points - middle, axis=1).max()) * (1.0 + 1e-9)
