@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from translucent.arguments import brief, checked, checked_but
+from translucent.arrays import Floats
 from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.extras import require_package
 from translucent.formulas.tone import tone_curve
@@ -43,6 +44,9 @@ if TYPE_CHECKING:
 
 #: Backends that a user may ask for.
 BACKENDS = (*get_args(Backend), "cpu")
+
+#: Samples of the picture that helps to denoise random paths: its time is small beside theirs.
+GUIDE_SAMPLES = 16
 
 
 @checked
@@ -191,7 +195,8 @@ class Renderer:
         denoise : bool
             Take the noise of random paths, and of rough interfaces and what they mirror, out of the picture by Open
             Image Denoise (the extra ``denoise``). Such a picture has no standard error, and no known one: its plan and
-            its provenance say so. What has no noise stays as it is.
+            its provenance say so. What has no noise stays as it is. For paths in media that scatter, a picture by
+            diffusion is rendered as well, and helps.
         progress : callable, optional
             Takes the share of the work that is done, 0 to 1; with OpenGL.
 
@@ -258,9 +263,16 @@ class Renderer:
         if not request.over_backdrop:  # such a scene is not all that is seen
             frame = frame.rendered_from(scene, plan)
         if request.denoise and plan.has_noise:
-            frame = denoised(frame, plan.scene)
+            frame = denoised(frame, plan.scene, self._guide(scene, size, plan))
         _warn(frame)
         return frame
+
+    def _guide(self, scene: Scene, size: tuple[int, int], plan: RenderPlan) -> Floats | None:
+        """Radiance without noise that helps to denoise random paths in media that scatter; None for other pictures."""
+        if plan.paths is None or not any(body.medium.scatters for body in scene.bodies if body.medium):
+            return None
+        request = dataclasses.replace(plan.request, method=None, denoise=False, samples=GUIDE_SAMPLES)
+        return self._run(self.plan_requested(scene, request), size, None).radiance
 
     def _run(self, plan: RenderPlan, size: tuple[int, int], progress: Callable[[float], None] | None) -> Frame:
         engine = self._engine

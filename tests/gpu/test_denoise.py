@@ -82,6 +82,20 @@ def test_paths_have_a_third_of_the_error_and_no_standard_error(frosted: tl.Scene
     assert clean.scene is not None
 
 
+def test_light_that_diffuses_guides_paths_in_media(coarse_light: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pyoidn", reason="the extra denoise is not installed")
+    mesh = Sphere(radius=0.02).tessellate(32)
+    jade = scene(tl.Object(mesh, tl.scattering_medium((0.07, 0.34, 0.17), 0.003, ior=1.6)))
+    with tl.Renderer() as renderer:
+        truth = renderer.render(jade, (32, 32), tl.PathTraced(1024)).radiance
+        guided = renderer.render(jade, (32, 32), tl.PathTraced(16), denoise=True)
+        monkeypatch.setattr(renderer, "_guide", lambda *_: None)
+        alone = renderer.render(jade, (32, 32), tl.PathTraced(16), denoise=True)
+    inside = tl.interior(guided.coverage)
+    errors = [np.sqrt(np.mean((one.radiance - truth)[inside] ** 2)) for one in (guided, alone)]
+    assert errors[0] < 0.7 * errors[1]
+
+
 def test_what_has_no_noise_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyoidn", type(sys)("pyoidn"))  # which nothing calls
     glass = scene(tl.Object(tl.load_mesh(mesh_path("bear")), GLASS))

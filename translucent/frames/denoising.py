@@ -3,6 +3,10 @@
 A denoiser blurs across what it takes for noise and keeps edges of its features: the albedo and the normal at each
 pixel. Renderers commonly give those of the first surface, which for glass say nothing of what is behind it. Here rays
 go on through smooth interfaces of clear media, up to the first surface that scatters light in many directions.
+
+Of light that media scatter, random paths have much noise, and no feature shows it. There another picture helps, by
+diffusion, without noise: paths are divided by it, and the denoised quotient multiplied by it again. Such demodulation
+is common for the albedo of surfaces (Bako et al. 2017).
 """
 
 from __future__ import annotations
@@ -26,12 +30,22 @@ FEATURE_SAMPLES, MOST_INTERFACES = 8, 8
 #: Roughness up to which an interface shows what is behind it, and not a blur of that.
 CLEAR = 0.05
 
+#: Radiance below which a guide does not divide, as a fraction of its mean.
+DARKEST_GUIDE = 1e-3
+
 #: Albedo of bodies that scatter light, and of rough interfaces: what they show has no color of its own.
 SCATTERED_ALBEDO = 0.8
 
 
-def denoised(frame: Frame, scene: Scene) -> Frame:
+def denoised(frame: Frame, scene: Scene, guide: Floats | None = None) -> Frame:
     """Frame with its radiance denoised, and without a standard error: of what a network makes, none is known.
+
+    Parameters
+    ----------
+    frame : Frame
+    scene : Scene
+    guide : (h, w, 3) float32, optional
+        See `denoised_radiance`.
 
     Raises
     ------
@@ -40,7 +54,7 @@ def denoised(frame: Frame, scene: Scene) -> Frame:
     """
     oidn = require_package("pyoidn", "denoise", "render with more samples")
     began = time.perf_counter()
-    made = denoised_radiance(frame.radiance, scene)
+    made = denoised_radiance(frame.radiance, scene, guide)
     library, binding = oidn.version.oidn_version, version("pyoidn")
     provenance = {**frame.provenance, "denoiser": f"Open Image Denoise {library} (pyoidn {binding})"}
     seconds = {**frame.seconds, "denoise": time.perf_counter() - began}
@@ -49,8 +63,16 @@ def denoised(frame: Frame, scene: Scene) -> Frame:
     )
 
 
-def denoised_radiance(radiance: Floats, scene: Scene) -> Floats:
+def denoised_radiance(radiance: Floats, scene: Scene, guide: Floats | None = None) -> Floats:
     """Radiance (h, w, 3) of a scene without its noise.
+
+    Parameters
+    ----------
+    radiance : (h, w, 3) float32
+    scene : Scene
+    guide : (h, w, 3) float32, optional
+        Radiance of the scene by another method that has hardly any noise. What the other method has wrong over many
+        pixels does not stay in the picture.
 
     Raises
     ------
@@ -60,7 +82,12 @@ def denoised_radiance(radiance: Floats, scene: Scene) -> Floats:
     oidn = require_package("pyoidn", "denoise", "render with more samples")
     albedo, normals = features(scene, (radiance.shape[1], radiance.shape[0]))
     radiance = np.ascontiguousarray(np.maximum(radiance, 0.0), dtype=np.float32)
-    made = oidn.denoise(radiance, albedo, normals, hdr=True)
+    if guide is None:
+        made = oidn.denoise(radiance, albedo, normals, hdr=True)
+    else:
+        floor = max(DARKEST_GUIDE * float(guide.mean()), float(np.finfo(np.float32).tiny))
+        divisor = np.maximum(guide, floor).astype(np.float32)
+        made = divisor * oidn.denoise(radiance / divisor, albedo, normals, hdr=True, clean_aux=True)
     return np.where(np.isfinite(made).all(axis=-1, keepdims=True), made, radiance)
 
 
