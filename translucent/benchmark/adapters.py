@@ -26,8 +26,8 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.bench.experiment import one_line
-from translucent.benchmark.browser import BABYLON, THREE, WebRenderer, open_page
-from translucent.benchmark.export import export_scene
+from translucent.benchmark.browser import BABYLON, FILAMENT, MODEL_VIEWER, THREE, WebRenderer, open_page
+from translucent.benchmark.export import export_scene, mean_chord
 from translucent.benchmark.results import (
     Results,
     SceneResult,
@@ -44,6 +44,7 @@ from translucent.errors import InputError, RenderError
 from translucent.files.images import read_exr
 from translucent.files.paths import make_folder
 from translucent.interop.mitsuba import to_mitsuba
+from translucent.interop.pyrender import load_pyrender
 from translucent.planning.interfaces import FrontInterface, ScreenInterfaces
 from translucent.planning.methods import BackFaceDepth, PathTraced, RayMarched, ThinLayer
 from translucent.planning.scattering import ScatteringLayer, SingleScattering
@@ -51,6 +52,10 @@ from translucent.renderer import Renderer
 from translucent.version import VERSION
 
 ALL: frozenset[Feature] = frozenset(FEATURES)
+
+
+class SceneNotSupportedError(Exception):
+    """A scene that a renderer lacks words or features for; the message says which. It is not counted as a failure."""
 
 
 class Rendered(NamedTuple):
@@ -143,7 +148,7 @@ def _drawn(adapter: Adapter, session: Session, scene: BenchmarkScene, temporary:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             rendered = session.draw(scene, export_scene(scene, temporary / scene.name))
-    except NotImplementedError as error:
+    except SceneNotSupportedError as error:
         return SceneResult(lacking=str(error))
     except Exception as error:  # noqa: BLE001 - one scene that fails leaves the others alone
         return SceneResult(failure=one_line(error))
@@ -210,7 +215,8 @@ def _mitsuba(paths: int) -> Adapter:
             try:
                 described = to_mitsuba(scene.make(), scene.size, folder, samples=paths)
             except InputError as error:
-                raise NotImplementedError(str(error)) from None
+                raise SceneNotSupportedError(str(error)) from None
+            described["sensor"]["far_clip"] = 1e9  # a scene is 2000 m away
             loaded = mitsuba.load_dict(described)
             np.array(mitsuba.render(loaded, seed=1))  # compiles
             begin = time.perf_counter()
@@ -314,7 +320,7 @@ def _gvxr() -> Adapter:
         def draw(scene: BenchmarkScene, _: Path) -> Rendered:
             made = scene.make()
             if not scene.thickness or made.overlap != "add":
-                raise NotImplementedError("it has thickness alone, no light")
+                raise SceneNotSupportedError("it has thickness alone, no light")
             camera, (width, height) = made.camera, scene.size
             reach = float((made.boxes.reshape(-1, 3) - camera.eye @ np.eye(3)).dot(camera.forward).max())
             away = 1.05 * reach
@@ -349,6 +355,62 @@ def _gvxr() -> Adapter:
 
     settings = "L-buffer of each body, one ray for each pixel"
     return Adapter("gvxr", "gVirtualXRay", settings, frozenset({"absorption"}), missing, start)
+
+
+# --- pyrender: alpha blending -----------------------------------------------------------------------------------------
+
+
+def _pyrender() -> Adapter:
+    """The rasterizer pyrender: each body with one opacity and one glow, so that white behind it has its color."""
+
+    def missing() -> str:
+        found = importlib.util.find_spec("pyrender") is not None
+        return "" if found else "pyrender is not installed; pip install pyrender"
+
+    @contextmanager
+    def start() -> Iterator[Session]:
+        pyrender: Any = load_pyrender("egl")
+
+        def draw(scene: BenchmarkScene, _: Path) -> Rendered:
+            made = scene.make()
+            if made.environment.kind != "constant" or made.opaque:
+                raise SceneNotSupportedError("its background has one color, and bodies do not change other objects")
+            drawn = pyrender.Scene(bg_color=np.ones(4), ambient_light=np.zeros(3))
+            for item in made.bodies:
+                assert item.medium is not None
+                # It blends values that are encoded by 1 / 2.2.
+                passed = np.exp(-np.asarray(item.medium.extinction) * mean_chord(item) / 2.2)
+                alpha = 1 - float(passed.min())
+                glow = ((passed - passed.min()) / alpha) ** 2.2
+                material = pyrender.MetallicRoughnessMaterial(
+                    baseColorFactor=[0.0, 0.0, 0.0, alpha],
+                    emissiveFactor=glow,
+                    metallicFactor=0.0,
+                    alphaMode="BLEND",
+                )
+                corners = item.mesh.vertices[item.mesh.faces] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+                normals = np.repeat(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), 3, axis=0)
+                normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+                primitive = pyrender.Primitive(corners.reshape(-1, 3), normals, material=material)
+                drawn.add(pyrender.Mesh([primitive]))
+            camera = made.camera
+            reach = np.linalg.norm(made.boxes.reshape(-1, 3) - camera.eye, axis=1).max()
+            lens = pyrender.PerspectiveCamera(math.radians(camera.fov_y or 45.0), znear=0.1 * reach, zfar=2 * reach)
+            drawn.add(lens, pose=camera.pose)
+            parts = 4
+            renderer = pyrender.OffscreenRenderer(*(parts * side for side in scene.size))
+            renderer.render(drawn)
+            begin = time.perf_counter()
+            color, _depth = renderer.render(drawn)
+            seconds = time.perf_counter() - begin
+            linear = (color[..., :3] / 255.0) ** 2.2
+            width, height = scene.size
+            return Rendered(linear.reshape(height, parts, width, parts, 3).mean(axis=(1, 3)), seconds)
+
+        yield Session(draw, str(pyrender.__version__), "OpenGL")
+
+    settings = "alpha blending by the mean chord of each body, unlit, 8 bits, 16 samples"
+    return Adapter("pyrender", "pyrender", settings, frozenset({"absorption"}), missing, start)
 
 
 def _works(mitsuba: Any, variant: str) -> bool:
@@ -414,7 +476,20 @@ _ADAPTERS: tuple[Adapter, ...] = (
     _blender("eevee", 64, "Blender EEVEE", _SCREEN, _NOT_NESTED),
     _web(THREE, "three.js", "MeshPhysicalMaterial, PMREM, transmission at full resolution, 16 samples", _GLTF),
     _web(BABYLON, "Babylon.js", "PBR with sub-surface refraction, filtered environment, 16 samples", _GLTF),
+    _web(
+        MODEL_VIEWER,
+        "model-viewer",
+        "environment and skybox from .hdr, no tone mapping, no shadow of its own, 16 samples",
+        _GLTF - {"shadows"},
+    ),
+    _web(
+        FILAMENT,
+        "Filament",
+        "gltfio, refraction in screen space, GGX-filtered environment, 8 bits for radiance up to 4, 16 samples",
+        _GLTF,
+    ),
     _gvxr(),
+    _pyrender(),
     _mitsuba(16),
     _mitsuba(64),
 )

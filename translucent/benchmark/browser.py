@@ -174,3 +174,11 @@ THREE = WebRenderer(
     },
 )
 BABYLON = WebRenderer("babylon", {"@babylonjs/core/": "@babylonjs/core/", "@babylonjs/loaders/": "@babylonjs/loaders/"})
+MODEL_VIEWER = WebRenderer(
+    "model-viewer",
+    {
+        "@google/model-viewer": "@google/model-viewer/dist/model-viewer-module.min.js",
+        "three": "three/build/three.module.js",
+    },
+)
+FILAMENT = WebRenderer("filament", {"filament": "filament/filament.js", "gl-matrix": "gl-matrix/gl-matrix-min.js"})

@@ -1,12 +1,15 @@
 """Scenes of the benchmark as files that any renderer can read: a .glb, a .json with every number, and the surroundings.
 
 All vertices are in the world, in metres; y is up. What glTF has words for is in the .glb: absorption, index of
-refraction, roughness, the camera, lights. Nested bodies, scattering, emission and the surroundings are in the .json.
+refraction, roughness, thickness as a texture, the camera, lights. Nested bodies, scattering, emission and the
+surroundings are in the .json.
 """
 
 from __future__ import annotations
 
+import io
 import json
+import math
 import struct
 from collections.abc import Sequence
 from functools import partial
@@ -15,12 +18,16 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
 from translucent.arrays import Array
 from translucent.benchmark.scenes import FEATURES, SCENES, BenchmarkScene
 from translucent.files.images import write_exr
 from translucent.files.paths import OutputFiles, make_folder, write_text_atomically
+from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals
+from translucent.geometry.ray_caster import ray_caster_of
+from translucent.gltf.materials import VOLUME
 from translucent.gltf.write import volume_extensions
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight
@@ -28,6 +35,9 @@ from translucent.scene.scene import Object, Scene
 
 #: Version of the layout of what is written.
 FORMAT = "translucent benchmark scene 1"
+
+#: Rays for the thickness below a corner, and triangles of a body at whose corners it is measured, at least.
+_RAYS, _FEWEST = 33, 500
 
 #: Rows of a picture of all directions.
 ROWS = 64
@@ -114,6 +124,56 @@ def mean_chord(item: Object) -> float:
     return 4 * volume / float(np.linalg.norm(crosses, axis=1).sum() / 2)
 
 
+def corner_thickness(corners: Array) -> Array:
+    """(n, 3) thickness in metres below the corners (n, 3, 3) of the triangles of a body, for a thicknessTexture.
+
+    It is the median of the first stretch of `_RAYS` rays, distributed by the cosine to the face, as bakers measure
+    it. A mean would follow rays that run along a wall.
+    """
+    placed = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3))
+    inwards = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
+    inwards /= np.maximum(np.linalg.norm(inwards, axis=1, keepdims=True), 1e-30)
+    side = np.cross(inwards, np.eye(3)[np.abs(inwards).argmin(axis=1)])
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    other = np.cross(inwards, side)
+    origins = 0.9 * corners + 0.1 * corners.mean(axis=1, keepdims=True) + 1e-5 * placed.diagonal * inwards[:, None]
+    caster, found = ray_caster_of(placed), []
+    for k in range(_RAYS):
+        height, turn = np.sqrt((k + 0.5) / _RAYS), k * np.pi * (3 - np.sqrt(5))
+        flat = np.sqrt(1 - height**2)
+        direction = height * inwards + flat * (np.cos(turn) * side + np.sin(turn) * other)
+        faces, far = caster.nearest(origins.reshape(-1, 3), np.repeat(direction, 3, axis=0))
+        found.append(np.where(faces >= 0, far, 0.0))
+    return np.median(found, axis=0).reshape(-1, 3)
+
+
+def divided(values: Array) -> Array:
+    """Each triangle as four: values (n, 3, k) of their corners, (4 n, 3, k)."""
+    a, b, c = np.moveaxis(values, 1, 0)
+    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+    fours = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.concatenate([np.stack(four, axis=1) for four in fours])
+
+
+def thickness_texture(thickness: Array) -> tuple[bytes, Array]:
+    """PNG with thickness (n, 3) as green, as a fraction of the largest, and texture coordinates (n, 3, 2) of corners.
+
+    Each triangle has 2 x 2 texels. The fourth makes bilinear interpolation linear in the triangle.
+    """
+    across = math.ceil(math.sqrt(len(thickness)))
+    texels = np.zeros((across, 2, across, 2))
+    down, right = np.divmod(np.arange(len(thickness)), across)
+    a, b, c = np.moveaxis(thickness / max(float(thickness.max()), 1e-30), 1, 0)
+    for (y, x), value in zip(((0, 0), (0, 1), (1, 0), (1, 1)), (a, b, c, b + c - a), strict=True):
+        texels[down, y, right, x] = value
+    pixels = np.zeros((2 * across, 2 * across, 3), np.uint8)
+    pixels[..., 1] = np.round(255 * np.clip(texels.reshape(2 * across, 2 * across), 0, 1))
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, format="PNG")
+    first = (2 * np.stack([right, down], axis=-1) + 0.5)[:, None] / (2 * across)
+    return stream.getvalue(), first + np.array([(0, 0), (1, 0), (0, 1)]) / (2 * across)
+
+
 def described_scene(scene: BenchmarkScene, made: Scene) -> Json:
     """Contents of a scene.json."""
     camera = made.camera
@@ -177,27 +237,42 @@ def glb_of(made: Scene) -> bytes:
     accessors: list[Json] = []
     meshes: list[Json] = []
     materials: list[Json] = []
+    images: list[Json] = []
 
-    def add(values: npt.NDArray[np.float32], bounded: bool) -> int:
-        data = values.astype("<f4").tobytes()
-        views.append({"buffer": 0, "byteOffset": sum(map(len, parts)), "byteLength": len(data), "target": 34962})
-        parts.append(data)
-        told: Json = {"bufferView": len(views) - 1, "componentType": 5126, "count": len(values), "type": "VEC3"}
+    def view(data: bytes, **more: int) -> int:
+        views.append({"buffer": 0, "byteOffset": sum(map(len, parts)), "byteLength": len(data), **more})
+        parts.append(data + b"\0" * (-len(data) % 4))
+        return len(views) - 1
+
+    def add(values: npt.NDArray[np.float32], bounded: bool = False) -> int:
+        at = view(values.astype("<f4").tobytes(), target=34962)
+        told: Json = {"bufferView": at, "componentType": 5126, "count": len(values), "type": f"VEC{values.shape[-1]}"}
         if bounded:
             told |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         accessors.append(told)
         return len(accessors) - 1
 
     for item in made.objects:
-        corners = (item.mesh.vertices[item.mesh.faces] @ item.matrix[:3, :3].T + item.matrix[:3, 3]).astype(np.float32)
+        corners = item.mesh.vertices[item.mesh.faces] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
         normals = corner_normals(item.mesh) @ np.linalg.inv(item.matrix[:3, :3])
-        normals = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-30)
         if item.faces_inwards:
             corners, normals = corners[:, ::-1], normals[:, ::-1]
-        attributes = {"POSITION": add(corners.reshape(-1, 3), True)}
-        attributes["NORMAL"] = add(normals.reshape(-1, 3).astype(np.float32), False)
+        solid = item.medium is not None and item.sheet_thickness is None
+        while solid and len(corners) < _FEWEST:
+            corners, normals = divided(corners), divided(normals)
+        normals = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-30)
+        attributes = {"POSITION": add(corners.reshape(-1, 3).astype(np.float32), True)}
+        attributes["NORMAL"] = add(normals.reshape(-1, 3).astype(np.float32))
+        material = _gltf_material(item)
+        if solid:
+            thickness = corner_thickness(corners)
+            image, texels = thickness_texture(thickness)
+            attributes["TEXCOORD_0"] = add(texels.reshape(-1, 2).astype(np.float32))
+            volume = {"thicknessFactor": float(thickness.max()), "thicknessTexture": {"index": len(images)}}
+            material["extensions"][VOLUME] |= volume
+            images.append({"bufferView": view(image), "mimeType": "image/png"})
         meshes.append({"primitives": [{"attributes": attributes, "material": len(materials)}], "name": item.mesh.name})
-        materials.append(_gltf_material(item))
+        materials.append(material)
     nodes: list[Json] = [{"mesh": i, "name": f"object_{i}"} for i in range(len(meshes))]
     camera = made.camera
     far = 10 * float(np.linalg.norm(made.boxes.reshape(-1, 3) - camera.eye, axis=1).max())
@@ -212,6 +287,9 @@ def glb_of(made: Scene) -> bytes:
         "accessors": accessors,
         "bufferViews": views,
     }
+    if images:
+        content |= {"images": images, "textures": [{"source": i, "sampler": 0} for i in range(len(images))]}
+        content["samplers"] = [{"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071}]
     used = {name for material in materials for name in material.get("extensions", {})}
     if made.lights:
         lights, places = zip(*(_gltf_light(light) for light in made.lights), strict=True)

@@ -18,7 +18,7 @@ from PIL import Image
 
 from translucent.arrays import Array
 from translucent.benchmark.results import FLOOR, Results, SceneResult, picture_path, read_picture
-from translucent.benchmark.scenes import FEATURES, SCENES, BenchmarkScene
+from translucent.benchmark.scenes import FEATURES, SCENES, BenchmarkScene, promise_kept
 from translucent.benchmark.truth import AGREEING, TruthPicture, read_records, stored_truth_of, truth_path
 from translucent.errors import InputError
 from translucent.extras import install_command, require_package
@@ -33,6 +33,9 @@ WIDTH, HEIGHT, LEFT, BELOW = 460, 250, 56, 34
 
 #: Error that a heat map shows at its end, as a fraction of the truth's mean.
 HOTTEST = 0.5
+
+#: Name of the results whose promises the page judges, and with whose time others are compared.
+OURS = "translucent"
 
 #: Colors of renderers in drawings (Okabe and Ito 2008).
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c6bb1", "#6b6b6b", "#a6761d")
@@ -116,6 +119,26 @@ class ScenePart:
     rows: Sequence[PageRow]
     others: Sequence[tuple[str, str]]
     plot: str
+
+    @property
+    def ours(self) -> PageRow | None:
+        """Row of this toolkit as it chooses by itself."""
+        return next((row for row in self.rows if row.name == OURS and row.result.score is not None), None)
+
+    @property
+    def promise(self) -> str:
+        """What this toolkit promises, and whether it holds; empty without its row."""
+        row = self.ours
+        return "" if row is None or row.result.score is None else promise_kept(self.scene, row.result.score.block)
+
+    @property
+    def nearer(self) -> list[str]:
+        """Names of other renderers that are nearer to the truth than this toolkit in no more time."""
+        row = self.ours
+        if row is None or row.ratio is None:
+            return []
+        others = (one for one in self.rows if not one.name.startswith(OURS))
+        return [one.name for one in others if one.ratio and one.ratio <= row.ratio and one.nrmse < row.nrmse]
 
 
 def write_benchmark_page(results: Sequence[Results], path: Path) -> None:

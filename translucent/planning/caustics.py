@@ -235,11 +235,11 @@ def gathers_light(scene: Scene) -> bool:
     """True if clear bodies bend light of lights onto opaque objects, and photons are followed by OpenGL alone."""
     refused = [body for body in scene.bodies if body.density is not None or body.covers or body.sheet_thickness]
     scatters = any(body.medium is not None and body.medium.scatters for body in scene.bodies)
-    return bool(caustics_to_request(scene)) and not refused and not scatters
+    return bool(scene.lights and caustics_to_request(scene)) and not refused and not scatters
 
 
 def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
-    """Note on light that clear bodies gather in their shadows, which photons would show; empty without such light."""
+    """Note on light that clear bodies focus onto opaque objects; photons would show that of lights."""
     clear = [
         body
         for body in scene.bodies
@@ -249,8 +249,13 @@ def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
         and body.medium is not None
         and not body.medium.scatters
     ]
-    if not clear or not scene.lights or not scene.opaque:
+    if not clear or not scene.opaque:
         return ()
+    if not scene.lights:
+        if not scene.environment_shadows:
+            return ()
+        text = f"light of the environment that {object_names(clear)} focuses onto other objects: tl.PathTraced shows it"
+        return (Note(NoteKind.CAUSTICS, text),)
     text = (
         f"the bright spot in the shadow of {object_names(clear)}, several times as bright as the ground, and the dark "
         "around the spot: --caustics (tl.Caustics()) shows both"

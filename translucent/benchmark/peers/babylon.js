@@ -14,6 +14,7 @@ import "@babylonjs/core/Helpers/sceneHelpers.js";
 import "@babylonjs/core/Materials/PBR/pbrMaterial.js";
 import "@babylonjs/core/Engines/Extensions/engine.readTexture.js";
 import "@babylonjs/loaders/glTF/2.0/index.js";
+import { topDown } from "./pixels.js";
 
 const PARTS = 4;
 const canvas = document.getElementById("canvas");
@@ -70,14 +71,3 @@ window.drawScene = async ({ home, size }) => {
   scene.dispose();
   return { pixels: found, seconds };
 };
-
-// Base64 of RGB in float32, the top row first.
-function topDown(rgba, side) {
-  const rgb = new Float32Array(3 * side * side);
-  for (let y = 0; y < side; y++)
-    for (let x = 0; x < side; x++)
-      for (let c = 0; c < 3; c++) rgb[3 * (y * side + x) + c] = rgba[4 * ((side - 1 - y) * side + x) + c];
-  const bytes = new Uint8Array(rgb.buffer), parts = [];
-  for (let i = 0; i < bytes.length; i += 32768) parts.push(String.fromCharCode(...bytes.subarray(i, i + 32768)));
-  return btoa(parts.join(""));
-}

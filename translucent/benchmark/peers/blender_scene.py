@@ -26,8 +26,11 @@ def new_node(tree, kind, **values):
     return node
 
 
-def material_of(told, number):
-    """Glass or a transparent surface, and a volume with the coefficients of the medium; or a diffuse surface."""
+def material_of(told, number, engine):
+    """Glass or a transparent surface, and a volume with the coefficients of the medium; or a diffuse surface.
+
+    Rays that EEVEE refracts do not see volumes: its clear glass gets the color of the mean chord.
+    """
     material = bpy.data.materials.new(f"benchmark {number}")
     material.use_nodes = True
     tree = material.node_tree
@@ -46,6 +49,10 @@ def material_of(told, number):
         if hasattr(material, "use_raytrace_refraction"):
             material.use_raytrace_refraction = True  # EEVEE
     tree.links.new(surface.outputs[0], output.inputs["Surface"])
+    if engine == "eevee" and told["ior"] != 1.0 and not any(told["scattering"] + told["emission"]):
+        color = [math.exp(-each * told["mean_chord"]) for each in told["absorption"]]
+        surface.inputs["Color"].default_value = (*color, 1.0)
+        return material
     volume = tree.nodes.new("ShaderNodeVolumeCoefficients")
     for name, value in (("Absorption", "absorption"), ("Scatter", "scattering"), ("Emission", "emission")):
         volume.inputs[f"{name} Coefficients"].default_value = told[value]
@@ -66,7 +73,7 @@ def build(folder, engine, samples):
     for number, one in enumerate(told["objects"]):
         mesh = bpy.data.objects[f"object_{number}"]
         mesh.data.materials.clear()
-        mesh.data.materials.append(material_of(one, number))
+        mesh.data.materials.append(material_of(one, number, engine))
     for light in told["lights"]:
         add_light(scene, light)
     world = bpy.data.worlds.new("world")

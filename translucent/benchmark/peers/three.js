@@ -4,6 +4,7 @@
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { EXRLoader } from "three/addons/loaders/EXRLoader.js";
+import { topDown } from "./pixels.js";
 
 const PARTS = 4;
 const renderer = new THREE.WebGLRenderer({ canvas: document.getElementById("canvas"), antialias: false });
@@ -63,14 +64,3 @@ window.drawScene = async ({ home, size }) => {
   gltf.scene.traverse((item) => item.geometry?.dispose());
   return { pixels: topDown(pixels, side), seconds };
 };
-
-// Base64 of RGB in float32, the top row first.
-function topDown(rgba, side) {
-  const rgb = new Float32Array(3 * side * side);
-  for (let y = 0; y < side; y++)
-    for (let x = 0; x < side; x++)
-      for (let c = 0; c < 3; c++) rgb[3 * (y * side + x) + c] = rgba[4 * ((side - 1 - y) * side + x) + c];
-  const bytes = new Uint8Array(rgb.buffer), parts = [];
-  for (let i = 0; i < bytes.length; i += 32768) parts.push(String.fromCharCode(...bytes.subarray(i, i + 32768)));
-  return btoa(parts.join(""));
-}
