@@ -39,10 +39,10 @@ from translucent.bake.measure import Measure
 from translucent.bake.rays import Points, PreparedMesh
 from translucent.bake.record import parts_of, read_record
 from translucent.bake.settings import BakeSettings
-from translucent.cpu.threads import in_threads, processors
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.file import write_gltf
 from translucent.mesh_files import load_mesh
+from translucent.threads import in_threads, processors
 
 #: Rays that Embree alone traces in a round: enough for some seconds, and little memory.
 SAMPLE = 1 << 23

@@ -15,12 +15,12 @@ import numpy as np
 from translucent.assets import mesh_path
 from translucent.cpu.hits import Band, PictureRays, PixelTracer, TracedMesh
 from translucent.cpu.renderer import CpuRenderer
-from translucent.cpu.threads import in_threads, processors
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.ray_caster import BEFORE
 from translucent.mesh_files import load_mesh
 from translucent.planning.plan import plan
 from translucent.scene.showcase import showcase
+from translucent.threads import in_threads, processors
 
 
 def throughput(

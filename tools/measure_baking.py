@@ -30,7 +30,7 @@ from translucent.bake.atlas import unwrap
 from translucent.bake.measure import Measure
 from translucent.bake.rays import PreparedMesh
 from translucent.bake.settings import BakeSettings
-from translucent.cpu.threads import in_threads, processors
+from translucent.threads import in_threads, processors
 
 Array = npt.NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, get_args
 
-from translucent.cpu.threads import processors
 from translucent.errors import RenderError
 from translucent.geometry.ray_caster import embree_versions
 from translucent.gpu.context import Backend, NoContextError, open_context
 from translucent.gpu.targets import SHADER_STORAGE
+from translucent.threads import processors
 
 #: Optional packages, and the purpose of each.
 OPTIONAL = {

@@ -23,9 +23,8 @@ from translucent.files.reading import open_file, require_memory, require_room, s
 from translucent.geometry.foreign import foreign_name, foreign_parts, unit_of
 from translucent.geometry.mesh import PER_TRIANGLE, Mesh, Triangles, adopted, joined, mended
 from translucent.gltf.load import read_whole
-from translucent.model_size import scale_to
-from translucent.signals import import_trimesh
-from translucent.units import metres_per_unit
+from translucent.threads import import_trimesh
+from translucent.units import metres_per_unit, scale_to
 
 # Without a handler of its own, what trimesh logs of a damaged file is printed.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())

@@ -32,7 +32,6 @@ from translucent.media.conversion import CLAMP, clamp_colors
 from translucent.media.medium import Medium
 from translucent.media.presets import preset
 from translucent.mesh_files import load_mesh
-from translucent.model_size import scale_to
 from translucent.scene.camera import FRAMED_FROM, Camera, direction_from
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, Light, PointLight, SphereLight, SpotLight
@@ -41,7 +40,7 @@ from translucent.scene.showcase import LIGHT_TABLE, SOLID_IOR, default_medium, f
 from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, Stage, has_ground, stage_named, staged
 from translucent.scene.surface import Surface
 from translucent.scene.touching import with_priorities
-from translucent.units import metres_in, metres_per_unit
+from translucent.units import metres_in, metres_per_unit, scale_to
 
 #: Index of refraction of media that a scattering color makes: that of soap, wax, skin and milk is 1.33 to 1.5.
 SCATTERING_IOR = 1.4

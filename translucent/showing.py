@@ -29,7 +29,7 @@ from translucent.scene.scene import Scene
 from translucent.scene.showcase import filled, showcase, with_roughness
 from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, has_ground, staged
 from translucent.scene_files import is_composed, load_composed
-from translucent.signals import import_trimesh
+from translucent.threads import import_trimesh
 
 #: Size of the picture that pages and widgets frame.
 SIZE = (960, 720)

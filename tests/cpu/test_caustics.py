@@ -7,7 +7,7 @@ import pytest
 
 import translucent as tl
 from tests.ball_light import ball_parts
-from translucent.cpu.shading import CausticLight
+from translucent.cpu.renderer import CausticLight
 from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.solids import Box, Sphere
 

@@ -10,8 +10,7 @@ import pytest
 import translucent as tl
 from translucent.arrays import Array
 from translucent.assets import mesh_path
-from translucent.cpu.renderer import CpuRenderer
-from translucent.cpu.shading import EmbreeLightPaths
+from translucent.cpu.renderer import CpuRenderer, EmbreeLightPaths
 from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.solids import Box, Sphere
 from translucent.reference.light_paths import LightPaths, SurfaceLight

@@ -16,9 +16,9 @@ import pytest
 import translucent as tl
 from tests.solids import Box, Solid, Sphere, Torus
 from tools.cpu_throughput import throughput
-from translucent.cpu import hits, ray_tree, shading
-from translucent.cpu import shading as light_paths
-from translucent.cpu import threads as pool
+from translucent import threads as pool
+from translucent.cpu import hits, ray_tree
+from translucent.cpu import renderer as own
 from translucent.cpu.renderer import CpuRenderer
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import ARRAYS
@@ -133,7 +133,7 @@ def test_threads_and_pieces_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None
     scene = SCENES["opaque"]
     alone = frame_of(scene, samples=2, threads=1)
     monkeypatch.setattr(hits, "BAND", 100)
-    monkeypatch.setattr(shading, "SURFACES", 64)
+    monkeypatch.setattr(own, "SURFACES", 64)
     for threads in (1, 5):
         frame = frame_of(scene, samples=2, threads=threads)
         for name in ARRAYS:
@@ -141,9 +141,7 @@ def test_threads_and_pieces_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal to one thread")
-@pytest.mark.parametrize(
-    ("where", "method"), [(light_paths._EmbreeObject, "_candidates"), (ray_tree._Growth, "_correct")]
-)
+@pytest.mark.parametrize(("where", "method"), [(own._EmbreeObject, "_candidates"), (ray_tree._Growth, "_correct")])
 def test_ctrl_c_ends_the_threads_within_a_picture(monkeypatch: pytest.MonkeyPatch, where: type, method: str) -> None:
     """Its step of the work is not begun again once the picture has been interrupted."""
     real: Callable[..., Any] = getattr(where, method)

@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent import signals as deferrals
+from translucent import threads as deferrals
 from translucent.geometry.solids import Sphere
 from translucent.gpu import context as contexts
 from translucent.gpu import pass_costs as timers
 from translucent.gpu import renderer as renderers
-from translucent.signals import DeferredSignals
+from translucent.threads import DeferredSignals
 
 SIZE = (12, 8)
 MEDIUM = tl.Medium(absorption=(1, 2, 3))

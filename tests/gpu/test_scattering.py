@@ -14,7 +14,7 @@ from translucent.assets import mesh_path
 from translucent.formulas.phase import ISOTROPIC
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes.light_views import LightViewsPass
-from translucent.reference.phase import phase_value
+from translucent.reference.volume import phase_value
 
 BLACK = tl.Environment.constant((0.0, 0.0, 0.0))
 LIGHTS = {

@@ -16,7 +16,7 @@ from translucent.geometry.solids import Box, Torus
 from translucent.media.density import Density, DensityGrid, LinearDensity
 from translucent.media.medium import Medium
 from translucent.reference import path_trace, render
-from translucent.reference.phase import henyey_greenstein_cosine, scattered_directions
+from translucent.reference.volume import henyey_greenstein_cosine, scattered_directions
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight

@@ -13,8 +13,8 @@ from scipy.special import expn
 
 import translucent as tl
 from translucent.formulas import optics
-from translucent.formulas.card import reflectance_on_card
 from translucent.formulas.diffuse_interface import diffuse_interface, half_space_reflectance
+from translucent.formulas.slab import reflectance_on_card
 from translucent.media.preset import CARDS, SLABS
 from translucent.reference import slabs
 

@@ -10,8 +10,8 @@ import pytest
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.geometry.solids import Box
-from translucent.model_size import likely_unit, size_note
 from translucent.planning.passes import Note, NoteKind
+from translucent.units import likely_unit, size_note
 
 BOX = Box((0, 0, 0), (1, 2, 1)).tessellate()
 

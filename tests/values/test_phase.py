@@ -21,7 +21,7 @@ from translucent.formulas.phase import (
     phase_after_scattering,
     phase_cosine,
 )
-from translucent.reference import phase as reference
+from translucent.reference import volume as reference
 
 EPS = float(np.finfo(np.float64).eps)
 

@@ -20,12 +20,12 @@ from translucent.bake.rays import PreparedMesh
 from translucent.bake.settings import BakeSettings, settings_from
 from translucent.bake.strips import Canvas, Checkpoint, Progress, Projection, Strips, bake_key, bake_strips, in_order
 from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
-from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentWarning
 from translucent.files.paths import require_output
 from translucent.geometry.grouping import position_ids
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_angles
+from translucent.threads import processors
 
 #: Fraction of the surface that may have no texel of its own before a warning, and how many texels per face a map
 #: has that could show all.

@@ -43,13 +43,13 @@ from translucent.bake.jobs import (
 )
 from translucent.bake.record import Record, add_record, files_of, parts_of, read_record
 from translucent.bake.thickness_map import ThicknessMap, add_map, shared
-from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentError
 from translucent.files.paths import OutputFiles
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.file import read_gltf
 from translucent.media.medium import Medium
 from translucent.mesh_files import load_mesh
+from translucent.threads import processors
 from translucent.units import metres_per_unit
 from translucent.version import VERSION
 

@@ -47,7 +47,7 @@ from translucent.media.medium import Medium
 from translucent.planning.plan import plan
 from translucent.scene.camera import Camera
 from translucent.scene.showcase import showcase
-from translucent.signals import import_trimesh
+from translucent.threads import import_trimesh
 from translucent.units import metres_per_unit
 
 if TYPE_CHECKING:

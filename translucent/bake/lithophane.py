@@ -26,7 +26,7 @@ from translucent.renderer import Renderer
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene
-from translucent.signals import import_trimesh
+from translucent.threads import import_trimesh
 
 #: Largest number of points of a relief.
 MOST_POINTS = 4_000_000

@@ -63,7 +63,7 @@ from translucent.files.reading import open_file, read_bytes
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.file import GltfFile, fill_gltf, write_gltf
 from translucent.media.medium import Medium
-from translucent.signals import import_trimesh
+from translucent.threads import import_trimesh
 
 MAP_SUFFIXES = (".exr", ".png", ".npy", ".npz", ".glb")
 VERTEX_SUFFIXES = (".ply", ".glb", ".npy")

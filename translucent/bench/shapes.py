@@ -15,7 +15,7 @@ from translucent.geometry.solids import Box, Ellipsoid, Sphere, Torus
 from translucent.media.medium import Medium
 from translucent.mesh_files import load_mesh
 from translucent.scene.scene import Object
-from translucent.signals import import_trimesh
+from translucent.threads import import_trimesh
 
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]

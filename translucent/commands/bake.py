@@ -40,7 +40,7 @@ from translucent.commands.options import (
 )
 from translucent.errors import InputError, RenderError, TranslucentError, printable
 from translucent.extras import require_package
-from translucent.model_size import size_note
+from translucent.units import size_note
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -23,7 +23,7 @@ from translucent.commands.options import (
     takes,
 )
 from translucent.errors import TranslucentError
-from translucent.model_size import size_note, tall
+from translucent.units import size_note, tall
 
 if TYPE_CHECKING:
     from translucent.geometry.mesh import Mesh

@@ -29,7 +29,7 @@ from translucent.commands.options import (
     with_options,
 )
 from translucent.errors import InputError
-from translucent.model_size import scale_to, size_note, tall
+from translucent.units import scale_to, size_note, tall
 
 if TYPE_CHECKING:
     from translucent.arrays import Array

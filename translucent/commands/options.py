@@ -571,7 +571,7 @@ class ChoiceOptions:
         help="With --interfaces traced: how often both the reflected and the refracted ray are followed. Default: 2.",
     )
     interface_hits: str | None = option(
-        type=NamesOf("translucent.planning.hits", "HITS"),
+        type=NamesOf("translucent.planning.methods.base", "HITS"),
         help="With --interfaces traced: ray caster that finds the surfaces that rays hit, Embree or shaders (gl). "
         "Default: "
         "Embree if OpenGL is a software rasterizer.",

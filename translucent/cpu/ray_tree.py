@@ -28,7 +28,6 @@ from translucent.cpu.interior_list import (
     leave,
 )
 from translucent.cpu.surroundings import Surroundings, first_footprints, moved_on, split_footprints
-from translucent.cpu.threads import end_if_stopped
 from translucent.diffusion.field import DiffusionField
 from translucent.diffusion.interfaces import InterfaceTable
 from translucent.formulas import optics
@@ -41,6 +40,7 @@ from translucent.reference.intervals import Intervals
 from translucent.reference.light_paths import SurfaceLight, direction_and_distance
 from translucent.reference.surfaces import OpaqueHits, reflected_radiance, scene_crossings
 from translucent.reference.volume import Volume, volume_segments
+from translucent.threads import end_if_stopped
 
 
 class SegmentMedia:

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask, expanded
-from translucent.diffusion.escape import EscapePaths
+from translucent.diffusion.interfaces import EscapePaths
 from translucent.diffusion.voxels import Voxels, cut_cells, voxels, without
 from translucent.formulas import optics
 from translucent.geometry.mesh import Mesh, Triangles, joined

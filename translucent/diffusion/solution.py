@@ -25,7 +25,6 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from translucent.arrays import Array, Integers
 from translucent.diffusion.densities import Densities, even_densities
-from translucent.diffusion.escape import scattered_escape
 from translucent.diffusion.first_events import (
     EnteringRays,
     EntryPaths,
@@ -37,6 +36,7 @@ from translucent.diffusion.first_events import (
     scattered_fractions,
 )
 from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.interfaces import scattered_escape
 from translucent.diffusion.walls import SlabSolution, Walls
 from translucent.errors import RenderError
 from translucent.formulas import optics

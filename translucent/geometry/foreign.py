@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
-from translucent.signals import import_trimesh
+from translucent.threads import import_trimesh
 from translucent.units import METRES_PER_UNIT, metres_per_unit
 
 #: Attributes that hold positions and corners, with the libraries that call them so.

@@ -19,8 +19,8 @@ from translucent.geometry.foreign import foreign_name, foreign_parts, unit_of
 from translucent.geometry.grouping import CHUNK, equal_rows, extent, use_mask
 from translucent.geometry.repair import WELD_EDGE_FRACTION, WELD_TOLERANCE, all_apart, orient, weld
 from translucent.geometry.winding import winding_number
-from translucent.model_size import size_note
-from translucent.signals import import_trimesh
+from translucent.threads import import_trimesh
+from translucent.units import size_note
 
 #: Largest index of a vertex.
 MAX_INDEX = 2**31 - 1

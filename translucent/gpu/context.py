@@ -29,7 +29,7 @@ import moderngl
 from translucent.arguments import brief
 from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.files.reading import require_allowed
-from translucent.signals import DeferredSignals
+from translucent.threads import DeferredSignals
 
 WHEEL = "lavavu-osmesa"
 

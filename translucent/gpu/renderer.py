@@ -45,7 +45,7 @@ from translucent.gpu.shaders import before_drawing, before_making, set_uniform
 from translucent.gpu.shadow_atlas import ShadowAtlas
 from translucent.gpu.targets import SHADER_STORAGE, Targets, read_floats
 from translucent.gpu.uniforms import bounded_extinction
-from translucent.planning.hits import HITS
+from translucent.planning.methods.base import HITS
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.scene.backdrop import Backdrop

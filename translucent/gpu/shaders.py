@@ -15,7 +15,7 @@ from translucent.assets import shader_path
 from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import BLOCKS, TABLES, PackedTable, UniformBlock
-from translucent.signals import DeferredSignals
+from translucent.threads import DeferredSignals
 
 #: Key of a program, the same in every process: its files, and its switches.
 ProgramName: TypeAlias = tuple[tuple[str, str], tuple[tuple[str, int], ...]]

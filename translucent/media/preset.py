@@ -19,10 +19,10 @@ from translucent.arguments import checked
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.files.reading import json_value, read_text, toml_value
-from translucent.formulas.card import reflectance_on_card
 from translucent.formulas.color import to_hex
 from translucent.formulas.diffuse_interface import diffuse_interface, half_space_reflectance
 from translucent.formulas.phase import HenyeyGreenstein, PhaseFunction, parse_phase
+from translucent.formulas.slab import reflectance_on_card
 from translucent.media.colors import html_card, parse_color
 from translucent.media.medium import Medium
 from translucent.units import metres_per_unit, parse_length

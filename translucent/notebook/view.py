@@ -14,7 +14,6 @@ from translucent.errors import InputError, RenderError, TranslucentError
 from translucent.extras import install_command, require_package
 from translucent.formulas.color import to_hex
 from translucent.frames.writing import Bundle, bundle, png
-from translucent.model_size import size_note
 from translucent.page.container import header_of
 from translucent.page.payload import payload
 from translucent.page.plans import plan_page
@@ -24,7 +23,7 @@ from translucent.planning.request import RenderRequest
 from translucent.renderer import Renderer
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Object, Scene
-from translucent.units import length_text
+from translucent.units import length_text, size_note
 
 if TYPE_CHECKING:
     from translucent.notebook.widget import SceneView

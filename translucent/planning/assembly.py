@@ -17,7 +17,6 @@ from translucent.planning.bodies import (
     sheets_of,
     solids_of,
 )
-from translucent.planning.hits import EMBREE_COST, HITS, chosen_hits
 from translucent.planning.interfaces import InterfaceMode, TracedInterfaces, touching_interfaces, with_interfaces
 from translucent.planning.limits import (
     AMBIENT,
@@ -33,6 +32,7 @@ from translucent.planning.limits import (
     with_ambient,
 )
 from translucent.planning.methods import FragmentLists, Method, SignedDepth, ThinLayer
+from translucent.planning.methods.base import EMBREE_COST, HITS, chosen_hits
 from translucent.planning.methods.thin_layer import sheet_pass
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.render_plan import Capabilities, RenderPlan

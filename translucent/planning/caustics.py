@@ -14,9 +14,8 @@ from translucent.errors import InputError
 from translucent.formulas.light import ALL_AROUND
 from translucent.formulas.phase import ISOTROPIC
 from translucent.planning.bodies import count_of, indices, varies_at_hits
-from translucent.planning.hits import EMBREE_COST, HITS
 from translucent.planning.methods import Method
-from translucent.planning.methods.base import check_count
+from translucent.planning.methods.base import EMBREE_COST, HITS, check_count
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.scene.lights import DirectionalLight, PositionalLight, with_whole_spheres
 from translucent.scene.scene import Light, Object, Scene, object_names

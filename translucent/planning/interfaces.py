@@ -10,8 +10,7 @@ import numpy as np
 from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import indices, overlapping_pair
-from translucent.planning.hits import check_hits
-from translucent.planning.methods.base import check_count
+from translucent.planning.methods.base import check_count, check_hits
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.shadow_maps import dims_interfaces

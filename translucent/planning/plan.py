@@ -39,7 +39,6 @@ from translucent.planning.caustics import (
     opaque_to_shadows,
     passes_with_caustics,
 )
-from translucent.planning.hits import EMBREE_COST, HITS, chosen_hits
 from translucent.planning.interfaces import (
     USUAL_DEPTH,
     InterfaceMode,
@@ -69,6 +68,7 @@ from translucent.planning.methods import (
     SignedDepth,
     ThinLayer,
 )
+from translucent.planning.methods.base import EMBREE_COST, HITS, chosen_hits
 from translucent.planning.methods.path_traced import has_bases, takes_picture
 from translucent.planning.methods.ray_marched import MAX_STEPS
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec

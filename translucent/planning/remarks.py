@@ -9,10 +9,9 @@ import numpy as np
 from translucent.formulas.color import luminance
 from translucent.formulas.two_stream import two_stream_absorption, two_stream_reflectance, two_stream_scattering
 from translucent.media.medium import Medium
-from translucent.model_size import other_size
 from translucent.planning.passes import Note, NoteKind
 from translucent.scene.scene import Object, Scene, object_names
-from translucent.units import length_text, short_length
+from translucent.units import length_text, other_size, short_length
 
 #: Luminance of white light that passes a body, or comes back from it, below which it is black: a step of 8 bits.
 BLACK = 1 / 255

@@ -20,9 +20,8 @@ from translucent.files.paths import write_atomically
 from translucent.gpu.context import avoid_full_cache, open_context
 from translucent.preview.dialogs import accept_drops
 from translucent.preview.document import Document
-from translucent.preview.panels.files import file_browser, files_panel
 from translucent.preview.panels.material import library_panel, material_panel, scene_panel
-from translucent.preview.panels.menus import handle_keys, keys_page, menus, status
+from translucent.preview.panels.menus import file_browser, files_panel, handle_keys, keys_page, menus, status
 from translucent.preview.panels.view import environments_panel, look_panel, messages_panel, method_panel
 from translucent.preview.panels.viewport import viewport_panel
 from translucent.preview.script import Script

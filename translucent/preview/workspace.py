@@ -14,7 +14,6 @@ from typing import Any, Literal
 
 from translucent.errors import RenderError, TranslucentError
 from translucent.files.paths import remove_partial
-from translucent.model_size import scale_to, size_note
 from translucent.planning.methods import Method
 from translucent.preview.actions import Action, Adopt, History, Open, Replace, Resize, SetOrbit
 from translucent.preview.document import Display, Document, Model, framed
@@ -50,7 +49,7 @@ from translucent.preview.tasks import Lane, Task, problem
 from translucent.preview.worker import Pool, Urgency
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import fillable
-from translucent.units import metres_per_unit
+from translucent.units import metres_per_unit, scale_to, size_note
 
 #: Largest number of messages that the window keeps.
 MAX_MESSAGES = 50

@@ -27,7 +27,6 @@ from translucent.reference.interactions import Interactions, LiveRays, StraightL
 from translucent.reference.interfaces import FirstInterfaces, Inside, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge
 from translucent.reference.light_paths import LightPaths, SurfaceLight
-from translucent.reference.phase import scattered_directions, turned
 from translucent.reference.refracted import RayEnds, check_surfaces
 from translucent.reference.render import scene_hits, shade_hits
 from translucent.reference.surfaces import (
@@ -37,7 +36,15 @@ from translucent.reference.surfaces import (
     scene_crossings,
     sheet_thicknesses,
 )
-from translucent.reference.volume import Segments, Volume, multiplicities, points_on, volume_segments
+from translucent.reference.volume import (
+    Segments,
+    Volume,
+    multiplicities,
+    points_on,
+    scattered_directions,
+    turned,
+    volume_segments,
+)
 from translucent.scene.camera import Camera, check_size
 from translucent.scene.scene import Scene
 

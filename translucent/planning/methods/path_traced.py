@@ -8,8 +8,7 @@ from typing import ClassVar
 from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import has_more, indices, open_bodies, varies_at_hits
-from translucent.planning.hits import check_hits
-from translucent.planning.methods.base import Method, check_count
+from translucent.planning.methods.base import Method, check_count, check_hits
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Object, Scene, object_names
