@@ -34,9 +34,8 @@ def test_no_error_is_larger_than_the_notes_say(one: Case, renderer: tl.Renderer)
 
 
 def test_notes_name_what_they_are_about() -> None:
-    """A matched body on a ground, a leaf, a glow, and opaque objects in bodies: each has its words, and no other."""
+    """A leaf, a glow, and opaque objects in bodies: each has its words, and no other."""
     words = {
-        "matched wax in the sun": "light that grounds reflect into the medium",
         "thin leaf": "spikes and edges are",
         "neon": "light that the bodies emit and scatter is",
         "ball in soap": "the light around 'sphere' inside the bodies",

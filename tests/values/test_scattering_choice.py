@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import translucent as tl
@@ -18,7 +19,13 @@ from translucent.planning.passes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
 from translucent.planning.rendered import Treatment, scatterer_of, treatment_of
-from translucent.planning.scattering import LEAST_DEPTH, MOST_CELL_DEPTH, MOST_DIFFUSED, choose_treatments
+from translucent.planning.scattering import (
+    LEAST_DEPTH,
+    LEAST_LIT_DEPTH,
+    MOST_CELL_DEPTH,
+    MOST_DIFFUSED,
+    choose_treatments,
+)
 
 WAX = tl.Medium(absorption=0.1, scattering=5.0, ior=1.4)
 LIT = [tl.PointLight((0, 0, 5), (1, 1, 1))]
@@ -271,6 +278,25 @@ def test_light_is_scattered_on_in_fog_and_leaves_dense_bodies_through_their_surf
     assert isinstance(plan(fog).method, tl.RayMarched)
     assert not many_times(plan(fog, tl.FragmentLists()))
     assert not many_times(plan(dense, tl.FragmentLists()))
+
+
+def test_bodies_that_a_ground_lights_show_it_through_their_surface() -> None:
+    """Rays in a volume know no ground; beams, lights inside and eyes within need a volume."""
+    corners = np.array([(-9, -5, -9), (-9, -5, 9), (9, -5, 9), (9, -5, -9)], dtype=np.float64)
+    ground = tl.Object(tl.Mesh(corners, np.array([(0, 1, 2), (0, 2, 3)])), color=(0.5, 0.5, 0.5))
+    fog, place = body(MILK), tuple(np.mean(body(MILK).bounds, axis=0))
+    assert plan(scene(fog, ground)).treated(Treatment.DIFFUSION) == (0,)
+    thin = tl.Medium(scattering=0.9 * LEAST_LIT_DEPTH / fog.mean_thickness)
+    away = (place[0], place[1] + 9.0, place[2])
+    beam = tl.SpotLight(away, (0, -1, 0), (1, 1, 1), 0.1, 0.2)
+    for kept in (
+        scene(body(thin), ground),
+        scene(fog, ground, lights=[tl.PointLight(place, (1, 1, 1))]),
+        scene(fog, ground, lights=[beam]),
+        replace(scene(fog, ground), camera=tl.Camera.look_at(place, (0.0, 0.0, -9.0))),
+    ):
+        assert plan(kept).treated(Treatment.VOLUME) == (0,)
+        assert "light that grounds reflect into the medium" in str(plan(kept))
 
 
 def test_a_march_that_is_asked_for_has_light_scattered_once() -> None:

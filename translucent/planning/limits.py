@@ -245,7 +245,7 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
             "and light of these objects that the medium scatters forward on its way to the eye"
         )
         if scene.opaque:
-            text += "; light that grounds reflect into the medium, up to 30 % of the light of a body on a bright ground"
+            text += "; light that grounds reflect into the medium, up to 45 % of the light of a body on a bright ground"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     rendered = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
     if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in rendered]:

@@ -15,6 +15,8 @@ from translucent.media.medium import Medium
 from translucent.planning.bodies import MAX_SLOTS, medium_slots
 from translucent.planning.methods.base import MAX_LIGHT_POINTS, check_count
 from translucent.planning.rendered import Treatment, treated
+from translucent.scene.grounds import ground_below
+from translucent.scene.lights import PositionalLight, SpotLight
 from translucent.scene.scene import Object, Scene
 
 
@@ -172,6 +174,11 @@ SCATTERINGS: dict[str, type[Scattering]] = {one.name: one for one in (Diffusion,
 #: scattering does: of the environment's light, that is nothing, and what goes on ahead is lost, too.
 LEAST_DEPTH = 0.01
 
+#: Reduced optical depth of the mean thickness from which on a body without an interface that stands on a ground is lit by
+#: it. Measured on balls over gray and white grounds, of depths 0.1 to 3.3 and mean cosines 0.3 to 0.85: rays in a volume,
+#: which know no ground, are 15 to 45 % too dark. Surfaces are up to 7 % off, and 20 % where thin fog scatters ahead.
+LEAST_LIT_DEPTH = 0.1
+
 #: Optical depth across a cell from which on light of a body of one density leaves through its surface.
 MOST_CELL_DEPTH = 1.0
 
@@ -285,7 +292,11 @@ def rendered_scene(scene: Scene, treatments: Treatments) -> Scene:
 def _volumes(scene: Scene, solved: list[int], chosen: Diffusion) -> tuple[int, ...]:
     """Bodies with in-scattered light, as far as each can have winding numbers of its own."""
     varying = tuple(i for i in solved if _is_cloud(scene.objects[i]))
-    even = tuple(i for i in solved if scene.objects[i].density is None and _is_volume(scene.objects[i], chosen))
+    even = tuple(
+        i
+        for i in solved
+        if scene.objects[i].density is None and _is_volume(scene.objects[i], chosen) and not _is_lit_by_ground(scene, i)
+    )
     fogs = varying + even
     return fogs if not fogs or len(medium_slots(scene, apart=fogs)) <= MAX_SLOTS else varying
 
@@ -299,11 +310,33 @@ def _is_deep(body: Object, medium: Medium) -> bool:
     return bool(np.asarray(medium.scattering).max() * densest * body.mean_thickness > LEAST_DEPTH)
 
 
+def _is_lit_by_ground(scene: Scene, body: int) -> bool:
+    """True if a ground below sends a body more light than what a surface instead of a volume gets wrong.
+
+    Not where it shows beams, or is viewed from within: those are in its volume.
+    """
+    item, (low, high) = scene.objects[body], scene.boxes[body]
+    assert item.medium is not None
+
+    def inside(point: Array) -> bool:
+        return bool((point > low).all() and (point < high).all())
+
+    if inside(scene.camera.eye) or any(
+        isinstance(light, SpotLight) or (isinstance(light, PositionalLight) and inside(np.asarray(light.position)))
+        for light in scene.lights
+    ):
+        return False
+    depth = float(_reduced_extinction(item.medium).max()) * item.mean_thickness
+    return depth > LEAST_LIT_DEPTH and ground_below(scene, [body]) is not None
+
+
+def _reduced_extinction(medium: Medium) -> Array:
+    return np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
+
+
 def _is_volume(body: Object, chosen: Diffusion) -> bool:
     """True if rays gather light in a body of one density: where they see more than a skin beneath all cells."""
     if body.has_interface:
         return False
     assert body.medium is not None
-    medium = body.medium
-    reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
-    return float(reduced.max()) * chosen.cell_size(body) < MOST_CELL_DEPTH
+    return float(_reduced_extinction(body.medium).max()) * chosen.cell_size(body) < MOST_CELL_DEPTH
