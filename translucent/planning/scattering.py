@@ -174,9 +174,10 @@ SCATTERINGS: dict[str, type[Scattering]] = {one.name: one for one in (Diffusion,
 #: scattering does: of the environment's light, that is nothing, and what goes on ahead is lost, too.
 LEAST_DEPTH = 0.01
 
-#: Reduced optical depth of the mean thickness from which on a body without an interface that stands on a ground is lit by
-#: it. Measured on balls over gray and white grounds, of depths 0.1 to 3.3 and mean cosines 0.3 to 0.85: rays in a volume,
-#: which know no ground, are 15 to 45 % too dark. Surfaces are up to 7 % off, and 20 % where thin fog scatters ahead.
+#: Reduced optical depth of the mean thickness from which on a body without an interface that stands on a ground is lit
+#: by it. Measured on balls over gray and white grounds, of depths 0.1 to 3.3 and mean cosines 0.3 to 0.85: rays in a
+#: volume, which know no ground, are 15 to 45 % too dark. Surfaces are up to 7 % off, and 20 % where thin fog scatters
+#: ahead.
 LEAST_LIT_DEPTH = 0.1
 
 #: Optical depth across a cell from which on light of a body of one density leaves through its surface.
