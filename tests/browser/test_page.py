@@ -14,7 +14,7 @@ import trimesh
 
 import translucent as tl
 from tests.browser.pages import WebPage, decoded
-from tests.browser.thickness import Truth, rounded
+from tests.browser.thickness import Truth, framing, rounded
 from translucent.assets import mesh_path
 from translucent.formulas.color import to_hex
 from translucent.formulas.diffuse_interface import half_space_reflectance
@@ -371,3 +371,31 @@ def test_color_of_a_medium_that_scatters(
     assert (np.median(was, axis=0) > 0.2).all()
     page.evaluate("viewer.resetMaterial()")
     np.testing.assert_array_equal(radiance(web_page, samples=1), before)
+
+
+_MEASURED = """async ({ size }) => {
+  const viewer = await translucent;
+  const drawn = (what) => encoded(viewer.render({ size, samples: 1, what }));
+  return [drawn("flags"), drawn("thickness"), viewer.marked];
+}"""
+
+
+@pytest.mark.parametrize(("name", "ahead"), [("bear", (0.5, 0.35, 1.0)), ("armadillo.obj", (-1.0, 0.2, 0.4))])
+def test_pixels_that_a_rasterizer_misplaces_are_marked(
+    web_page: WebPage, web_dist: Path, request: pytest.FixtureRequest, tmp_path: Path, tools: str, name: str, ahead: Any
+) -> None:
+    """Pixels that a grid of 1/16 pixel makes wrong by 1e-3 of the diagonal are invalid, and no others."""
+    path = request.getfixturevalue("assets") / "meshes_clean" / name if "." in name else mesh_path(name)
+    mesh, size = rounded(tl.load_mesh(path)), (512, 512)
+    floor = trimesh.creation.box(mesh.diagonal * np.array([2.0, 0.02, 2.0]))
+    floor.apply_translation((mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2 - (0, mesh.diagonal, 0))
+    ground = tl.Object(tl.Mesh(floor.vertices, floor.faces, name="floor.ply"), None)
+    camera = framing(mesh, ahead)
+    green = tl.Medium.from_color("#30c060", mesh.diagonal / 4)
+    opened(web_page, tl.Scene([tl.Object(mesh, green), ground], camera, environment=SKY), tmp_path, tools)
+    *drawn, marked = web_page.run(_MEASURED, {"size": size})
+    flags, metres = (decoded(text, "f4").reshape(*size, 4)[..., 0] for text in drawn)
+    truth = Truth.of(mesh, camera, size)
+    wrong = np.abs(metres - truth.thickness) > 1e-3 * mesh.diagonal
+    assert wrong.sum() == marked > 0
+    np.testing.assert_array_equal((flags.astype(int) & 2) == 0, wrong)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,8 +44,60 @@ def test_thickness_is_that_of_the_reference(three_page: WebPage) -> None:
     assert errors.median <= 1e-7
     assert errors.p999_off_edges <= 1e-5
     assert errors.p999 <= 1e-5
-    assert (errors.wrong, errors.wrong_by_edges, errors.marked) == (0, 0, 0)
+    assert (errors.wrong, errors.wrong_by_edges) == (0, 0)
+    assert errors.marked <= MARKED
     assert errors.coverage <= 3e-4
+
+
+#: Pixels of a picture beside edges, outlines above all, in which the grid of a rasterizer in software decides.
+MARKED = 120
+
+
+def mostly_valid(found: Measured) -> bool:
+    """True if all pixels are, but for some by edges of the outline."""
+    return bool((~found.valid).sum() <= 2e-3 * found.covered.sum())
+
+
+@pytest.mark.parametrize(
+    ("name", "ahead", "before"), [("armadillo", (-1.0, 0.2, 0.4), 3), ("cow", (0.3, -0.5, -0.9), 1)]
+)
+def test_pixels_by_edges_are_marked_if_wrong(
+    three_page: WebPage, assets: Path, name: str, ahead: tuple[float, float, float], before: int
+) -> None:
+    """At outlines as well. Without the check as many pixels inside outlines would be wrong."""
+    mesh, size = rounded(tl.load_mesh(assets / "meshes_clean" / f"{name}.obj")), (512, 512)
+    camera = framing(mesh, ahead)
+    truth = Truth.of(mesh, camera, size)
+    found = measure(three_page, [described(mesh)], camera, size)
+    wrong = np.abs(found.thickness - truth.thickness) > 1e-3 * mesh.diagonal
+    assert not (wrong & found.valid & (truth.crossed > 0) & found.covered).any()
+    inside = tl.interior(truth.crossed) & (truth.crossed > 0)
+    assert before <= (inside & ~found.valid).sum() <= 10
+    assert (~found.valid).sum() <= MARKED
+
+
+AT_REST = """({ mesh, camera, size }) => tools.withRenderer(size, (renderer) => {
+    const { THREE, ExactThicknessPass } = translucentThree;
+    const body = tools.mesh(mesh);
+    const seen = tools.camera(camera);
+    const pass = new ExactThicknessPass(renderer, { bodies: [body] });
+    const check = pass.checkEdges.bind(pass);
+    let checks = 0;
+    pass.checkEdges = (...all) => { checks++; check(...all); };
+    const after = (act) => { checks = 0; act(); return checks; };
+    const draw = () => pass.render(body, seen);
+    const move = () => { body.position.x += 0.01; body.updateMatrix(); draw(); };
+    return { first: after(draw), again: after(draw), moved: after(move), rests: after(draw), rested: after(draw),
+        unread: after(move), read: after(() => pass.read()), twice: after(() => pass.at(1, 1)) };
+})"""
+
+
+def test_edges_are_checked_once_at_rest(three_page: WebPage) -> None:
+    """Not while something moves, but before numbers are read."""
+    camera = described_camera(seen_from(5.0, fov_y=30.0), (64, 64))
+    found = three_page.run(AT_REST, {"mesh": described(BALL), "camera": camera, "size": (64, 64)})
+    once = {"first", "rests", "read"}
+    assert found == {name: int(name in once) for name in found}
 
 
 REFINEMENTS = """(renderers) => tools.withRenderer([8, 8], (renderer) => {
@@ -88,7 +141,8 @@ def test_transforms_are_followed(three_page: WebPage, scale: Any, shift: Any) ->
     assert errors.pixels > 3_000
     assert errors.median <= 5e-7  # twice the pixel, four times what the grid leaves
     assert errors.p999_off_edges <= 5e-5
-    assert (errors.wrong, errors.marked) == (0, 0)
+    assert errors.wrong == 0
+    assert errors.marked <= MARKED
 
 
 def test_orthographic_cameras(three_page: WebPage) -> None:
@@ -96,12 +150,13 @@ def test_orthographic_cameras(three_page: WebPage) -> None:
     found = measure(three_page, [described(BALL)], camera, SIZE)
     errors = Errors.of(found, Truth.of(BALL, camera, SIZE), BALL.diagonal)
     assert errors.median <= 1e-7
-    assert (errors.wrong, errors.marked) == (0, 0)
+    assert errors.wrong == 0
+    assert errors.marked <= MARKED
 
 
 def test_rays_from_inside_begin_at_the_eye(three_page: WebPage) -> None:
     found = measure(three_page, [described(BALL)], seen_from(0.4, fov_y=60.0), SIZE)
-    assert found.valid.all()
+    assert mostly_valid(found)
     assert found.covered.all()
     assert found.thickness[128, 128] == pytest.approx(1.4, abs=SAGITTA)
     assert np.all(found.count == 1)
@@ -109,7 +164,7 @@ def test_rays_from_inside_begin_at_the_eye(three_page: WebPage) -> None:
 
 def test_orthographic_rays_begin_at_the_near_plane(three_page: WebPage) -> None:
     found = measure(three_page, [described(BALL)], tl.Camera(seen_from(0.4, fov_y=60.0).pose, None, 1.0), (32, 32))
-    assert found.valid.all()
+    assert mostly_valid(found)
     assert found.thickness[16, 16] == pytest.approx(1.4 - 0.01, abs=SAGITTA)
 
 
@@ -117,7 +172,7 @@ def test_opaque_objects_end_rays(three_page: WebPage) -> None:
     """The right half of a wall through the middle of the ball."""
     wall = Box((0.0, -2.0, -0.01), (2.0, 2.0, 0.0)).tessellate()
     found = measure(three_page, [described(BALL)], seen_from(500.0, fov_y=0.3), SIZE, opaque=[described(rounded(wall))])
-    assert found.valid.all()
+    assert mostly_valid(found)
     assert found.thickness[128, 100] == pytest.approx(2 * found.thickness[128, 155], abs=2 * SAGITTA)
     assert found.thickness[128, 129] == pytest.approx(1.0, abs=SAGITTA)
 
@@ -193,7 +248,7 @@ def test_instances_and_poses_are_what_they_show(three_page: WebPage) -> None:
     found = three_page.run(VARIANTS, {"ball": described(BALL), "camera": camera, "size": SIZE})
     pictures = {name: Measured.of(pixels) for name, pixels in found.items()}
     for one, other in (("instanced", "plain"), ("morphed", "scaled"), ("skinned", "scaled")):
-        assert pictures[one].valid.all()
+        assert mostly_valid(pictures[one])
         assert pictures[other].covered.sum() > 3_000
         assert (pictures[one].covered != pictures[other].covered).sum() <= 20
         both = pictures[one].covered & pictures[other].covered
@@ -246,7 +301,7 @@ def test_sixteen_bits_where_floats_cannot_be_added_up(three_page: WebPage) -> No
     found = three_page.run(FALLBACKS, {**asked, "missing": ["EXT_float_blend"]})
     assert found["precision"] == "float16"
     pixels, truth = Measured.of(found), Truth.of(BALL, camera, SIZE)
-    assert pixels.valid.all()
+    assert mostly_valid(pixels)
     assert np.abs(pixels.thickness - truth.thickness)[tl.interior(truth.crossed)].max() < 4e-3 * BALL.diagonal
     none = ["EXT_color_buffer_float", "EXT_color_buffer_half_float"]
     message = three_page.run(FALLBACKS, {**asked, "missing": none})["error"]
@@ -463,7 +518,7 @@ def test_geometries_of_three_are_closed(three_page: WebPage) -> None:
         found = Measured.of(pixels)
         assert pixels["weight"] == 1  # more: open
         assert found.covered.sum() > 5_000
-        assert found.valid.all()
+        assert mostly_valid(found)
 
 
 SLIVERS = """({ size, angles }) => tools.withRenderer(size, (renderer) => {

@@ -6,6 +6,7 @@ import {
   Mesh,
   NearestFilter,
   OrthographicCamera,
+  Points,
   BufferGeometry,
   BufferAttribute,
   RGFormat,
@@ -16,7 +17,7 @@ import {
   Vector3,
   WebGLRenderTarget,
 } from "three";
-import type { Camera, Material, Object3D, Texture, WebGLRenderer } from "three";
+import type { Camera, InstancedMesh, Material, Object3D, SkinnedMesh, Texture, WebGLRenderer } from "three";
 import { StandIns, areSpectral, bends, setExtinction } from "./bodies.js";
 import type { StandIn } from "./bodies.js";
 import { TranslucentError } from "./errors.js";
@@ -25,7 +26,8 @@ import type { ThicknessOptions, ThicknessPixels } from "./options.js";
 import { COVERAGE_FLOOR, NOTHING, OPEN_WEIGHTS, ROUNDING } from "./generated/shaders.js";
 import { expectedCount, place, seesFrom } from "./placement.js";
 import type { DepthRange, View } from "./placement.js";
-import { last, nearest, resolveUniforms, resolving, summing } from "./programs.js";
+import { CHECK_SHIFT, besideEdges, checkUniforms, checking, last, nearest, resolveUniforms, resolving, summing } from "./programs.js";
+import type { Summing } from "./programs.js";
 import { drawsInSoftware, refinementOf } from "./software.js";
 import { isClosed } from "./topology.js";
 import { bodyUniforms } from "./uniforms.js";
@@ -42,12 +44,30 @@ export interface ExactThicknessOptions extends ThicknessOptions {
 const ROUNDING_16 = 4e-3;
 const LARGEST_16 = 65504;
 
+/** Share of the diagonal by which a pixel beside an edge may be off before it is marked, in software. */
+const WRONG = 1e-3;
+
+/** All that decides what a picture shows, as a text. */
+function pictureOf(view: View, all: StandIn[][], layout: string): string {
+  const bodies = all.map((some) =>
+    some.map(({ mesh }) => {
+      const { geometry, morphTargetInfluences: morphs } = mesh;
+      const versions = Object.values(geometry.attributes).map((one) => (one as BufferAttribute).version);
+      const { instanceMatrix: instances, count } = mesh as InstancedMesh;
+      const bones = (mesh as unknown as SkinnedMesh).skeleton?.boneMatrices;
+      return [mesh.id, geometry.id, versions, geometry.index?.version, mesh.matrixWorld.elements, morphs, instances?.version, count, bones && [...bones]];
+    }),
+  );
+  return JSON.stringify([layout, view.camera.projectionMatrix.elements, view.camera.matrixWorld.elements, bodies]);
+}
+
 /**
  * Exact thickness of meshes along every view ray, for a three.js scene.
  *
  * `render(scene, camera)` before the picture itself; `texture` then holds, for each pixel of the canvas: metres (r), signed
  * count (g), 1 if the number can be trusted (b), 1 if a body is there (a). Exact for closed meshes of any shape, in any
- * order, as deep as they overlap; other pixels are marked.
+ * order, as deep as they overlap; other pixels are marked. Beside an edge b is 0.25 if a rasterizer in software may be off
+ * by more than 0.1 % of the diagonal; see `settle`.
  */
 export class ExactThicknessPass {
   /** Renderer that draws the pass. */
@@ -60,6 +80,9 @@ export class ExactThicknessPass {
   private sums: WebGLRenderTarget | null = null;
   private last: WebGLRenderTarget | null = null;
   private ends: WebGLRenderTarget | null = null;
+  private checks: WebGLRenderTarget | null = null;
+  private readonly check = checkUniforms();
+  private readonly points: Points<BufferGeometry, Material>;
   private result: WebGLRenderTarget | null = null;
   private readonly resolve = resolveUniforms();
   private readonly resolvers: Record<string, Material> = {};
@@ -68,6 +91,10 @@ export class ExactThicknessPass {
   // Any: the shaders place bodies themselves. One of these knows reversed and logarithmic depth.
   private readonly eye = new OrthographicCamera();
   private layout = "";
+  // What the last picture shows; the one whose edges are checked, or "".
+  private picture = "";
+  private checked = "";
+  private settling: (() => void) | null = null;
   private software: boolean | null = null;
 
   constructor(renderer: WebGLRenderer, options: ExactThicknessOptions = {}) {
@@ -83,7 +110,8 @@ export class ExactThicknessPass {
     const triangle = new BufferGeometry();
     triangle.setAttribute("position", new BufferAttribute(new Float32Array(9), 3));
     this.screen = new Mesh(triangle);
-    this.screen.frustumCulled = false;
+    this.points = new Points(new BufferGeometry(), besideEdges(this.check));
+    this.screen.frustumCulled = this.points.frustumCulled = false;
   }
 
   /** Numbers that paths are added up in, on this machine; float16 has three digits. */
@@ -130,7 +158,10 @@ export class ExactThicknessPass {
   render(scene: Object3D, camera: Camera): boolean {
     const { renderer } = this;
     const gl = renderer.getContext() as WebGL2RenderingContext;
-    if (gl.isContextLost()) return false;
+    if (gl.isContextLost()) {
+      this.checked = "";
+      return false;
+    }
     checkOptions(this.options, "ExactThicknessPass", ["float32", "float16"]);
     if (scene.matrixWorldAutoUpdate) scene.updateMatrixWorld();
     if (camera.parent === null && camera.matrixWorldAutoUpdate) camera.updateMatrixWorld();
@@ -178,15 +209,42 @@ export class ExactThicknessPass {
       });
       this.draw(this.sums!, meshes, [0, 0, 0, 0]);
       if (this.last) this.leave(bodies);
-      this.finish(view, media, spectral, diagonal, expected);
+      const picture = pictureOf(view, [bodies, opaque], this.layout);
+      const still = this.picture === "" || this.picture === picture;
+      if (this.checked !== picture) this.checked = "";
+      this.picture = picture;
+      this.settling = () => {
+        const switches = { spectral: false, opaque: this.ends !== null, subpixel };
+        if (this.checks && this.checked !== picture) this.checkEdges(bodies, view.rectangle(media), switches, diagonal);
+        this.checked = picture;
+        this.finish(view, media, spectral, diagonal, expected);
+      };
+      if (still || this.checked) this.settling();
+      else this.finish(view, media, spectral, diagonal, expected);
     } finally {
       this.restore(saved);
     }
     return true;
   }
 
+  /**
+   * Mark the pixels of the last `render` in which the grid of a rasterizer in software decides which face is shown, and the
+   * faces differ by more than 0.1 % of the diagonal. `render` does so itself in the first picture, and in each one that is
+   * the same as the one before; `read` and `at` do so as well. On graphics cards, and with `refine: 1`, this does nothing.
+   */
+  settle(): void {
+    if (!this.checks || this.checked || !this.settling) return;
+    const saved = this.save();
+    try {
+      this.settling();
+    } finally {
+      this.restore(saved);
+    }
+  }
+
   /** Pixels of the last `render`, read back from the graphics card. */
   read(): ThicknessPixels {
+    this.settle();
     if (!this.result) throw new TranslucentError("read()", "nothing is rendered yet", "call render(scene, camera) first");
     const { width, height } = this.result;
     const pixels = new Float32Array(4 * width * height);
@@ -201,9 +259,9 @@ export class ExactThicknessPass {
     };
     for (let y = 0, i = 0; y < height; y++) {
       for (let x = 0, j = 4 * width * (height - 1 - y); x < width; x++, i++, j += 4) {
-        found.thickness[i] = pixels[j];
+        found.valid[i] = Math.floor(pixels[j + 2]);
+        found.thickness[i] = found.valid[i] * pixels[j];
         found.count[i] = pixels[j + 1];
-        found.valid[i] = pixels[j + 2];
         found.covered[i] = pixels[j + 3];
       }
     }
@@ -213,10 +271,11 @@ export class ExactThicknessPass {
   /** Metres inside bodies at a pixel of the last `render`, from the top left; null where there is no number to trust. */
   at(x: number, y: number): number | null {
     if (!this.result) return null;
+    this.settle();
     const texel = new Float32Array(4);
     const up = this.result.height - 1 - Math.floor(y);
     this.renderer.readRenderTargetPixels(this.result, Math.floor(x), up, 1, 1, texel);
-    return texel[2] > 0 ? texel[0] : null;
+    return texel[2] === 1 ? texel[0] : null;
   }
 
   /** Free all that is on the graphics card; the pass may be used again. */
@@ -226,10 +285,12 @@ export class ExactThicknessPass {
       this.resolvers[key].dispose();
       delete this.resolvers[key];
     }
-    this.screen.geometry.dispose();
-    for (const target of [this.sums, this.ends, this.last, this.result]) target?.dispose();
-    this.sums = this.ends = this.last = this.result = null;
-    this.layout = "";
+    for (const drawn of [this.screen, this.points]) drawn.geometry.dispose();
+    this.points.material.dispose();
+    for (const target of [this.sums, this.ends, this.checks, this.last, this.result]) target?.dispose();
+    this.sums = this.ends = this.checks = this.last = this.result = null;
+    this.layout = this.picture = this.checked = "";
+    this.settling = null;
   }
 
   private openWeight(number: number): number {
@@ -267,7 +328,7 @@ export class ExactThicknessPass {
     const type = this.precision === "float32" ? FloatType : HalfFloatType;
     const layout = [width, height, refine, type, spectral, opaque, exits].join();
     if (layout === this.layout) return;
-    for (const target of [this.sums, this.ends, this.last, this.result]) target?.dispose();
+    for (const target of [this.sums, this.ends, this.checks, this.last, this.result]) target?.dispose();
     const common = {
       depthBuffer: false,
       stencilBuffer: false,
@@ -279,12 +340,43 @@ export class ExactThicknessPass {
     this.sums = new WebGLRenderTarget(width * refine, height * refine, { ...common, type, format: spectral ? RGBAFormat : RGFormat, count });
     if (spectral) this.sums.textures[1].format = RedFormat;
     this.ends = opaque ? new WebGLRenderTarget(width * refine, height * refine, { ...common, type, format: RedFormat }) : null;
+    const check = this.software && refine > 1 && type === FloatType;
+    this.checks = check ? new WebGLRenderTarget(width * refine, height * refine, { ...common, type, format: RGBAFormat, depthBuffer: true, stencilBuffer: true }) : null;
     const precise = this.renderer.extensions.has("EXT_color_buffer_float") ? FloatType : HalfFloatType;
     const filled = { ...common, depthBuffer: true, type: precise, format: RGBAFormat };
     this.last = exits ? new WebGLRenderTarget(width, height, filled) : null;
     this.result = new WebGLRenderTarget(width, height, { ...common, type: precise, format: RGBAFormat, count });
     this.result.textures[0].name = "thickness";
     this.layout = layout;
+  }
+
+  /**
+   * Draw again what is near edges of faces, moved by more than the rasterizer moves vertices, each way. Where its grid decides
+   * which of two faces is shown, one of these pictures shows the other one.
+   */
+  private checkEdges(bodies: StandIn[], rectangle: [number, number, number, number], switches: Omit<Summing, "instanced">, diagonal: number): void {
+    const { check, checks, sums } = this;
+    check.accumulated.value = sums!.textures.at(-1)!;
+    check.refine.value = sums!.width / this.result!.width;
+    check.limit.value = (WRONG / 4) * diagonal;
+    check.rectangle.value.fromArray(rectangle);
+    this.points.geometry.setDrawRange(0, Math.max(rectangle[2] * rectangle[3], 0));
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.draw(checks!, [], [0, 0, 0, 0]);
+    this.renderer.state.buffers.stencil.setMask(0xff);
+    gl.clearBufferiv(gl.STENCIL, 0, [0]);
+    this.draw(checks!, [this.points], null);
+    const meshes = bodies.map((one) => {
+      const all = { ...switches, instanced: one.instanced !== null };
+      return one.use(`check ${Object.values(all)}`, () => checking(one.uniforms, all, check));
+    });
+    const { width, height } = sums!;
+    const [right, up] = [(2 * CHECK_SHIFT * switches.subpixel) / width, (2 * CHECK_SHIFT * switches.subpixel) / height];
+    for (let i = 0; i < 4; i++) {
+      check.channel.value.set(0, 0, 0, 0).setComponent(i, 1);
+      check.shift.value.set(i & 1 ? right : -right, i & 2 ? up : -up);
+      this.draw(checks!, meshes, null);
+    }
   }
 
   /** Draw where rays leave the bodies. */
@@ -311,8 +403,11 @@ export class ExactThicknessPass {
     resolve.rounding.value = (precise ? ROUNDING : ROUNDING_16) * diagonal;
     resolve.count_share.value = diagonal;
     resolve.coverage_floor.value = (precise ? COVERAGE_FLOOR : ROUNDING_16) * diagonal;
-    this.resolvers[String(spectral)] ??= resolving(resolve, spectral);
-    this.screen.material = this.resolvers[String(spectral)];
+    resolve.checks.value = this.checks?.texture ?? null;
+    resolve.disagreement.value = WRONG * diagonal;
+    const key = `${spectral} ${this.checks !== null}`;
+    this.resolvers[key] ??= resolving(resolve, spectral, this.checks !== null);
+    this.screen.material = this.resolvers[key];
     // Where no body is, no number has to be found.
     const everywhere = expected[0] !== 0 || expected[1] !== 0;
     const [x, y, w, h] = everywhere ? [0, 0, result!.width, result!.height] : view.rectangle(media);
@@ -324,7 +419,7 @@ export class ExactThicknessPass {
     result!.scissorTest = false;
   }
 
-  private draw(target: WebGLRenderTarget, meshes: Mesh[], cleared: number[] | null, depth?: number): void {
+  private draw(target: WebGLRenderTarget, meshes: Object3D[], cleared: number[] | null, depth?: number): void {
     const { renderer, stage } = this;
     renderer.setRenderTarget(target);
     if (cleared !== null) {

@@ -76,7 +76,7 @@ bool exactInside(vec3 p) {
 vec3 exactTransmitted(vec3 p, vec3 n, float roughness, float ior, float fallback) {
   vec2 place = exactPlace(p);
   vec4 path = exactTexel(exactPath, place);
-  bool valid = path.b > 0.5;
+  bool valid = path.b > 0.0;
   float thickness = valid ? path.r : fallback;
   vec3 ray = isOrthographic ? vec3(0.0, 0.0, -1.0) : normalize(p);
   // Smooth normals may look away at an outline.
@@ -116,7 +116,7 @@ vec3 exactTransmitted(vec3 p, vec3 n, float roughness, float ior, float fallback
     // gap: no more than is on either, and on as the ray came.
     filled = reach > thickness ? thickness / reach : 1.0;
     vec4 other = exactTexel(exactPath, there);
-    longest = max(thickness, other.b > 0.5 ? other.r : 0.0) / max(dot(inside, ray), 0.1);
+    longest = max(thickness, other.b > 0.0 ? other.r : 0.0) / max(dot(inside, ray), 0.1);
     vec3 normal = normalize((viewMatrix * vec4(exitNormal, 0.0)).xyz);
     float cosine = dot(inside, normal);
     bool gap = along * filled > longest;

@@ -1,13 +1,16 @@
 /** Materials of the passes: generated GLSL with the vertices of three.js, whatever moves them. */
 import {
   AddEquation,
+  AlwaysStencilFunc,
   CustomBlending,
   DoubleSide,
+  EqualStencilFunc,
   GreaterDepth,
   GLSL3,
   MinEquation,
   NoBlending,
   OneFactor,
+  ReplaceStencilOp,
   ShaderMaterial,
   Vector2,
   Vector4,
@@ -38,6 +41,9 @@ uniform vec2 anchor_slope;
 uniform vec2 anchor_rest;
 uniform vec2 across_start;
 uniform vec2 anchor_pixel;
+#ifdef CHECKING
+uniform vec2 shift;
+#endif
 out vec2 across;
 flat out vec2 anchor;
 #ifdef USE_INSTANCING
@@ -60,6 +66,9 @@ void main() {
   vec2 apart = (clip_from_offset * vec4(offset, 0.0)).xy + across_start - anchor_slope * axial_shown;
   anchor = anchor_pixel;
   across = half_size * apart + anchor_rest * gl_Position.w;
+  #ifdef CHECKING
+  gl_Position.xy += shift * gl_Position.w;
+  #endif
 }
 `;
 
@@ -86,9 +95,9 @@ uniform float longest_change;
 ${generated.recentered}
 `;
 
-const findAxial = (subpixel: number): string => `
+const findAxial = (reach: number): string => `
   vec2 missing = (gl_FragCoord.xy - anchor) - across * gl_FragCoord.w;
-  vec2 on_ray = recentered(axial_shown, missing, ${constant(subpixel)}, longest_change);
+  vec2 on_ray = recentered(axial_shown, missing, ${constant(reach)}, longest_change);
   axial = on_ray.x;
 `;
 
@@ -101,12 +110,13 @@ void main() {
 
 const constant = (value: number): string => value.toExponential();
 
-function recentering(fragment: string, subpixel: number): string {
+/** With places on the rays of pixels, which are at most `reach` pixels off the points that are shown. */
+function recentering(fragment: string, reach: number): string {
   return fragment
     .replace("gl_FrontFacing", "FRONT_FACING")
     .replace("in float axial;\n", "")
     .replace("snapping(axial, snapping_share)", "on_ray.y * snapping_share")
-    .replace("void main() {", `void main() {${findAxial(subpixel)}`);
+    .replace("void main() {", `void main() {${findAxial(reach)}`);
 }
 
 function drawn(fragment: string, equation: BlendingEquation, uniforms: BodyUniforms, instanced: boolean): ShaderMaterial {
@@ -146,6 +156,82 @@ export function summing(uniforms: BodyUniforms, { spectral, opaque, instanced, s
   return drawn(recentering(spectral ? paths : path, subpixel), AddEquation, uniforms, instanced);
 }
 
+/** Adds up signed paths alone, of the picture that is moved by `shift`, into one of four channels. */
+export function checking(uniforms: BodyUniforms, { opaque, instanced, subpixel }: Summing, check: CheckUniforms): ShaderMaterial {
+  const path = opaque ? generated.signedDepthBeforeOpaque : generated.signedDepth;
+  const one = path
+    .replace("out vec2 path_and_count;", "out vec4 paths;\nuniform vec4 channel;")
+    .replace(/path_and_count = .*;/, "paths = signed_path * channel;");
+  const made = drawn(recentering(one, (1 + CHECK_SHIFT) * subpixel), AddEquation, { ...uniforms, ...check }, instanced);
+  made.defines.CHECKING = 1;
+  made.stencilWrite = true; // three's word for the test
+  made.stencilFunc = EqualStencilFunc;
+  made.stencilRef = 1;
+  return made;
+}
+
+/** Steps of the grid by which pictures are moved to check a pixel: more than vertices are, in any direction. */
+export const CHECK_SHIFT = 0.55;
+
+/** Uniforms of what checks edges. */
+export function checkUniforms() {
+  return {
+    shift: { value: new Vector2() },
+    channel: { value: new Vector4() },
+    accumulated: { value: null as Texture | null },
+    rectangle: { value: new Vector4() },
+    refine: { value: 1 },
+    limit: { value: 0 },
+  };
+}
+
+export type CheckUniforms = ReturnType<typeof checkUniforms>;
+
+// A point at each pixel around which the sums do not lie on a line in some direction: an edge may be near. The stencil keeps
+// these pixels, and the target the negative sum, to which the checks are added.
+const BESIDE_EDGES = `
+uniform sampler2D accumulated;
+uniform ivec4 rectangle;
+uniform int refine;
+uniform float limit;
+flat out float middle;
+float path_at(ivec2 texel) { return texelFetch(accumulated, clamp(texel, ivec2(0), textureSize(accumulated, 0) - 1), 0).r; }
+float bend(ivec2 texel, ivec2 to) { return abs(path_at(texel + to) + path_at(texel - to) - 2.0 * middle); }
+void main() {
+  ivec2 pixel = rectangle.xy + ivec2(gl_VertexID % rectangle.z, gl_VertexID / rectangle.z);
+  ivec2 texel = pixel * refine + refine / 2;
+  middle = path_at(texel);
+  float most = max(max(bend(texel, ivec2(1, 0)), bend(texel, ivec2(0, 1))), max(bend(texel, ivec2(1, 1)), bend(texel, ivec2(1, -1))));
+  vec2 place = (vec2(texel) + 0.5) * 2.0 / vec2(textureSize(accumulated, 0)) - 1.0;
+  gl_Position = vec4(most <= limit ? vec2(2.0) : place, 0.0, 1.0);
+  gl_PointSize = 1.0;
+}
+`;
+
+const NEGATIVE = `
+flat in float middle;
+layout(location = 0) out vec4 paths;
+void main() { paths = vec4(-middle); }
+`;
+
+/** Selects the pixels that edges may be near. */
+export function besideEdges(check: CheckUniforms): ShaderMaterial {
+  return new ShaderMaterial({
+    glslVersion: GLSL3,
+    vertexShader: BESIDE_EDGES,
+    fragmentShader: NEGATIVE,
+    uniforms: check,
+    depthTest: false,
+    depthWrite: false,
+    blending: NoBlending,
+    stencilWrite: true,
+    stencilFunc: AlwaysStencilFunc,
+    stencilRef: 1,
+    stencilZPass: ReplaceStencilOp,
+    toneMapped: false,
+  });
+}
+
 /** Keeps the nearest opaque surface, as a share of the depth of the media; without a depth buffer, which would round it. */
 export function nearest(uniforms: BodyUniforms, instanced: boolean, subpixel: number): ShaderMaterial {
   return drawn(recentering(generated.opaqueDepth, subpixel), MinEquation, uniforms, instanced);
@@ -182,6 +268,8 @@ export function resolveUniforms() {
   return {
     accumulated: { value: null as Texture | null },
     accumulated_path: { value: null as Texture | null },
+    checks: { value: null as Texture | null },
+    disagreement: { value: 0 },
     refine: { value: 1 },
     frame_size: { value: new Vector4() },
     ray_right: { value: new Vector4() },
@@ -198,12 +286,29 @@ export function resolveUniforms() {
 const refined = (fragment: string): string =>
   fragment.replace("void main() {", "uniform int refine;\nvoid main() {").replace(/(accumulated(_path)?), texel,/g, "$1, texel * refine + refine / 2,");
 
+// Valid in full only where pictures that are moved a little agree, or show nothing, as beside an outline; else the number stays.
+const checked = (fragment: string, spectral: boolean): string =>
+  fragment
+    .replace("void main() {", "uniform sampler2D checks;\nuniform float disagreement;\nvoid main() {")
+    .replace("valid ? 1.0 : 0.0,", "valid ? trust : 0.0,")
+    .replace("bool covered", `float path_here = texelFetch(${spectral ? "accumulated_path" : "accumulated"}, texel * refine + refine / 2, 0).r;
+    vec4 apart = abs(texelFetch(checks, texel * refine + refine / 2, 0));
+    apart *= vec4(notEqual(apart, vec4(abs(path_here))));
+    bool agree = path_here == 0.0 || max(max(apart.x, apart.y), max(apart.z, apart.w)) * advance <= disagreement;
+    float trust = agree ? 1.0 : UNSURE;
+    bool covered`)
+    .replaceAll("UNSURE", constant(UNSURE));
+
+/** Validity of a pixel by an edge whose number may be off by more than 0.1 % of the diagonal. */
+export const UNSURE = 0.25;
+
 /** From sums to metres. */
-export function resolving(uniforms: ReturnType<typeof resolveUniforms>, spectral: boolean): ShaderMaterial {
+export function resolving(uniforms: ReturnType<typeof resolveUniforms>, spectral: boolean, check: boolean): ShaderMaterial {
+  const fragment = refined(spectral ? generated.spectralThickness : generated.thickness);
   return new ShaderMaterial({
     glslVersion: GLSL3,
     vertexShader: FULLSCREEN,
-    fragmentShader: refined(spectral ? generated.spectralThickness : generated.thickness),
+    fragmentShader: check ? checked(fragment, spectral) : fragment,
     uniforms,
     depthTest: false,
     depthWrite: false,

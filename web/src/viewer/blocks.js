@@ -176,6 +176,22 @@ function surfacesBlock(fields, scene, camera, size, media) {
   fields.surface_eye_axial_depth[0] = -media.near / media.length;
 }
 
+/** Vertices of an object, four numbers each: column and row of the picture, both times w, then w, then depth along the camera's axis. */
+export function seenVertices(body, mesh, camera, size) {
+  const [halfWidth, halfHeight] = halfExtent(camera, size);
+  const anchor = plus(linear(body.matrix, mesh.center), minus(column(body.matrix), camera.eye));
+  const found = new Float64Array((4 * mesh.offsets.length) / 3);
+  for (let i = 0, k = 0; i < mesh.offsets.length; i += 3, k += 4) {
+    const at = plus(linear(body.matrix, [mesh.offsets[i], mesh.offsets[i + 1], mesh.offsets[i + 2]]), anchor);
+    const depth = dot(camera.forward, at), w = camera.fov_y == null ? 1 : depth;
+    found[k] = (dot(camera.right, at) / halfWidth + w) * (size[0] / 2) - 0.5 * w;
+    found[k + 1] = (w - dot(camera.up, at) / halfHeight) * (size[1] / 2) - 0.5 * w;
+    found[k + 2] = w;
+    found[k + 3] = depth;
+  }
+  return found;
+}
+
 /** Write all blocks of a variant of the page's frame for a camera, a size and a shift (right, down) in pixels. */
 export function writeBlocks({ scene, meshes, variant, blocks, bodies, camera, size, shift, subpixel }) {
   const where = placed(scene, meshes, camera);

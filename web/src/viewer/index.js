@@ -2,6 +2,7 @@
 
 import { View } from "./camera.js";
 import { opened } from "./container.js";
+import { exactThickness } from "./exact.js";
 import { Materials, colorOf, extinctionOf } from "./material.js";
 import { meshesOf } from "./meshes.js";
 import { Panel } from "./panel.js";
@@ -15,6 +16,9 @@ const REST = 140;
 
 /** Times that one pixel is enlarged for the probe where WebGL draws in software: a grid of 1/16 pixel becomes one of 1/4096. */
 const FINER = 256;
+
+/** Share of the smallest body's diagonal by which thickness that is drawn in software may be off before its pixel is marked. */
+const WRONG = 1e-3;
 
 /** Milliseconds that one sample of a still picture may take; else it has fewer pixels. */
 const LONGEST = 4000;
@@ -162,6 +166,7 @@ export class Viewer {
       this.still_scale = most;
       this.most_metres = null;
       this.#draw(this.#size(most), null);
+      if (this.shown === "thickness") this.#mark(this.view.camera(this.view.widened(this.size)));
       this.#present("radiance", this.stops);
       this.player.finish();
       this.cost = performance.now() - begun;
@@ -237,6 +242,26 @@ export class Viewer {
     for (let i = 0; i < metres.length; i += 4) if (flags[i] & 1 && flags[i] & 2) most = Math.max(most, metres[i]);
     this.panel.scaled(most);
     return most || 1;
+  }
+
+  /** Mark pixels of the frame as invalid where a rasterizer in software shows another face than the ray of the pixel meets. */
+  #mark(camera) {
+    const { caps } = this.player;
+    if (!caps.software || !caps.float || !caps.blend) return; // 16 bits are off everywhere, and told
+    const { page, player, meshes, size } = this;
+    const key = this.materials.variant;
+    const exact = exactThickness({ scene: page.scene, meshes, variant: page.variants[key], camera, size });
+    if (!exact) return;
+    const bodies = page.scene.objects.filter((body) => !body.opaque);
+    const most = WRONG * Math.min(...bodies.map(({ bounds: [low, high] }) => Math.hypot(...high.map((x, k) => x - low[k]))));
+    const metres = player.read("thickness", key, size), flags = player.read("flags", key, size);
+    this.marked = 0;
+    exact.forEach((value, i) => {
+      if (!(flags[4 * i] & 2) || Math.abs(value - metres[4 * i]) <= most) return;
+      flags[4 * i] = (flags[4 * i] & ~2) | 1;
+      this.marked++;
+    });
+    if (this.marked) player.writeFlags(key, size, flags);
   }
 
   /** Show the picture, or thickness in false colors. */
@@ -341,14 +366,16 @@ export class Viewer {
   }
 
   /**
-   * Draw a picture of any size and read it: linear radiance (h, w, 4), first row at the top.
-   * @param {{size: number[], samples?: number}} asked
+   * Draw a picture of any size and read it: linear radiance, or a result such as "thickness" or "flags" (1: covered, 2: valid);
+   * (h, w, 4), first row at the top.
+   * @param {{size: number[], samples?: number, what?: string}} asked
    */
   render({ size, samples = this.page.samples, what = "radiance" }) {
     const key = this.materials.variant;
     const camera = this.view.camera();
     this.size = size;
     this.player.frame({ camera, size, sample: null }, this.materials);
+    if (what === "flags") this.#mark(camera);
     let found = this.player.read(what, key, size);
     if (what === "radiance" && samples > 1) {
       for (let i = 0; i < this.page.samples; i++) this.player.frame({ camera, size, sample: i }, this.materials);

@@ -514,6 +514,17 @@ export class Player {
     return found;
   }
 
+  /** Write the flags of the last frame of this size, as `read` gives them. */
+  writeFlags(key, size, flags) {
+    const { gl } = this;
+    const number = this.page.variants[key].targets.flags;
+    const { components } = this.page.textures[number];
+    const [, format, type] = this.#format(number, this.page.textures[number], null);
+    const bytes = Uint8Array.from({ length: components * size[0] * size[1] }, (_, i) => flags[4 * Math.floor(i / components) + (i % components)]);
+    gl.bindTexture(gl.TEXTURE_2D, this.#texture(number, size));
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ...size, format, type, bytes);
+  }
+
   /** Wait until all has been drawn. */
   finish() {
     const { gl } = this;
