@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import moderngl
@@ -167,12 +168,26 @@ class ShadowViews:
     def sky_uniforms(self, center: Array, irradiance: Array) -> bytes:
         """Contents of the SkyShadows block, with what each direction sends, (k, 3)."""
         rows = np.zeros((MAX_SKY_VIEWS, 4, 4))
-        for row, view, light in zip(rows, self.sky, irradiance, strict=False):
-            row[:] = view.rows(center)
-            x, y = np.floor_divide(view.corner, view.size)
-            number = y * self._columns + x + 1
-            row[3] = [*light, -number if view.ends else number]
+        axes, eyes, numbers = self._sky_rows
+        count = min(len(rows), len(axes), len(irradiance))
+        rows[:count, :3, :3] = axes[:count]
+        rows[:count, :3, 3] = np.einsum("kij,kj->ki", axes[:count], center - eyes[:count])
+        rows[:count, 3, :3], rows[:count, 3, 3] = irradiance[:count], numbers[:count]
         return SKY_SHADOWS.pack(sky_views=rows.reshape(-1, 4))
+
+    @cached_property
+    def _sky_rows(self) -> tuple[Array, Array, Array]:
+        """Of each direction of the environment: axes (k, 3, 3) of its camera, its eye (k, 3), and the place of its map
+        (k,), from 1, negative if it has ends.
+
+        Every sample of a picture needs them.
+        """
+        origin = np.zeros(3)
+        axes = np.array([view.rows(origin)[:3, :3] for view in self.sky]).reshape(-1, 3, 3)
+        eyes = np.array([view.camera.eye for view in self.sky]).reshape(-1, 3)
+        places = [(view.corner[0] // view.size, view.corner[1] // view.size, view.ends) for view in self.sky]
+        numbers = [(y * self._columns + x + 1) * (-1 if ends else 1) for x, y, ends in places]
+        return axes, eyes, np.array(numbers, dtype=np.float64)
 
     @property
     def _columns(self) -> int:
