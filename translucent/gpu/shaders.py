@@ -332,5 +332,5 @@ def set_uniform(program: moderngl.Program | moderngl.ComputeShader, name: str, v
 def set_used(program: moderngl.Program | moderngl.ComputeShader, values: Mapping[str, Any]) -> None:
     """Set those of these loose uniforms that the program has: variants of a shader use some of them each."""
     for name, value in values.items():
-        if name in program:
-            set_uniform(program, name, value)
+        if (uniform := program.get(name, None)) is not None:  # `in` goes through all names
+            uniform.value = value
