@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,10 +23,18 @@ from tests.values.diffusing import (
     lit_by_rays,
     seen_field,
 )
-from translucent.diffusion import entering
+from translucent.diffusion import entering, field
 from translucent.diffusion.cache import diffusion_key
-from translucent.diffusion.entering import Occluders, from_light, opaque_surfaces
+from translucent.diffusion.entering import (
+    Occluders,
+    environment_parts,
+    from_light,
+    nearest_parts,
+    opaque_surfaces,
+    sky_light,
+)
 from translucent.diffusion.field import DiffusingBody, DiffusionField
+from translucent.diffusion.first_events import EnteringRays, joined_rays
 from translucent.diffusion.grid import other_plane_points, plane_points
 from translucent.diffusion.lit_body import lit_body
 from translucent.formulas import optics
@@ -143,7 +152,6 @@ def test_bright_parts_of_the_environment_enter_as_lamps_do(monkeypatch: pytest.M
     """A disc of 17 degrees overhead, as the sun there; as uniform light it goes less deep. Measured: .015, .22."""
     texels = np.zeros((64, 128, 3), np.float32)
     texels[:3] = 1.0
-    overhead = tl.Environment.image(texels)
     medium = tl.Medium(absorption=0.15, scattering=2.85, ior=1.3)
     body = tl.Object(BALL, medium)
 
@@ -153,13 +161,40 @@ def test_bright_parts_of_the_environment_enter_as_lamps_do(monkeypatch: pytest.M
         return found / found.mean()
 
     sun = zones(BLACK, tl.DirectionalLight((0, -1, 0), (1, 1, 1)))
-    directed = zones(overhead)
-    monkeypatch.setattr(entering, "BRIGHT", 1e9)
+    directed = zones(tl.Environment.image(texels))
     monkeypatch.setattr(entering, "SUN", 1e9)
-    uniform = zones(overhead)
-    off = [float(np.abs(found - sun).max()) for found in (directed, uniform)]
-    print(off)
-    assert off[0] < 0.05 < 0.1 < off[1]
+    parts = zones(tl.Environment.image(texels))
+
+    def as_uniform(*given: Any) -> tuple[Array, EnteringRays]:
+        least, rays = sky_light(*given)
+        np.add.at(least, rays.samples, rays.entering)
+        return least, joined_rays([])
+
+    monkeypatch.setattr(field, "sky_light", as_uniform)
+    uniform = zones(tl.Environment.image(texels))
+    off = [float(np.abs(found - sun).max()) for found in (directed, parts, uniform)]
+    assert max(off[:2]) < 0.05 < 0.1 < off[2], off
+
+
+def test_constant_environments_have_no_rays_and_others_keep_their_flux() -> None:
+    """What all directions have alike is uniform, exactly; the rest has a direction, and nothing is lost."""
+    medium = tl.Medium(scattering=3.0, ior=1.3)
+    body = tl.Object(BALL, medium)
+    geometry = lit_body(body, None, Diffusion(12).cell_size(body))
+    solver, found = DiffusingBody(geometry, medium, 0.0), {}
+    for top in (1.0, 3.0):
+        parts = environment_parts(tl.Environment.gradient((1, 1, 1), (top, top, 1)), geometry.shape.sky.directions)
+        found[top] = uniform, rays = solver._from_sky(parts, [])
+        sums = uniform.copy()
+        np.add.at(sums, rays.samples, rays.entering)
+        means = parts / nearest_parts(geometry.shape.sky.directions)[1][:, None]
+        received = geometry.entrance(1.3, 0.0).received[:, None] * means[geometry.shape.sky.direction]
+        expected = [np.bincount(geometry.shape.sky.sample, channel) for channel in received.T]
+        np.testing.assert_allclose(sums, np.transpose(expected), rtol=1e-9)
+    assert not len(found[1.0][1].samples)
+    rays = found[3.0][1]
+    assert len(rays.samples) == entering.SKY_RAYS * len(geometry.grid.points)
+    assert not rays.entering[:, 2].any()
 
 
 def test_bodies_on_the_way_absorb_light_of_the_environment() -> None:

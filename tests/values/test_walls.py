@@ -48,9 +48,9 @@ def test_what_is_scattered_ahead_counts_as_unscattered() -> None:
 def test_fluences_make_these_fluxes(cosine: float) -> None:
     """At depths and cosines of the table, and as much in all as diffusion finds where slabs are thick."""
     table, conductance = slab_fluxes(0.9, 1.3), diffuse_interface(1.3).conductance
-    slab = SlabSolution(0.01 * table.depths, 1.3, 10.0, 90.0, HenyeyGreenstein(0.0))
+    everywhere, ones = np.arange(len(table.depths)), np.ones(len(table.depths))
+    slab = SlabSolution(Walls(ones, everywhere, 0.01 * table.depths, ones), 1.3, 10.0, 90.0, HenyeyGreenstein(0.0))
     at = int(np.argmin(np.abs(table.cosines - cosine)))
-    everywhere = np.arange(len(table.depths))
     found = slab.events(everywhere, np.full(len(everywhere), table.cosines[at]))
     for fluence, flux in zip(found, (table.own, table.across), strict=True):
         np.testing.assert_allclose(conductance * fluence, flux[:, at], rtol=1e-9, atol=1e-12)

@@ -166,6 +166,7 @@ class FieldCache:
                 medium,
                 roughness,
                 shape.densities,
+                walls=shape.walls,
                 colors=colors,
                 corrected=diffusion.corrected,
                 warm_starts=self._warm_starts,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from weakref import WeakKeyDictionary
@@ -105,18 +105,15 @@ BEFORE = 1e-4
 #: Least height of a light above the samples that it lights, in radii of the area of each, and how far to the side that
 #: counts, in such heights. The first is about a cell: the samples then find its light within a tenth (sd 3 %).
 _WIDTH, _REACH = 3.0, 3.0
-#: Radiance, in units of the mean over the visible environment, above which light has a direction of its own inside:
-#: light of windows and soft boxes has one, and that of a smooth sky enters as uniform light.
-BRIGHT = 2.0
 
-#: Rays of each sample that carry such light.
-SKY_RAYS = 4
+#: Rays of each sample that carry the light of an environment that is brighter in some directions than in others.
+SKY_RAYS = 2
 
 #: Radiance of an environment's picture, in units of its mean, above which light counts as that of a sun.
 SUN = 16.0
 
-#: Pairs of a sample and a direction whose transfer is found at a time.
-_TOGETHER = 1 << 13
+#: Pairs of a sample and a direction that are looked at at a time.
+_TOGETHER = 1 << 14
 
 #: Digits to which the stretch of a body is rounded, so that it does not depend on its rotation, and the least size of
 #: a body along one axis over that along another up to which this is done.
@@ -271,8 +268,10 @@ def environment_parts(
         )
     else:
         # Of a picture every pixel counts, however small the sun is.
-        texels, power, rest = _map_texels(environment)
-        nearest = np.asarray(cKDTree(directions).query(texels if turn is None else texels @ turn)[1])
+        power, rest = _map_power(environment)
+        texels = _turned_texels(environment)
+        towards = directions if turn is None else directions @ turn.T
+        nearest = (texels.astype(np.float32) @ towards.T.astype(np.float32)).argmax(axis=1)
         radiance = power if suns else rest
     return np.stack([np.bincount(nearest, radiance[:, channel], len(directions)) for channel in range(3)], axis=1)
 
@@ -285,9 +284,12 @@ def suns_of(environment: Environment) -> tuple[DirectionalLight, ...]:
     """
     if environment.map is None:
         return ()
-    texels, power, rest = _map_texels(environment)
-    bright = np.flatnonzero((power - rest).any(axis=1))
-    part = cKDTree(even_directions(DIRECTIONS)).query(texels[bright])[1] if len(bright) else np.zeros(0, np.int64)
+    power, rest = _map_power(environment)
+    bright = np.flatnonzero((power != rest).any(axis=1))
+    if not len(bright):
+        return ()
+    texels = _turned_texels(environment)
+    part = cKDTree(even_directions(DIRECTIONS)).query(texels[bright])[1]
     found = []
     for number in np.unique(part):
         at = bright[part == number]
@@ -302,23 +304,30 @@ def radiance_without_suns(environment: Environment, directions: Array) -> Array:
     return radiance if environment.map is None else radiance * _below_suns(radiance, environment)
 
 
-#: Pictures of environments, (k, 3), in the size of `_map_texels`: they stay when one is turned, or brightened.
-_reduced: WeakKeyDictionary[EnvironmentMap, Array] = WeakKeyDictionary()
+#: Radiance times solid angle (k, 3) of the pixels of environments at a scale of 1, in rows of `MAP_HEIGHT`, and that
+#: without suns: they stay when one is turned, or brightened.
+_powers: WeakKeyDictionary[EnvironmentMap, tuple[Array, Array]] = WeakKeyDictionary()
 
 
-def _map_texels(environment: Environment) -> tuple[Array, Array, Array]:
-    """Directions (k, 3) in the world of an image's texels, their radiance times solid angle, and that without suns."""
+def _map_power(environment: Environment) -> tuple[Array, Array]:
+    """(k, 3), (k, 3): radiance of an image's texels times their solid angle, and that without suns."""
     assert environment.map is not None
+    if (powers := _powers.get(environment.map)) is None:
+        height, width = MAP_HEIGHT, 2 * MAP_HEIGHT
+        radiance = environment.map.reduced(height, width).reshape(-1, 3)
+        power = np.repeat(row_solid_angles(height, width), width)[:, None] * radiance
+        powers = _powers[environment.map] = power, power * _below_suns(environment.scale * radiance, environment)
+    return environment.scale * powers[0], environment.scale * powers[1]
+
+
+def _turned_texels(environment: Environment) -> Array:
+    """(k, 3): directions of an image's texels in the world, see `_map_power`."""
     height, width = MAP_HEIGHT, 2 * MAP_HEIGHT
-    if (reduced := _reduced.get(environment.map)) is None:
-        reduced = _reduced[environment.map] = environment.map.reduced(height, width).reshape(-1, 3)
-    radiance = environment.scale * reduced
-    angle = np.repeat(row_solid_angles(height, width), width)[:, None]
-    down, right = np.divmod(np.arange(height * width), width)
-    polar, azimuth = np.pi * (down + 0.5) / height, 2.0 * np.pi * ((right + 0.5) / width - environment.turn - 0.5)
+    polar = np.pi * (np.arange(height) + 0.5)[:, None] / height
+    azimuth = 2.0 * np.pi * ((np.arange(width) + 0.5) / width - environment.turn - 0.5)
     level = np.sin(polar)
-    directions = np.stack([level * np.sin(azimuth), np.cos(polar), -level * np.cos(azimuth)], axis=1)
-    return directions, angle * radiance, angle * radiance * _below_suns(radiance, environment)
+    parts = level * np.sin(azimuth), np.cos(polar), -level * np.cos(azimuth)
+    return np.stack(np.broadcast_arrays(*parts), axis=-1).reshape(-1, 3)
 
 
 def _below_suns(radiance: Array, environment: Environment) -> Array:
@@ -360,72 +369,71 @@ def transfer(sky: Sky, samples: int, ior: float, interface: DiffuseInterface) ->
 
 
 def sky_light(
-    directions: Array,
-    received: Floats,
-    radiances: Sequence[Floats],
+    sky: Sky,
+    received: Array,
+    radiances: Callable[[slice], Array],
     normals: Array,
     ior: float,
     mirrored: float,
 ) -> tuple[Array, EnteringRays]:
-    """Light of the environment: flux (s, 3) that enters as uniform light does, and rays for its brighter parts.
+    """Light of the environment: flux (s, 3) that enters as uniform light does, and rays for all else.
+
+    Of each sample, the least radiance in the directions above it is uniform. `SKY_RAYS` rays have the rest: each an
+    equal part of the flux, in the order of the directions, and all of it from one of them, chosen by its flux.
+    Neighboring samples have others.
 
     Parameters
     ----------
-    directions : (k, 3) float64
-    received : (s, k) float32
+    sky : Sky
+        With n pairs of a sample and a direction.
+    received : (n,) float64
         See `Entrance`.
-    radiances : three of (s, k) float32
-        Mean radiance of the part of the sky around each direction as a sample sees it, in each channel.
+    radiances : callable
+        Mean radiance (3, k) of the part of the sky around the direction of each of k pairs, as the sample sees it.
     normals : (s, 3)
         Of the surface at the samples.
     ior : float
     mirrored : float
         Flux that the surface mirrors, as if it was diffuse, for a unit of what enters.
     """
-    whole = np.maximum(received.sum(axis=1), np.finfo(np.float32).tiny)
-    entering = np.stack([np.einsum("sk,sk->s", received, radiance) for radiance in radiances], axis=1)
-    most = BRIGHT * entering / whole[:, None]
-    bright = np.zeros(received.shape, bool)
-    for radiance, limit in zip(radiances, most.T, strict=True):
-        bright |= radiance > limit[:, None]
-    flat = np.flatnonzero(bright & (received > 0.0))
-    sample, direction = np.divmod(flat, len(directions))
-    weight = received.ravel()[flat].astype(np.float64)
-    flux = np.stack(
-        [
-            np.maximum(radiance[sample, direction] - limit[sample], 0.0) * weight
-            for radiance, limit in zip(radiances, most.T, strict=True)
-        ]
-    )
-    rest = np.stack([np.bincount(sample, channel, len(received)) for channel in flux], axis=1)
-    return np.maximum(entering - rest, 0.0), _sky_rays(directions, sample, direction, flux, normals, ior, mirrored)
+    entering, rays = np.zeros((len(normals), 3)), []
+    first, shifts = np.flatnonzero(np.diff(sky.sample, prepend=-1)), other_plane_points(len(normals))[:, 0]
+    ends = np.append(first[1:], len(received))
+    for of in np.array_split(np.arange(len(first)), len(received) // _TOGETHER + 1):
+        pairs = slice(first[of[0]], ends[of[-1]]) if len(of) else slice(0, 0)
+        samples, starts = sky.sample[first[of]].astype(np.int64), first[of] - pairs.start
+        if len(of):
+            entering[samples], *found = _sky_rays(received[pairs], radiances(pairs), starts, shifts[samples])
+            rays.append((samples[found[0]], sky.direction[pairs][found[1]], found[2]))
+    of, direction, flux = (np.concatenate(part) for part in zip(*rays, strict=True))
+    towards = sky.directions[direction.ravel()]
+    samples = np.repeat(of, SKY_RAYS)
+    refracted = refracted_direction(-towards, normals[samples], np.full(len(samples), ior))
+    flux = flux.reshape(-1, 3)
+    return entering, EnteringRays(samples, refracted, flux, mirrored * flux)
 
 
 def _sky_rays(
-    directions: Array, sample: Integers, direction: Integers, flux: Array, normals: Array, ior: float, mirrored: float
-) -> EnteringRays:
-    """Rays for the bright parts of the sky, `SKY_RAYS` of each sample.
+    received: Array, radiances: Array, first: Integers, shifts: Array
+) -> tuple[Array, Integers, Integers, Array]:
+    """Uniform flux (s, 3) of samples whose pairs begin at `first` (s,); and samples (l,) with rays, pairs and fluxes.
 
-    The directions are divided among the rays by the flux (3, n) from them, in their order on the spiral. All light of a
-    ray comes from one of them, chosen by its flux: neighboring samples have others.
+    The pairs (l, r) are those from whose directions the rays come, for `shifts` (s,) from 0 to 1, and their fluxes are
+    (l, r, 3).
     """
-    each = flux[0] + flux[1] + flux[2]
-    ends = np.cumsum(each)
-    first = np.flatnonzero(np.diff(sample, prepend=-1))
-    before = (ends - each)[first]
-    count = np.diff(first, append=len(sample))
-    total = np.repeat(np.maximum(ends[first + count - 1] - before, np.finfo(np.float64).tiny), count)
-    number = np.minimum(SKY_RAYS * (ends - 0.5 * each - np.repeat(before, count)) / total, SKY_RAYS - 1)
-    begin = np.flatnonzero(np.diff(SKY_RAYS * sample + number.astype(np.int64), prepend=-1))
-    entering = np.add.reduceat(flux, begin, axis=1) if len(begin) else flux
-    of = sample[begin]
-    level = (ends - each)[begin] + other_plane_points(len(normals))[of, 0] * entering.sum(axis=0)
-    last = np.append(begin[1:], len(sample)) - 1
-    chosen = directions[direction[np.clip(np.searchsorted(ends, level), begin, last)]]
-    turned = (chosen * normals[of]).sum(axis=1) > 0.0
-    of, chosen, entering = of[turned], chosen[turned], entering.T[turned]
-    refracted = refracted_direction(-chosen, normals[of], np.full(len(of), ior))
-    return EnteringRays(of, refracted, entering, mirrored * entering)
+    count = np.diff(first, append=len(received))
+    least, sums = np.minimum.reduceat(radiances, first, axis=1), np.zeros((3, len(received) + 1))
+    for channel, own, low in zip(sums, radiances, least, strict=True):
+        np.cumsum(received * (own - np.repeat(low, count)), out=channel[1:])
+    total = sums.sum(axis=0)
+    lit = np.flatnonzero(total[first + count] > total[first])
+    begin, end = first[lit, None], (first + count)[lit, None]
+    parts = np.arange(SKY_RAYS + 1) / SKY_RAYS
+    levels = total[begin] + (total[end] - total[begin]) * parts
+    flux = np.stack([np.diff(np.interp(levels, total, channel)) for channel in sums], axis=-1)
+    chosen = levels[:, :-1] + shifts[lit, None] * np.diff(levels)
+    pairs = np.clip(np.searchsorted(total, chosen, "right") - 1, begin, end - 1)
+    return (least * np.add.reduceat(received, first)).T, lit, pairs, flux
 
 
 def from_light(

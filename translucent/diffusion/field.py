@@ -8,7 +8,6 @@ from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
-from scipy import sparse
 
 from translucent.arrays import Array
 from translucent.diffusion.entering import (
@@ -251,7 +250,13 @@ class DiffusingBody:
         self._entrance = lit.entrance(medium.ior, roughness)
         self._exchange = lit.exchange(medium.ior, roughness)
         self._system = system or BodySystem(
-            lit.grid, medium, roughness, lit.shape.densities, corrected=corrected, warm_starts=warm_starts
+            lit.grid,
+            medium,
+            roughness,
+            lit.shape.densities,
+            walls=lit.shape.walls,
+            corrected=corrected,
+            warm_starts=warm_starts,
         )
 
     @np.errstate(under="ignore")
@@ -311,21 +316,20 @@ class DiffusingBody:
         """
         if not parts.any():
             return np.zeros((len(self.lit.grid.points), 3)), joined_rays([])
-        received, directions, ior = self._entrance.received, self.lit.shape.sky.directions, self._medium.ior
-        means = parts / nearest_parts(directions)[1][:, None]
-        radiances = [np.broadcast_to(channel.astype(np.float32), received.shape) for channel in means.T]
+        sky, ior = self.lit.shape.sky, self._medium.ior
+        means = (parts / nearest_parts(sky.directions)[1][:, None]).T
         absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
-        paths = self.lit.sky_paths(absorbing)
-        for channel in range(3) if absorbing else ():
-            depth = sparse.csr_array(received.shape)
-            for body, metres in zip(absorbing, paths, strict=True):
-                assert body.medium is not None
-                depth = depth + metres * float(np.asarray(body.medium.absorption)[channel])
-            lost = depth.tocoo()
-            radiances[channel] = radiances[channel].copy()
-            radiances[channel][lost.row, lost.col] *= optics.transmittance(lost.data)
+        depth = np.zeros((3, len(sky.sample) if absorbing else 0))
+        for body, paths in zip(absorbing, self.lit.sky_paths(absorbing), strict=True):
+            assert body.medium is not None
+            depth += np.asarray(body.medium.absorption)[:, None] * paths.toarray()[sky.sample, sky.direction]
+
+        def radiances(pairs: slice) -> Array:
+            seen = np.take(means, sky.direction[pairs], axis=1)
+            return seen * optics.transmittance(depth[:, pairs]) if absorbing else seen
+
         mirrored = (1.0 - diffuse_interface(ior).entering) / self._interface.entering
-        return sky_light(directions, received, radiances, self.lit.grid.normals, ior, mirrored)
+        return sky_light(sky, self._entrance.received, radiances, self.lit.grid.normals, ior, mirrored)
 
 
 def _cell_at(grid: BodyGrid, pose: Pose, position: npt.ArrayLike) -> int:

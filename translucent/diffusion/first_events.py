@@ -1,7 +1,7 @@
 """First scattering events of light that enters a body, and their source terms for diffusion.
 
-Light of smooth environments, and of the body itself, goes on below the surface as uniform light from outside does.
-Light of the lights of a scene goes in one direction below each sample, and light of the bright parts of an environment
+Light that comes alike from all sides, and light of the body itself, goes on below the surface as uniform light from
+outside does. Light of the lights of a scene goes in one direction below each sample, and what else an environment has
 in a few: refracted, so that it is scattered deeper where it enters straight, and farther along the surface where it
 enters at a slant.
 """

@@ -18,6 +18,7 @@ from translucent.diffusion.exchange import Exchange, OpaqueSurfaces, Patches
 from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.sides import SurfaceSides
+from translucent.diffusion.walls import Walls
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.ray_caster import ray_caster_of
@@ -38,14 +39,14 @@ class Entrance:
     ----------
     transfer : (n,) float64
         Flux for a unit of radiance from the part of the sphere around the direction of each pair of `Sky`.
-    received : (s, k) float32
+    received : (n,) float64
         The same where the sky is visible, else 0.
     itself : (s, s) csr_array
         Form factors: for a unit of diffuse flux that leaves another sample.
     """
 
     transfer: Array
-    received: Floats
+    received: Array
     itself: sparse.csr_array
 
 
@@ -92,13 +93,17 @@ class BodyShape:
         """Densities of the body."""
         return densities(self.body, self.grid)
 
+    @cached_property
+    def walls(self) -> Walls:
+        """Walls of the body."""
+        return Walls.of(self.grid)
+
     def entrance(self, ior: float, roughness: float) -> Entrance:
         """Transfer through an interface with this index and roughness; the last one is cached."""
         if (ior, roughness) not in self._entrances:
             sky, count = self.sky, len(self.grid.points)
             flux = transfer(sky, count, ior, diffuse_interface(ior, roughness))
-            received = np.zeros((count, len(sky.directions)), np.float32)
-            received[sky.sample, sky.direction] = np.where(np.isinf(sky.distance), flux, 0.0)
+            received = np.where(np.isinf(sky.distance), flux, 0.0)
             ends = np.searchsorted(sky.sample[sky.facing], np.arange(count + 1))
             itself = sparse.csr_array((flux[sky.facing] / np.pi, sky.other, ends), (count, count))
             self._entrances.clear()
@@ -221,8 +226,8 @@ class LitBody:
         if not hidden.any():
             return free
         if (ior, roughness) not in self._entrances:
-            sky, received, itself = self.shape.sky, free.received.copy(), free.itself.copy()
-            received[sky.sample[hidden], sky.direction[hidden]] = 0.0
+            sky, itself = self.shape.sky, free.itself.copy()
+            received = np.where(hidden, 0.0, free.received)
             itself.data[hidden[sky.facing]] = 0.0
             self._entrances.clear()
             self._entrances[ior, roughness] = Entrance(free.transfer, received, itself)

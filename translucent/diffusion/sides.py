@@ -17,7 +17,7 @@ from scipy import sparse
 from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 
-from translucent.arrays import Array, Floats, Integers
+from translucent.arrays import Array, Floats, Integers, Mask
 from translucent.diffusion.grid import BodyGrid
 
 #: Directions: two along each axis.
@@ -31,6 +31,9 @@ _ASIDE = -0.1
 
 #: Numbers of the entries of a symmetric matrix (3, 3) among those of its upper half.
 _SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+
+#: Cells that are fitted at a time: what that takes stays in the processor's cache.
+_TOGETHER = 256
 
 #: Squared distance in cells over which samples must be spread for their gradient to count.
 _STIFF = 0.1
@@ -67,21 +70,19 @@ class SurfaceSides:
         count = min(AROUND, len(points))
         distance, sample = cKDTree(points).query(centers, count, distance_upper_bound=REACH)
         distance, sample = distance.reshape(-1, count), np.asarray(sample).reshape(-1, count)
-        near = np.where(np.isfinite(distance), (1.0 - (distance / REACH) ** 2) ** 2, 0.0)
-        sample = np.where(near > 0.0, sample, 0)
-        near *= grid.areas[sample]
-        offset = (points[sample] - centers[:, None]).astype(np.float32)
-        normals = grid.face_normals.astype(np.float32)[sample]
-        signs = np.where(np.arange(SIDES) % 2 == 0, np.float32(1.0), np.float32(-1.0))
-        facing = np.maximum(signs * np.repeat(normals, 2, axis=2) - np.float32(_ASIDE), 0.0)
-        weight = np.moveaxis(facing**2, 2, 1) * near[:, None].astype(np.float32)
-        cell, side = np.nonzero(weight.any(axis=2))
-        rows = _fitted(weight, offset, normals)[cell, side]
-        used = rows != 0.0
-        first = np.concatenate([[0], np.cumsum(np.count_nonzero(used, axis=1))])
+        areas, face_normals = grid.areas.astype(np.float32), grid.face_normals.astype(np.float32)
+        rows = []
+        for part in np.array_split(np.arange(len(cells)), len(cells) // _TOGETHER + 1):
+            near = np.where(np.isfinite(distance[part]), (1.0 - (distance[part] / REACH) ** 2) ** 2, 0.0)
+            own = np.where(near > 0.0, sample[part], 0)
+            offset = (points[own] - centers[part, None]).astype(np.float32)
+            rows.append(_rows(near.astype(np.float32) * areas[own], offset, face_normals[own], own))
+        weight, samples, used, has = (np.concatenate(each) for each in zip(*rows, strict=True))
+        cell, side = np.nonzero(has)
         number = grid.number.ravel()
         deep = np.setdiff1d(np.flatnonzero(number >= 0), cells, assume_unique=True)
-        weights = sparse.csr_array((rows[used], sample[cell][used], first), (len(rows), len(points)))
+        first = np.concatenate([[0], np.cumsum(used)])
+        weights = sparse.csr_array((weight, samples, first), (len(used), len(points)))
         return cls(weights, side * int(np.prod(shape)) + cells[cell], deep, number[deep], shape)
 
     def volume(self, values: Floats, deep: Floats) -> Floats:
@@ -105,6 +106,20 @@ def _cells_near(grid: BodyGrid) -> Integers:
         for towards in (-1, 1):
             wide |= np.roll(near, towards, axis)
     return np.flatnonzero(near | wide)
+
+
+def _rows(near: Floats, offset: Floats, normals: Floats, sample: Integers) -> tuple[Floats, Integers, Integers, Mask]:
+    """Rows of `SurfaceSides.weights` for k cells: numbers (u,), columns (u,), lengths (r,), and sides (k, 6) with one.
+
+    Of n samples around each, with weights (k, n), offsets (k, n, 3) from the cell and normals (k, n, 3).
+    """
+    signs = np.where(np.arange(SIDES) % 2 == 0, np.float32(1.0), np.float32(-1.0))
+    facing = np.maximum(signs * np.repeat(normals, 2, axis=2) - np.float32(_ASIDE), 0.0)
+    weight = np.moveaxis(facing**2, 2, 1) * near[:, None]
+    has = np.asarray(weight.any(axis=2))
+    found = _fitted(weight, offset, normals)[has]
+    used = found != 0.0
+    return found[used], sample[np.nonzero(has)[0]][used], np.count_nonzero(used, axis=1), has
 
 
 def _fitted(weight: Floats, offset: Floats, normals: Floats) -> Floats:

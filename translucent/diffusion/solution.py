@@ -281,6 +281,8 @@ class BodySystem:
         Of its surface.
     dense : Densities, optional
         Of the body; default: `even_densities`.
+    walls : Walls, optional
+        Of the grid; default: `Walls.of` it.
     colors : (i, 3) float64, optional
         Fraction of the light that inclusions reflect at their samples; default: half.
     corrected : bool
@@ -298,6 +300,7 @@ class BodySystem:
         roughness: float,
         dense: Densities | None = None,
         *,
+        walls: Walls | None = None,
         colors: Array | None = None,
         corrected: bool = True,
         warm_starts: bool = False,
@@ -308,7 +311,7 @@ class BodySystem:
         self._grid, self._dense = grid, dense or even_densities(grid)
         count = 0 if grid.inclusions is None else len(grid.inclusions.points)
         colors = np.full((count, 3), 0.5) if colors is None else colors
-        paths, walls = diffuse_paths(grid, self._dense, medium.ior), Walls.of(grid)
+        paths, walls = diffuse_paths(grid, self._dense, medium.ior), walls or Walls.of(grid)
         self._channels = {
             channel: _ChannelSystem(
                 grid,
@@ -449,7 +452,7 @@ class _ChannelSystem:
         self._extinctions = extinction, absorption + scattering / (1.0 - phase.mean_cosine)
         self._ior, self._chord, self._interface = ior, chord, interface
         self._walls = walls
-        slab = SlabSolution(walls.thickness, ior, absorption, scattering, phase) if walls.any else None
+        slab = SlabSolution(walls, ior, absorption, scattering, phase) if walls.any else None
         self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord, slab)
         diffuse, self._paths, self._all = self._first.of(paths), paths, paths.samples
         # Cells that the surface cuts count a little too many events, or too few. The lengths of paths say how many: at

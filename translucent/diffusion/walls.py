@@ -10,11 +10,12 @@ taken out by their exact fluxes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array, Integers, Mask
 from translucent.diffusion.grid import THIN, BodyGrid
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient
@@ -80,26 +81,42 @@ class Walls:
         near = ((grid.points[other] - ends) ** 2).sum(axis=1) < _NEAR * grid.area
         cells = thickness[thin] / grid.cells.step
         part[thin] = near * grid.parallel * np.clip((THIN - cells) / (THIN - SLAB), 0.0, 1.0)
-        area = _area_ratios(grid, thickness)
+        if not part.any():
+            return cls(part, across, thickness, np.ones(count))
+        area = _area_ratios(grid, thickness, np.flatnonzero(part))
         flat = np.minimum(area, 1.0 / area)
         return cls(part * np.clip((flat - _CURVED) / (_FLAT - _CURVED), 0.0, 1.0), across, thickness, area)
+
+    @cached_property
+    def lit(self) -> Mask:
+        """(s,): samples whose light makes the fluence of walls: those of walls, and those across."""
+        found = self.part > 0.0
+        found[self.across[found]] = True
+        return found
 
     @property
     def any(self) -> bool:
         """True if there are walls."""
-        return bool((self.part > 0.0).any())
+        return bool(self.lit.any())
 
 
-def _area_ratios(grid: BodyGrid, thickness: Array) -> Array:
-    """(s,): area of the other side of a wall over that of this one, from the spreads of neighboring samples on both."""
-    points, normals, nearest = grid.points, grid.normals, grid.nearest
-    aside = np.where(np.abs(normals[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    across = np.cross(normals, aside)
+def _area_ratios(grid: BodyGrid, thickness: Array, samples: Integers) -> Array:
+    """(s,): area of the other side of a wall over that of this one, at samples (k,); 1 at all others.
+
+    From the spreads of neighboring samples on both sides.
+    """
+    points, normals = grid.points, grid.normals
+    # Those that means of means at the samples read.
+    for _ in range(MEANS):
+        samples = np.unique(grid.nearest[samples])
+    nearest, own = grid.nearest[samples], normals[samples]
+    aside = np.where(np.abs(own[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    across = np.cross(own, aside)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    plane = np.stack([across, np.cross(normals, across)], axis=1)
+    plane = np.stack([across, np.cross(own, across)], axis=1)
 
     # Of neighbors, those on the same side.
-    same = (np.einsum("sc,snc->sn", normals, normals[nearest]) > _ALIKE_NORMALS).astype(np.float64)
+    same = (np.einsum("sc,snc->sn", own, normals[nearest]) > _ALIKE_NORMALS).astype(np.float64)
     share = same / same.sum(axis=1, keepdims=True)
 
     def spread(places: Array) -> Array:
@@ -111,9 +128,10 @@ def _area_ratios(grid: BodyGrid, thickness: Array) -> Array:
     least = (1e-3 * grid.area) ** 2
     squared = np.maximum(spread(points - thickness[:, None] * normals), least) / np.maximum(spread(points), least)
     # So few samples say little of it, and their neighbors are as curved.
-    ratio = 0.5 * np.log(squared)
+    ratio = np.zeros(len(points))
+    ratio[samples] = 0.5 * np.log(squared)
     for _ in range(MEANS):
-        ratio = np.einsum("sn,sn->s", share, ratio[nearest])
+        ratio[samples] = np.einsum("sn,sn->s", share, ratio[nearest])
     return np.asarray(np.exp(ratio))
 
 
@@ -122,18 +140,15 @@ class SlabSolution:
 
     Parameters
     ----------
-    thickness : (s,) float64
-        In m.
+    walls : Walls
     ior : float
     absorption, scattering : float
         The reduced one, in 1/m.
     phase : PhaseFunction
     """
 
-    def __init__(
-        self, thickness: Array, ior: float, absorption: float, scattering: float, phase: PhaseFunction
-    ) -> None:
-        self._thickness, self._extinction = thickness, absorption + scattering
+    def __init__(self, walls: Walls, ior: float, absorption: float, scattering: float, phase: PhaseFunction) -> None:
+        self._walls, self._extinction = walls, absorption + scattering
         albedo = max(round(scattering / self._extinction, 6), _LEAST_ALBEDO)
         self._conductance, self._mean_cosine = diffuse_interface(ior).conductance, diffuse_interface(ior).mean_cosine
         self._table = exact = slab_fluxes(albedo, ior, phase)
@@ -147,7 +162,7 @@ class SlabSolution:
 
     @np.errstate(under="ignore")
     def events(self, samples: Integers, cosine: Array | float) -> tuple[Array, Array]:
-        """Fluence (k,) on the side where a unit of flux enters at samples (k,), and on the other one.
+        """Fluence (k,) on the side where a unit of flux enters at samples (k,), and on the other one; 0 off walls.
 
         Parameters
         ----------
@@ -155,8 +170,11 @@ class SlabSolution:
         cosine : (k,), or float
             Of light with the normal, inside; one for all: uniform light.
         """
-        depth = self._extinction * self._thickness[samples]
-        found = _by_diffusion(self._albedo, self._conductance, depth, np.asarray(cosine))
+        own, across = np.zeros((2, len(samples)))
+        on = np.flatnonzero(self._walls.lit[samples])
+        cosine = np.asarray(cosine) if np.ndim(cosine) == 0 else np.asarray(cosine)[on]
+        depth = self._extinction * self._walls.thickness[samples[on]]
+        found = _by_diffusion(self._albedo, self._conductance, depth, cosine)
         depths = self._table.depths
         at = np.interp(np.log(np.maximum(depth, depths[0])), np.log(depths), np.arange(len(depths)))
         if np.ndim(cosine) == 0:
@@ -164,7 +182,7 @@ class SlabSolution:
         else:
             along = np.interp(cosine, self._table.cosines, np.arange(len(self._table.cosines)))
             ratios = [map_coordinates(ratio, np.stack([at, along]), order=1, mode="nearest") for ratio in self._ratios]
-        own, across = (ratio * flux / self._conductance for ratio, flux in zip(ratios, found, strict=True))
+        own[on], across[on] = (ratio * flux / self._conductance for ratio, flux in zip(ratios, found, strict=True))
         return own, across
 
 
