@@ -16,6 +16,7 @@ uniform float samples;             // of a pixel
 uniform float most;                // that one may have which shows an interface alone
 uniform float contrast;            // largest range of light near a pixel that one sample is enough for, as a fraction of its mean
 uniform float much_lost;           // fraction of a pixel's light whose loss makes it invalid whatever other samples find
+uniform float error;               // standard error that is as good as none, as a fraction of the light
 uniform float wanted;              // samples of a pixel whose deviation is 1
 uniform int first;                 // 1: there is one sample so far
 uniform int measures;
@@ -62,5 +63,6 @@ void main() {
         return;
     }
     unsettled = sqrt(squares / max(sum, 1e-30));
-    if (measures == 0 && taken >= wanted * pow(unsettled, 2.0 / 3.0)) { discard; }
+    bool good = squares * count <= taken * error * error * sum * sum;
+    if (measures == 0 && (good || taken >= wanted * pow(unsettled, 2.0 / 3.0))) { discard; }
 }

@@ -20,9 +20,9 @@ from translucent.planning.passes import PassName
 
 Floats = npt.NDArray[np.float32]
 
-#: Of 16 samples: the largest range of light near a pixel that one sample is enough for, as a fraction of the light.
-#: With more samples it is smaller.
-CONTRAST = 0.05
+#: Of 16 samples: the largest range of light near a pixel that one sample is enough for, and the largest standard error
+#: that is as good as none, both as fractions of the light. With more samples they are smaller.
+CONTRAST, ERROR = 0.05, 0.005
 
 #: The same of the light that bodies add to what a ground mirrors, as a fraction of all light of the ground: that is
 #: smooth but for the mirror image, so that less of an error shows.
@@ -123,6 +123,7 @@ class AdaptiveSampling:
             marked.append((("mirrored", "mirror_unsettled"), MIRROR_CONTRAST, MIRROR_LOST, part))
         finer = min(16.0 / samples, 1.0) ** 0.5
         values = {"samples": samples, "most": _most(samples), "first": taken == 1, "wanted": 0.0, "measures": 1}
+        values["error"] = finer * ERROR
         own = [{**values, "contrast": finer * contrast, "much_lost": lost} for _, contrast, lost, _ in marked]
         if taken == FIRST_LOOK:
             found = []

@@ -48,7 +48,7 @@ class OpaquePass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the opaque objects with the depth test on."""
-        if job.bending:
+        if job.bending or job.averaged:  # no picture of them is read
             ends = job.targets.opaque_ends()
             ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
             self.draw_depth(job, spec.objects, ends)
