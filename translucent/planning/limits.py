@@ -246,6 +246,9 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
         )
         if scene.opaque:
             text += "; light that grounds reflect into the medium, up to 45 % of the light of a body on a bright ground"
+        volumes = [body for body in bodies if treatment_of(body) is Treatment.VOLUME]
+        if scene.lights and any(body.medium.anisotropy >= STRONGLY_AHEAD for body in volumes if body.medium):
+            text += "; dense fog that scatters forward is up to 15 % too dark before and beside a light"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     rendered = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
     if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in rendered]:
@@ -296,7 +299,7 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             text += "; a body next to another is up to 10 % too dark"
         ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
         if any(ahead) and scene.environment.kind == "image":
-            text += "; bright parts of the environment, scattered forward by the bodies, are up to 30 % too dark"
+            text += "; bright parts of the environment, scattered forward by the bodies, are up to 50 % too dark"
         if any(body.medium is not None and body.medium.emits for body in bodies):
             text += "; light that the bodies emit and scatter is up to 10 % too dark"
         if held := [item for item in scene.opaque if any(_may_hold(body, item) for body in bodies)]:
