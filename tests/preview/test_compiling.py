@@ -17,6 +17,7 @@ import pytest
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
+from translucent.geometry import normals
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals, made_normals
 from translucent.geometry.solids import Box, Sphere
@@ -216,12 +217,13 @@ def test_normals_of_a_large_mesh_come_from_another_process(
     mesh = work.loaded.scene.objects[0].mesh
     assert not has_drawn_normals(mesh)
     wait(work, lambda: work.compiler.lane.task is None)
-    here: list[Mesh] = []
-    monkeypatch.setattr("translucent.geometry.normals.corner_normals", here.append)
-    work.do(ChoosePreset("crystal"))
+    here: list[object] = []
+    fill = normals._fill
+    monkeypatch.setattr(normals, "_fill", lambda *given: (here.append(given), fill(*given)))
+    work.do(ChoosePreset("merlot"))
     finish(view, work)
     assert view.problem == ""
-    assert not here
+    assert not [given for given in here if len(given[2]) == len(mesh.faces)]
     np.testing.assert_array_equal(drawn_normals(mesh), corner_normals(mesh).astype(np.float32))
 
 

@@ -21,7 +21,7 @@ from translucent.diffusion.interfaces import EscapePaths
 from translucent.diffusion.voxels import Voxels, cut_cells, voxels, without
 from translucent.formulas import optics
 from translucent.geometry.mesh import Mesh, Triangles, joined
-from translucent.geometry.normals import corner_normals
+from translucent.geometry.normals import drawn_normals
 from translucent.geometry.ray_caster import RayCaster, ray_caster_of
 from translucent.scene.scene import Object
 
@@ -567,7 +567,7 @@ def body_grid(body: Object, step: float, opaque: Sequence[Object] = ()) -> BodyG
         faces = faces[:, ::-1]
     whole = voxels(corners, faces, step)
     points, face_normals, face, weights, area = _surface_samples(corners[faces], SAMPLES / step**2)
-    at_corners = corner_normals(body.mesh).reshape(-1, 3, 3)
+    at_corners = drawn_normals(body.mesh).reshape(-1, 3, 3)
     if np.linalg.det(matrix) < 0.0:
         at_corners = at_corners[:, ::-1]
     normals = np.einsum("sc,sci->si", weights, at_corners[face]) @ np.linalg.inv(matrix)

@@ -72,7 +72,7 @@ class RayHits(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _EmbreePart:
-    """Embree scene of some objects, whose geometries they are, in coordinates of its own from -1 to 1 or about that.
+    """Embree scene of some objects, one geometry each, in its own coordinates of about -1 to 1.
 
     These are `scale` times `linear` (3, 3), where that is not None, times what rays are off `middle` (3,).
     """

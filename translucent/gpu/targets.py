@@ -276,7 +276,7 @@ class Targets:
 
 
 def add_up(gl: moderngl.Context, also: int = 0) -> None:
-    """Have what is drawn next be added to what its target holds, with `also` these flags of moderngl."""
+    """Blend the next draws by addition to the target's values, with `also` these flags of moderngl."""
     gl.enable_only(moderngl.BLEND | also)
     gl.blend_equation = moderngl.FUNC_ADD
     gl.blend_func = moderngl.ONE, moderngl.ONE

@@ -297,7 +297,7 @@ class ShadowMapsPass:
 
 
 def _mapped_ground(job: FrameJob) -> Mirror | None:
-    """Ground whose shadows of the environment are found once for all samples; None where they are not."""
+    """Ground with a map of the environment's shadows, made once for all samples; None without such a map."""
     few = job.bending and job.plan.shadows.directions is not None
     if few or job.any_eye or not job.scene.environment_shadows or not job.plan.has(PassName.OPAQUE):
         return None
