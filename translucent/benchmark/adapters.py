@@ -59,10 +59,10 @@ class SceneNotSupportedError(Exception):
 
 
 class Rendered(NamedTuple):
-    """A picture: linear radiance (h, w, 3), or none; its seconds; thickness (h, w) in metres, NaN where not known."""
+    """A picture: radiance (h, w, 3), if any; seconds, if known; thickness (h, w) in metres, NaN where not known."""
 
     radiance: npt.NDArray[Any] | None
-    seconds: float
+    seconds: float | None
     thickness: npt.NDArray[Any] | None = None
 
 

@@ -99,8 +99,8 @@ class WebSession:
         self._page, self.device, self._errors = page, device, errors
         self.folder = Path()
 
-    def draw(self, scene: BenchmarkScene, folder: Path) -> tuple[npt.NDArray[np.float32], float]:
-        """Linear radiance (h, w, 3) of a scene out of its folder, and seconds of a picture after the first."""
+    def draw(self, scene: BenchmarkScene, folder: Path) -> tuple[npt.NDArray[np.float32], float | None]:
+        """Linear radiance (h, w, 3) of a scene out of its folder, and its seconds, if it tells."""
         self.folder = folder
         self._errors.clear()
         width, height = scene.size
@@ -113,7 +113,7 @@ class WebSession:
         side = round((values.size / 3) ** 0.5)
         fine = values.reshape(side, side, 3)
         parts = side // width
-        return fine.reshape(height, parts, width, parts, 3).mean(axis=(1, 3)), float(told["seconds"])
+        return fine.reshape(height, parts, width, parts, 3).mean(axis=(1, 3)), told["seconds"]
 
 
 @contextmanager
