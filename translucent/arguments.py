@@ -128,7 +128,9 @@ def vectors(what: str, value: npt.ArrayLike, width: int = 3, give: str = "points
     found = np.asarray(value, dtype=np.float64)
     if found.ndim == 0 or found.shape[-1] != width:
         raise InputError(
-            f"{what} of shape {found.shape}", f"not (..., {width})", f"give {give} of {width} numbers each"
+            f"{what} of shape {found.shape}",
+            f"the last axis must have {width} numbers: (..., {width})",
+            f"give {give} of {width} numbers each",
         )
     if not np.isfinite(found).all():
         raise InputError(what, "not finite", f"give {give} of finite numbers")

@@ -15,7 +15,9 @@ def shader_path(name: str) -> Path:
     """Path of a shader file such as ``lib/optics.glsl``; raises `InputError` where there is none."""
     path = _folder("shaders") / name
     if not path.is_file():
-        raise InputError(f"shader {name!r}", f"no such file in {_folder('shaders')}", "reinstall translucent-shading")
+        raise InputError(
+            f"shader {name!r}", f"this file is missing in {_folder('shaders')}", "reinstall translucent-shading"
+        )
     return path
 
 
@@ -47,7 +49,7 @@ def mesh_path(name: str) -> Path:
     for path in _mesh_files():
         if path.stem == name:
             return path
-    raise InputError(f"mesh {name!r}", "not one of the toolkit's own", f"use one of {', '.join(mesh_names())}")
+    raise InputError(f"mesh {name!r}", "no built-in mesh has this name", f"use one of {', '.join(mesh_names())}")
 
 
 def mesh_names() -> list[str]:
@@ -59,7 +61,7 @@ def scene_path(name: str) -> Path:
     """Path of a scene that comes with the toolkit, such as ``glass-of-wine``; raises `InputError` for other names."""
     path = _folder("scenes") / f"{name}.toml"
     if name not in scene_names():
-        raise InputError(f"scene {name!r}", "not one of the toolkit's own", f"use one of {', '.join(scene_names())}")
+        raise InputError(f"scene {name!r}", "no built-in scene has this name", f"use one of {', '.join(scene_names())}")
     return path
 
 
@@ -73,7 +75,9 @@ def web_path(name: str) -> Path:
     path = _web_folder() / name
     if not path.is_file():
         found = f"{path} is not there: it is built, not kept with the source"
-        raise InputError(f"the script {name!r} for browsers", found, "run `make web` in the checkout (it needs npm)")
+        raise InputError(
+            f"the script {name!r} for browsers", found, "build the script: run `make web` in the checkout (needs npm)"
+        )
     return path
 
 

@@ -77,7 +77,9 @@ def _require_values(given: list[str]) -> None:
         if word == "--":
             return
         if word in valued and after in names:
-            raise InputError(word, f"the next word is the option {after}", f"give {word} a value before it")
+            raise InputError(
+                word, f"the next word is the option {after}", f"give {word} a value before the next option"
+            )
 
 
 def _refuse_two_words(given: list[str]) -> None:

@@ -102,7 +102,9 @@ def load_mesh(
     """
     stated = [name for name, value in (("unit", unit), ("height", height), ("longest", longest)) if value is not None]
     if len(stated) > 1:
-        raise InputError(f"load_mesh {stated[0]}", f"{stated[1]} is given, too", "give one of them")
+        raise InputError(
+            f"load_mesh {stated[0]}", f"{stated[1]} is given, too, and both set the size", "use only one of them"
+        )
     parts = None if isinstance(path, str | Path) else foreign_parts(path)
     if parts is not None:
         name = foreign_name(path)
@@ -128,7 +130,7 @@ def _read(path: Path, allow_outside: bool) -> Triangles:
         do = (
             "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
         )
-        raise InputError(asked, f"format {path.suffix or 'without suffix'!r} is not known", do)
+        raise InputError(asked, f"the mesh format {path.suffix or 'without suffix'!r} is not supported", do)
     return read_triangles(path, asked, allow_outside)
 
 
@@ -164,7 +166,7 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
         except InputError:
             raise
         except Exception as error:  # each of trimesh's readers raises its own kinds
-            raise InputError(asked, f"it cannot be read ({shown(error)})", "export the mesh again") from error
+            raise InputError(asked, f"the file cannot be read ({shown(error)})", "export the mesh again") from error
 
 
 def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
@@ -206,7 +208,7 @@ def _require_archive_room(stream: BinaryIO, asked: str) -> None:
         try:
             size = sum(member.file_size for member in zipfile.ZipFile(stream).infolist())
         except Exception as error:  # zipfile raises whatever its parts do
-            raise InputError(asked, f"it cannot be read ({shown(error)})", "export the mesh again") from error
+            raise InputError(asked, f"the file cannot be read ({shown(error)})", "export the mesh again") from error
         require_room(asked, "its parts", size, os.fstat(stream.fileno()).st_size)
     stream.seek(0)
 

@@ -71,9 +71,13 @@ class Renderer:
 
     def __init__(self, backend: str | None = None, context: moderngl.Context | None = None) -> None:
         if backend is not None and backend not in BACKENDS:
-            raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(BACKENDS)}")
+            raise InputError(f"backend {backend!r}", "no backend has this name", f"use one of {', '.join(BACKENDS)}")
         if context is not None and backend is not None:
-            raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
+            raise InputError(
+                f"backend {backend!r}",
+                "a context is given, too, and it already determines the backend",
+                "give only one of the two",
+            )
         self._plans: WeakKeyDictionary[Scene, dict[RenderRequest, RenderPlan]] = WeakKeyDictionary()
         self._closed = False
         self._asked = backend, context
@@ -244,7 +248,7 @@ class Renderer:
         if request.over_backdrop:
             _check_backdrop(backdrop, size)
         elif backdrop is not None:
-            raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
+            raise InputError("a transparent frame", "the frame also has a backdrop", "omit one of the two")
         request = dataclasses.replace(request, pixels=size[0] * size[1])
         plan = self.plan_requested(scene, request)
         if request.denoise:
@@ -366,12 +370,14 @@ class Renderer:
 
     def _gpu(self, what: str) -> GpuRenderer:
         if not isinstance(self._engine, GpuRenderer):
-            raise RenderError(what, "this renderer works on the CPU", 'use another backend than "cpu"')
+            raise RenderError(
+                what, "this renderer works on the CPU, and has no OpenGL", 'use a backend other than "cpu"'
+            )
         return self._engine
 
     def _require_open(self) -> None:
         if self._closed:
-            raise RenderError("rendering", "the renderer is closed", "make a new one")
+            raise RenderError("rendering", "the renderer has been closed", "create a new renderer")
 
 
 def _engine(backend: str | None, context: moderngl.Context | None) -> GpuRenderer | CpuRenderer:
@@ -386,7 +392,9 @@ def _engine(backend: str | None, context: moderngl.Context | None) -> GpuRendere
             engine = _cpu_renderer()
         except RenderError as other:
             raise error from other
-        warnings.warn(f"rendering on the CPU, for want of OpenGL: {error}", TranslucentWarning, stacklevel=4)
+        warnings.warn(
+            f"rendering on the CPU, because OpenGL is not available: {error}", TranslucentWarning, stacklevel=4
+        )
         return engine
 
 
@@ -399,10 +407,12 @@ def _cpu_renderer() -> CpuRenderer:
 
 def _check_backdrop(backdrop: Backdrop | TextureBackdrop | None, size: tuple[int, int]) -> None:
     if not isinstance(backdrop, Backdrop | TextureBackdrop):
-        raise InputError(f"backdrop {brief(backdrop)}", f"of type {type(backdrop).__name__}", "give a tl.Backdrop")
+        raise InputError(
+            f"backdrop {brief(backdrop)}", f"of type {type(backdrop).__name__}", "give an object of type tl.Backdrop"
+        )
     if backdrop.size != size:
         asked = f"backdrop of {backdrop.size[0]}x{backdrop.size[1]}"
-        raise InputError(asked, f"the frame is {size[0]}x{size[1]}", "draw both in the same size")
+        raise InputError(asked, f"the frame has {size[0]}x{size[1]} pixels", "render both in the same size")
 
 
 def _warn(frame: Frame) -> None:

@@ -170,7 +170,7 @@ def load_scene(
         return load_gltf(path, unit, camera, size, allow_outside=allow_outside, **more)  # type: ignore[arg-type]
     for name, value in (("variant", variant), ("time", time)):
         if value is not None:
-            raise InputError(f"{name} {value!r}", f"{_text(path)} is no glTF file", "leave it out")
+            raise InputError(f"{name} {value!r}", f"{_text(path)} is not a glTF file", "omit this key")
     scene = load_composed(_text(path), unit, size, allow_outside=allow_outside)
     if scene.stage == NO_STAGE:
         return scene
@@ -269,10 +269,14 @@ def _of_word(word: str) -> tuple[str, str, dict[str, Any]]:
         values["preset"] = material
     if not os.path.lexists(model) and model not in mesh_names():
         if model in scene_names():
-            raise InputError(f"model {word!r}", "it is a scene", f"give it alone: translucent render {model}")
+            raise InputError(
+                f"model {word!r}",
+                "the word names a whole scene, which cannot be combined with other models",
+                f"render the scene alone: translucent render {model}",
+            )
         close = close_names(model, mesh_names())
         do = did_you_mean(close) if close else f"give a path, or one of {', '.join(sorted(mesh_names()))}"
-        raise InputError(f"model {word!r}", f"no file {model!r} and no mesh of the toolkit", do)
+        raise InputError(f"model {word!r}", f"no file {model!r} and no built-in mesh has this name", do)
     return model, f"model {word!r}", values
 
 
@@ -329,7 +333,9 @@ def _length(value: Any) -> float:
     if not isinstance(value, str):
         return float(value)
     if not (metres := _coordinate(value)) > 0:
-        raise InputError(f"length {value!r}", "not positive", "give a distance above zero, for example 2cm")
+        raise InputError(
+            f"length {value!r}", "the length must be positive", "give a length above zero, for example 2cm"
+        )
     return metres
 
 
@@ -338,7 +344,11 @@ def _coordinate(value: Any) -> float:
     if not isinstance(value, str):
         return float(value)
     if (metres := metres_in(value)) is None or not np.isfinite(metres):
-        raise InputError(f"length {value!r}", "not a number with a unit", "write for example 2cm, 0.8in, or metres")
+        raise InputError(
+            f"length {value!r}",
+            "the text is not a number with a unit",
+            "write a length such as 2cm or 0.8in, or a number of metres",
+        )
     return metres
 
 
@@ -408,13 +418,13 @@ class _SceneFile:
         try:
             self.tree = toml_value(self.text)
         except ValueError as error:
-            raise InputError(self.what, f"no TOML: {error}", "correct the file") from None
+            raise InputError(self.what, f"the file is not valid TOML: {error}", "correct the file") from None
 
     def scene(self) -> ComposedScene:
         """Read the whole."""
         if "version" in self.tree and "object" not in self.tree:
             found = "it is a session of the previewer"
-            raise InputError(self.what, found, f"open it: translucent preview --session {self.path}")
+            raise InputError(self.what, found, f"open the session with: translucent preview --session {self.path}")
         self._check(self.tree, _SCENE_KEYS, "")
         tables = self.tree.get("object", [])
         if not (isinstance(tables, list) and tables and all(isinstance(one, dict) for one in tables)):
@@ -465,7 +475,7 @@ class _SceneFile:
         if not path.exists() and not os.path.dirname(model) and not Path(model).suffix:
             close = close_names(model, mesh_names())
             do = did_you_mean(close) if close else f"give a path, or one of {', '.join(sorted(mesh_names()))}"
-            raise InputError(f"model {model!r}", "no file and no mesh of the toolkit", do)
+            raise InputError(f"model {model!r}", "no file and no built-in mesh has this name", do)
         return path
 
     def _lights(self) -> list[dict[str, Any]]:
@@ -491,7 +501,7 @@ class _SceneFile:
             try:
                 light: Light = made(**given)
             except TypeError as error:
-                raise InputError(f"a {kind} light", str(error).partition(") ")[2], "give it") from None
+                raise InputError(f"a {kind} light", str(error).partition(") ")[2], "add this parameter") from None
             return light
 
         return self._at("light", number, "type", make)
@@ -520,7 +530,7 @@ class _SceneFile:
                 direction = -direction_from(*map(float, values["orbit"]))
             return framing(objects, self.size, fov, up, stage, direction, values.get("fit"))
         if extra := [key for key in ("orbit", "fit") if key in values]:
-            raise InputError(extra[0], "eye is given, too", "give one of them")
+            raise InputError(extra[0], "the key eye is given, too", "use only one of the two")
         bounds = np.array([item.bounds for item in objects])
         middle = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
         eye, target = ([self.factor * _coordinate(v) for v in values.get(key, ())] for key in ("eye", "target"))
@@ -556,7 +566,9 @@ def _environment_named(text: Any) -> Environment:
     if text is None:
         return LIGHT_TABLE
     if not isinstance(text, str):
-        raise InputError(f"environment {text!r}", "no text", 'write environment = "studio"')
+        raise InputError(
+            f"environment {text!r}", "the value is not a text", 'write a value such as environment = "studio"'
+        )
     name, comma, degrees = text.rpartition(",")
     turned = comma and re.fullmatch(r"[-+]?\d+\.?\d*", degrees.strip())
     return named_environment(name, float(degrees)) if turned else named_environment(text)

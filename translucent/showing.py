@@ -69,7 +69,7 @@ def show(
         If the window is requested and cannot be opened.
     """
     if where not in (None, "notebook", "window", "page"):
-        raise InputError(f"where {where!r}", "not a viewer", "use notebook, window or page")
+        raise InputError(f"where {where!r}", "no viewer has this name", 'use "notebook", "window" or "page"')
     found = named_preset(material) if isinstance(material, str) else material
     where = where or ("notebook" if _in_notebook() else "window" if _at_desk(thing) else "page")
     if where == "window":
@@ -137,7 +137,9 @@ def _window(thing: Any, material: Preset | Medium | None, unit: str | None) -> N
 
     if isinstance(thing, Scene):
         do = "show it as a page, or give the window a mesh: tl.show(mesh)"
-        raise InputError("show a Scene in the window", "the window would not keep its lights and camera", do)
+        raise InputError(
+            "show a Scene in the window", "the window would ignore the lights and the camera of the scene", do
+        )
     with tempfile.TemporaryDirectory(prefix="translucent-") as folder:
         if isinstance(thing, str | Path):
             model = Model(str(thing), unit or "m")
@@ -161,7 +163,9 @@ def _window(thing: Any, material: Preset | Medium | None, unit: str | None) -> N
         ended = subprocess.run([sys.executable, "-m", "translucent", "preview", "--session", str(session)], check=False)
     if ended.returncode:
         raise RenderError(
-            "show in a window", f"the previewer ended with exit code {ended.returncode}", "its error is printed above"
+            "show in a window",
+            f"the previewer ended with exit code {ended.returncode}",
+            "the error message of the previewer is printed above",
         )
 
 

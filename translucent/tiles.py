@@ -105,7 +105,9 @@ def render_tiles(
         or a backdrop.
     """
     if options.pop("backdrop", None) is not None:
-        raise InputError("a picture in tiles", "a backdrop is given, too", "render it at once")
+        raise InputError(
+            "rendering a picture in tiles", "a backdrop cannot be used with tiles", "render the whole picture at once"
+        )
     yield from tiles_requested(renderer, scene, size, RenderRequest(**options), tile, progress=progress)
 
 
@@ -201,10 +203,16 @@ def check_tiles(plan: RenderPlan) -> None:
     do = "render it at once, in a size that fits into memory"
     if plan.interfaces is not None and plan.has(PassName.SURFACES) and plan.interfaces.finds_exits:
         raise InputError(
-            "a picture in tiles", "interfaces in screen space, which need all of it", f"trace them, or {do}"
+            "rendering a picture in tiles",
+            "interfaces in screen space need the whole picture",
+            f"trace the interfaces, or {do}",
         )
     if plan.has(PassName.CAUSTICS):
-        raise InputError("a picture in tiles", "photons, which each tile would follow anew", f"leave them out, or {do}")
+        raise InputError(
+            "rendering a picture in tiles",
+            "each tile would trace all photons again",
+            f"render without caustics, or {do}",
+        )
 
 
 def _rendered(
@@ -244,7 +252,9 @@ def check_tiled_output(path: Path) -> None:
     check_output(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(
-            f"output {str(path)!r} in tiles", "a file that holds all arrays at once", "write an .exr, or a .png"
+            f"writing {str(path)!r} in tiles",
+            "this file format needs all arrays at once",
+            "write an .exr or a .png instead",
         )
 
 

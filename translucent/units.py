@@ -48,7 +48,7 @@ def metres_per_unit(unit: str) -> float:
         return METRES_PER_UNIT[name]
     if (match := _LENGTH.fullmatch(name)) is not None and match[2]:
         return parse_length(name)
-    raise InputError(f"unit {unit!r}", "not a known unit of length", f"use one of {', '.join(METRES_PER_UNIT)}")
+    raise InputError(f"unit {unit!r}", "no unit of length has this name", f"use one of {', '.join(METRES_PER_UNIT)}")
 
 
 def parse_length(text: str, default_unit: str = "m") -> float:
@@ -61,10 +61,14 @@ def parse_length(text: str, default_unit: str = "m") -> float:
     """
     match = _LENGTH.fullmatch(text)
     if match is None:
-        raise InputError(f"length {text!r}", "not a number with a unit", "write for example 2cm, 0.8in or 0.02")
+        raise InputError(
+            f"length {text!r}", "the text is not a number with a unit", "write a length such as 2cm, 0.8in or 0.02"
+        )
     metres = float(match[1]) * metres_per_unit(match[2] or default_unit)
     if not (math.isfinite(metres) and metres > 0):
-        raise InputError(f"length {text!r}", "not positive and finite", "give a distance above zero, for example 2cm")
+        raise InputError(
+            f"length {text!r}", "the length must be positive and finite", "give a length above zero, for example 2cm"
+        )
     return metres
 
 
@@ -209,11 +213,19 @@ def scale_to(bounds: Array, height: float | None, longest: float | None, name: s
     """
     requested, side = ("height", height) if height is not None else ("longest", longest)
     if side is None or not (math.isfinite(side) and side > 0):
-        raise InputError(f"{requested} {side!r}", "not positive and finite", "give metres, for example 0.12")
+        raise InputError(
+            f"{requested} {side!r}",
+            "the length must be positive and finite",
+            "give a length in metres, for example 0.12",
+        )
     extent = bounds[1] - bounds[0]
     present = float(extent[1] if requested == "height" else extent.max())
     if not present > 0:
-        raise InputError(f"{requested} {side:g} m of {name!r}", "the model is flat", "give its longest side instead")
+        raise InputError(
+            f"{requested} {side:g} m of {name!r}",
+            "the model is flat, so it has no extent in this direction",
+            "give the length of the longest side instead",
+        )
     return side / present
 
 

@@ -12,7 +12,10 @@ from translucent.errors import InputError
 
 def test_a_script_that_was_not_built_says_how_to_build_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(assets, "_PACKAGE", tmp_path / "translucent")
-    with pytest.raises(InputError, match=r"the script 'page.js' for browsers; .* is not there.*; run `make web`"):
+    with pytest.raises(
+        InputError,
+        match=r"the script 'page.js' for browsers; .* is not there.*; build the script: run `make web`",
+    ):
         assets.web_path("page.js")
 
 

@@ -50,9 +50,9 @@ def test_photons_are_counted_in_the_plan(run: Run, model: Path, tmp_path: Path) 
     [
         (
             ("goblet", "--preset", "crystal", "--stage", "none", "--caustics"),
-            "error: caustics; the scene has no lights; add a tl.PointLight",
+            "error: caustics; the scene has no lights that can emit photons; add a tl.PointLight",
         ),
-        (("goblet", "--caustics=1000000000000"), "error: Caustics photons 1000000000000; not a whole number in 0 to"),
+        (("goblet", "--caustics=1000000000000"), "error: Caustics photons 1000000000000; the value must be a whole"),
         (
             ("goblet", "--caustics=-5"),
             "error: '--caustics=-5'; a number below 0, where none is taken; give one above 0;",
@@ -69,4 +69,4 @@ def test_what_makes_no_caustics_is_told(run: Run, tmp_path: Path, options: tuple
 
 def test_another_renderer_shows_none(run: Run, model: Path, tmp_path: Path) -> None:
     found = run("render", model, "-o", tmp_path / "out.png", "--caustics", 10, "--opaque-with", "pyrender")
-    assert found.err.startswith("error: --caustics; --opaque-with, which draws what light lands on; leave out one")
+    assert found.err.startswith("error: --caustics; --opaque-with, which draws what light lands on; omit one")

@@ -20,7 +20,7 @@ from translucent.planning.scattering import SCATTERINGS
 def test_a_folder_is_no_model(run: Run, tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
     result = run("explain", tmp_path / name)
-    assert one_error_line(result).endswith(f"{name}'; it is a folder; give a file in it")
+    assert one_error_line(result).endswith(f"{name}'; the path is a folder; give the path of a file")
 
 
 def test_a_scene_of_opaque_objects_is_refused_and_yet_explained(run: Run, tmp_path: Path) -> None:
@@ -140,7 +140,7 @@ def test_the_size_of_a_model_is_said_and_may_be_requested(run: Run, tmp_path: Pa
         assert strict_json(run("explain", model, *size, "--json").out)["mesh"]["bounds"][1] == [0.1, 0.17, 0.1]
     refused = run("explain", model, "--unit", "mm", "--height", "12cm")
     assert refused.code == 2
-    assert refused.err == "error: --unit mm; --height is given, too; give one of them: each scales the model\n"
+    assert refused.err == "error: --unit mm; --height is given, too; both options scale the model: use one of them\n"
     wax = run("explain", model, "--preset", "wax").out
     assert "'cow.obj': opaque at this size, as plastic" in wax
 

@@ -72,7 +72,10 @@ def test_a_channel_of_0_is_clamped_and_told_unless_that_is_refused(run: Run, col
     code, out, err = run(color, "2cm")
     assert (code, err) == (0, "")
     assert "warning         color clamped to 0.0001 where it was below" in out.splitlines()
-    assert "is not in 0 < t <= 1; no finite extinction gives 0" in one_error_line(run(color, "2cm", "--no-clamp"))
+    assert (
+        "is not in 0 < t <= 1; a channel of 0 would need an infinite extinction; use a value such as 0.001 for"
+        in one_error_line(run(color, "2cm", "--no-clamp"))
+    )
 
 
 def test_a_bright_color_is_not_touched_by_clamping(run: Run) -> None:
@@ -100,9 +103,9 @@ def test_a_filament_is_told_by_its_transmission_distance(run: Run) -> None:
 
 
 def test_a_transmission_distance_is_all_that_is_said(run: Run) -> None:
-    assert "--td with COLOR" in one_error_line(run("#7b1e3a", "--td", "4mm"))
-    assert "not between 0 and 1" in one_error_line(run("--td", "4mm", "--td-transmittance", "1"))
-    assert "length '-4mm'; not positive" in one_error_line(run("--td", "-4mm"))
+    assert "--td and COLOR exclude each other" in one_error_line(run("#7b1e3a", "--td", "4mm"))
+    assert "the transmittance must lie between 0 and 1" in one_error_line(run("--td", "4mm", "--td-transmittance", "1"))
+    assert "length '-4mm'; the length must be positive" in one_error_line(run("--td", "-4mm"))
 
 
 def test_for_an_engine_only_the_block_is_printed(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -146,7 +149,7 @@ def test_a_material_has_its_surface_and_is_read_again(run: Run, here: Path, targ
 
 @pytest.mark.parametrize("option", [("--ior", "1.5"), ("--roughness", "0.5")])
 def test_a_surface_is_that_of_a_material_for_an_engine(run: Run, option: tuple[str, str]) -> None:
-    assert "add --as, or leave it out" in one_error_line(run("#7b1e3a", "1cm", *option))
+    assert "add --as, or omit the option" in one_error_line(run("#7b1e3a", "1cm", *option))
 
 
 @pytest.mark.parametrize("name", ["jade.mtlx", "jade.usda", "jade.json"])
@@ -196,7 +199,7 @@ def test_a_bad_row_does_not_stop_the_others(run: Run, here: Path) -> None:
     assert (code, out) == (1, "")
     lines = err.splitlines()
     assert lines[0].startswith("error: in.csv line 3: color (1.0, 0.0, 0.0); green = 0 is not in 0 < t <= 1")
-    assert lines[1].startswith("error: in.csv line 5: length 'far'; not a number with a unit")
+    assert lines[1].startswith("error: in.csv line 5: length 'far'; the text is not a number with a unit")
     assert lines[2:] == ["error: 2 of 4 rows failed; the others are in out.json"]
     told = json.loads((here / "out.json").read_text())
     assert [record["name"] for record in told] == ["wine", "jade"]
@@ -275,10 +278,10 @@ def test_photographs_are_fitted(run: Run, here: Path) -> None:
     assert "plates about" not in out
     thick = run(*how, "--patch", "20,0,60,20=1,2,4").out
     assert "plates about 2 m thick: lengths that name no unit are in metres" in thick
-    assert "--patch is missing; say where" in one_error_line(run(*how))
-    assert "outside of the picture" in one_error_line(run(*how, "--patch", "70,0,60,20=1mm"))
-    assert "--white; only --fit PHOTO takes it" in one_error_line(run("gray", "1cm", "--white", "0,0,1,1"))
-    assert "give one table or .toml" in one_error_line(run("--fit", "a.csv", "--fit", "b.csv"))
+    assert "this fit also needs --patch; say where" in one_error_line(run(*how))
+    assert "the rectangle lies outside the picture of" in one_error_line(run(*how, "--patch", "70,0,60,20=1mm"))
+    assert "these options apply only to --fit PHOTO" in one_error_line(run("gray", "1cm", "--white", "0,0,1,1"))
+    assert "give one table, one .toml file" in one_error_line(run("--fit", "a.csv", "--fit", "b.csv"))
 
 
 # On a model
@@ -366,18 +369,30 @@ def test_a_black_channel_is_clamped_on_a_model_too(run: Run, plate: Path) -> Non
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["black", "--no-clamp", *PLATE], "average color with red = 0; not in 0.0001 <= t <= 1; give 0.0001 or more"),
-        (["linear(1.5,1,1)", *PLATE], "red = 1.5; not in 0.0001 <= t <= 1; a medium cannot add light"),
+        (
+            ["black", "--no-clamp", *PLATE],
+            "average color with red = 0; the value must satisfy 0.0001 <= t <= 1; give 0.0001 or more",
+        ),
+        (["linear(1.5,1,1)", *PLATE], "red = 1.5; the value must satisfy 0.0001 <= t <= 1; a medium cannot add light"),
         (["gray", "--on", "none.obj"], "none.obj"),
-        (["gray", "--on", "bear", "--unit", "cm"], "--unit cm; bear comes with the toolkit, in metres"),
-        (["gray", "--on", "bear", "--eye", "0,0"], "--eye '0,0'; not three numbers"),
-        (["gray", "--on", "bear", "--eye", "9,9,9", "--preset", "jade"], "--preset with COLOR"),
-        (["--on", "bear", "--preset", "jadd"], "preset 'jadd'; not a known preset; did you mean jade"),
-        (["--on", "bear", "--fit", "w.csv"], "--on with --fit; they ask for different results"),
-        (["--on", "bear", "--batch", "t.csv"], "--on with --batch; they ask for different results"),
+        (
+            ["gray", "--on", "bear", "--unit", "cm"],
+            "--unit cm; bear is a built-in mesh, whose coordinates are in metres",
+        ),
+        (["gray", "--on", "bear", "--eye", "0,0"], "--eye '0,0'; the value is not three numbers"),
+        (["gray", "--on", "bear", "--eye", "9,9,9", "--preset", "jade"], "--preset and COLOR exclude each other"),
+        (["--on", "bear", "--preset", "jadd"], "preset 'jadd'; no preset has this name; did you mean jade"),
+        (
+            ["--on", "bear", "--fit", "w.csv"],
+            "--on and --fit exclude each other; each of the two options computes a different result",
+        ),
+        (
+            ["--on", "bear", "--batch", "t.csv"],
+            "--on and --batch exclude each other; each of the two options computes a different result",
+        ),
         (["--on", "bear"], "Missing argument 'COLOR'"),
-        (["gray", "1cm", "--preset", "jade"], "--preset with COLOR"),
-        (["gray", "1cm", "--eye", "0,0,1"], "--eye 0,0,1; only --on looks at a model"),
+        (["gray", "1cm", "--preset", "jade"], "--preset and COLOR exclude each other"),
+        (["gray", "1cm", "--eye", "0,0,1"], "--eye 0,0,1; only --on uses a view of a model"),
     ],
     ids=lambda v: " ".join(v) if isinstance(v, list) else None,
 )
@@ -392,40 +407,52 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
     trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).export(plate / "open.stl")
     code, out, err = run("gray", "--on", "open.stl")
     assert (code, out) == (2, "")
-    assert "pixels that the mesh covers are marked invalid; close its holes" in err.splitlines()[-1]
+    assert (
+        "pixels that the mesh covers are marked invalid; close the holes of the mesh, which `translucent explain` lists"
+        in err.splitlines()[-1]
+    )
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--batch", "none.csv"], "table 'none.csv'; no such file"),
-        (["--batch", "."], "table '.'; it is a folder"),
-        (["--batch", "empty.csv"], "table 'empty.csv'; no column 'name': it is empty"),
-        (["--batch", "head.csv"], "table 'head.csv'; no rows; give at least one"),
+        (["--batch", "none.csv"], "table 'none.csv'; no file has this path"),
+        (["--batch", "."], "table '.'; the path is a folder"),
+        (["--batch", "empty.csv"], "table 'empty.csv'; no column 'name': the file is empty"),
+        (["--batch", "head.csv"], "table 'head.csv'; the table has no rows; add at least one row"),
         (["--batch", "few.csv"], "no column 'distance': its first line says name, color"),
         (["--batch", "bytes.csv"], "not UTF-8 text"),
-        (["--batch", "bad.json"], "table 'bad.json'; no JSON"),
+        (["--batch", "bad.json"], "table 'bad.json'; the file is not valid JSON:"),
         (["--batch", "dict.json"], "not a list of objects"),
         (["--batch", "good.csv", "-o", "out.txt"], "output 'out.txt'; suffix '.txt'; use .json or .csv"),
-        (["--batch", "good.csv", "-o", "no/out.csv"], "no folder 'no'; make the folder first"),
-        (["--batch", "good.csv", "--unit", "furlong"], "unit 'furlong'; not a known unit"),
-        (["--batch", "good.csv", "--as", "css"], "--as css; it takes one color, not --batch"),
-        (["--batch", "good.csv", "--fit", "good.csv"], "--fit with --batch; they ask for different results"),
-        (["gray", "1cm", "--batch", "good.csv"], "COLOR with --batch"),
-        (["gray", "1cm", "-o", "x.json"], "-o x.json; only --batch writes a file"),
-        (["gray", "1cm", "--json", "--as", "css"], "--as with --json"),
+        (["--batch", "good.csv", "-o", "no/out.csv"], "the folder 'no' does not exist; create the folder first"),
+        (["--batch", "good.csv", "--unit", "furlong"], "unit 'furlong'; no unit of length has this name"),
+        (["--batch", "good.csv", "--as", "css"], "--as css; --as converts a single color, but --batch converts many"),
+        (
+            ["--batch", "good.csv", "--fit", "good.csv"],
+            "--fit and --batch exclude each other; each of the two options computes a different result",
+        ),
+        (["gray", "1cm", "--batch", "good.csv"], "COLOR and --batch exclude each other"),
+        (["gray", "1cm", "-o", "x.json"], "-o x.json; only --batch writes an output file"),
+        (["gray", "1cm", "--json", "--as", "css"], "--as and --json exclude each other"),
         (["gray", "1cm", "--as", "word"], "'word' is not one of"),
-        (["gray", "--from", "dict.json"], "--from with COLOR; they ask for different results"),
-        (["--preset", "jade", "--from", "dict.json"], "--from with --preset"),
-        (["--from", "none.mtlx"], "material 'none.mtlx'; no such file"),
+        (
+            ["gray", "--from", "dict.json"],
+            "--from and COLOR exclude each other; each of the two options computes a different result",
+        ),
+        (["--preset", "jade", "--from", "dict.json"], "--from and --preset exclude each other"),
+        (["--from", "none.mtlx"], "material 'none.mtlx'; no file has this path"),
         (["--from", "good.csv"], "material 'good.csv'; suffix '.csv'; give a .json, .mtlx, .py, .js,"),
-        (["--from", "dict.json"], "material 'dict.json'; medium as JSON; unknown name"),
+        (["--from", "dict.json"], "material 'dict.json'; medium as JSON; the JSON has the unknown keys name"),
         (["--from", "bytes.usda"], "material 'bytes.usda'; not UTF-8 text"),
-        (["gray", "1cm", "--unit-out", "furlong"], "unit 'furlong'; not a known unit"),
-        (["none.png@1,2", "1cm"], "pixel 1,2 of 'none.png'; no such file"),
+        (["gray", "1cm", "--unit-out", "furlong"], "unit 'furlong'; no unit of length has this name"),
+        (["none.png@1,2", "1cm"], "pixel 1,2 of 'none.png'; no file has this path"),
         (["linear(-.1,1,1)", "1cm", "--clamp"], "red = -0.1 is not in 0 < t <= 1"),
         (["--fit", "few.csv"], "no column 'distance'"),
-        (["--fit", "good.csv", "--clamp"], "--clamp; an invented sample would falsify --fit"),
+        (
+            ["--fit", "good.csv", "--clamp"],
+            "--clamp; --clamp would replace measured zeros by invented values, which would falsify the fit",
+        ),
         ([], "Missing argument 'COLOR'"),
         (["gray"], "Missing argument 'DISTANCE'. A color has a meaning only at a distance"),
         (["jade"], "For the preset of this name write --preset jade"),

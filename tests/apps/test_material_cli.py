@@ -128,10 +128,10 @@ def test_a_preset_brings_its_index_of_refraction_and_tells_what_is_lost(run: Run
     [
         ([], "no medium is given"),
         (["--color", "teal"], "--distance is missing"),
-        ([*WINE, "--preset", "jade"], "give one or the other"),
+        ([*WINE, "--preset", "jade"], "use one or the other"),
         ([*WINE, "--object", "Beer"], "object 'Beer'; "),
-        ([*WINE, "--thickness", "0"], "length '0'; not positive"),
-        ([*WINE, "--thickness", "thick"], "length 'thick'; not a number"),
+        ([*WINE, "--thickness", "0"], "length '0'; the length must be positive"),
+        ([*WINE, "--thickness", "thick"], "length 'thick'; the text is not a number"),
         (["--color", "linear(0,1,1)", "--distance", "1cm", "--no-clamp"], "red = 0 is not in 0 < t <= 1"),
     ],
 )
@@ -143,7 +143,11 @@ def test_a_bad_option_writes_nothing(run: Run, model: Path, tmp_path: Path, opti
 
 @pytest.mark.parametrize(
     ("output", "message"),
-    [("out.obj", "suffix '.obj'"), ("none/out.glb", "make the folder first"), ("folder.glb", "a folder of that name")],
+    [
+        ("out.obj", "suffix '.obj'"),
+        ("none/out.glb", "create the folder first"),
+        ("folder.glb", "a folder of this name"),
+    ],
 )
 def test_a_bad_output_is_refused(run: Run, model: Path, tmp_path: Path, output: str, message: str) -> None:
     (tmp_path / "folder.glb").mkdir()
@@ -166,7 +170,7 @@ def test_a_folder_that_refuses_is_a_failure_in_one_line(
 
     monkeypatch.setattr("translucent.files.paths._temporary_file", refuse)
     line = one_error_line(run("material", "apply", model, *WINE, "-o", tmp_path / "out.glb"), code=1)
-    assert "it cannot be written (Permission denied)" in line
+    assert "the file cannot be written (Permission denied)" in line
     assert not (tmp_path / "out.glb").exists()
 
 
@@ -174,10 +178,10 @@ def test_a_folder_that_refuses_is_a_failure_in_one_line(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"glTF\2\0\0\0\xff\0\0\0", "cut short at 12 bytes"),
-        (b"{", "its JSON is broken"),
-        (b"", "it is empty"),
-        (b"{}", "no asset"),
+        (b"glTF\2\0\0\0\xff\0\0\0", "the file is cut off after 12 bytes"),
+        (b"{", "the JSON of the file is broken ("),
+        (b"", "the file is empty"),
+        (b"{}", "the JSON of the file has no 'asset', so the file is not glTF 2.0"),
         (
             b'{"asset": {}, "materials": [{"extensions": {"KHR_materials_volume": {"thicknessFactor": "1"}}}]}',
             "material 0 '': thicknessFactor is '1', not a number",

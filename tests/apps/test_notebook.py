@@ -220,12 +220,16 @@ def test_the_camera_is_one_in_both_directions(view: Any, scene: tl.Scene) -> Non
 @pytest.mark.parametrize(
     ("name", "value", "told"),
     [
-        ("ior", 3.5, "ior 3.5; not in 1 to 3"),
-        ("roughness", -1, "roughness -1; not in 0 to 1"),
-        ("distance", 0, "distance 0; not above 0 and finite"),
+        ("ior", 3.5, "ior 3.5; the value must be in 1 to 3"),
+        ("roughness", -1, "roughness -1; the value must be in 0 to 1"),
+        ("distance", 0, "distance 0; the value must be above 0 and finite"),
         ("color", "#12", "color '#12'"),
-        ("color", (2, 0, 0), "a channel is not in 0..1"),
-        ("preset", "wax", "preset 'wax' in a view; it scatters or emits"),
+        ("color", (2, 0, 0), "a channel of the color is outside 0..1"),
+        (
+            "preset",
+            "wax",
+            "preset 'wax' in a view; this preset scatters or emits light, and a view can only change media that absorb",
+        ),
         ("preset", "vine", "vine"),
         ("medium", 1, "medium 1; the scene has 1"),
     ],

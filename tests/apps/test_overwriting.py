@@ -60,8 +60,8 @@ def test_what_is_read_is_not_replaced(name: str, folder: Path, run: Run) -> None
     result = run(*CASES[name])
     assert (result.code, result.out) == (2, "")
     assert result.err.startswith("error: output '")
-    assert result.err.endswith("choose another name, or add --overwrite to replace it\n")
-    assert "'; it is read, as '" in result.err
+    assert result.err.endswith("choose another name for the output, or add --overwrite to replace the file\n")
+    assert "'; the command reads this file, as '" in result.err
     assert {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()} == before
 
 
@@ -69,7 +69,7 @@ def test_a_table_is_not_replaced(folder: Path, run: Run) -> None:
     before = (folder / "table.csv").read_bytes()
     result = run("extinction", "--batch", "table.csv", "-o", "table.csv")
     assert result.code == 2
-    assert result.err.startswith("error: output 'table.csv'; it is read, as 'table.csv'; choose another name")
+    assert result.err.startswith("error: output 'table.csv'; the command reads this file, as 'table.csv'; choose")
     assert (folder / "table.csv").read_bytes() == before
     assert run("extinction", "--batch", "table.csv", "-o", "table.csv", "--overwrite").code == 0
     assert (folder / "table.csv").read_bytes() != before

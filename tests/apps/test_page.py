@@ -126,11 +126,11 @@ def test_sections_of_the_same_bytes_share_them() -> None:
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["-o", "cube.png"], ["not an .html file", "viewer.html"]),
-        (["-o", "nowhere/cube.html"], ["no folder"]),
+        (["-o", "cube.png"], ["the name must end in .html", "viewer.html"]),
+        (["-o", "nowhere/cube.html"], ["does not exist"]),
         (["--method", "fragment-lists"], ["WebGL2", "SignedDepth"]),
         (["--method", "path-traced"], ["random paths", "PathTraced"]),
-        (["--poster", "absent.png"], ["absent.png", "no such file"]),
+        (["--poster", "absent.png"], ["absent.png", "no file has this path"]),
         (["--samples", "0"], ["samples 0", "1 to 256"]),
         (["--simplify", "3"], ["--simplify 3"]),
         (["--size", "4"], ["--size"]),

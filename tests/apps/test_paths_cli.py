@@ -37,10 +37,10 @@ def test_the_plan_of_paths_is_explained(run: Run) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("bear", "--paths", 4), "--paths; only --method path-traced takes it; add --method path-traced"),
-        ((*JADE, "--paths", 1), "PathTraced paths 1; not a whole number in 2 to 1048576"),
-        ((*JADE, "--interfaces", "traced"), "random paths replace interfaces; give one of the two"),
-        ((*JADE, "--scattering", "single"), "random paths replace scattering; give one of the two"),
+        (("bear", "--paths", 4), "--paths; this option applies only to --method path-traced; add --method path-traced"),
+        ((*JADE, "--paths", 1), "PathTraced paths 1; the value must be a whole number in 2 to 1048576"),
+        ((*JADE, "--interfaces", "traced"), "path tracing replaces interfaces; give only one of the two"),
+        ((*JADE, "--scattering", "single"), "path tracing replaces scattering; give only one of the two"),
         ((*JADE, "--backend", "cpu"), "use tl.reference.path_trace(scene, size, paths), or an OpenGL backend"),
     ],
 )

@@ -196,9 +196,9 @@ def test_json_has_no_swatches(run: Run, pretend_a_terminal: Callable[..., None])
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["show", "honney"], "error: preset 'honney'; not a known preset; did you mean honey? 'translucent presets' "),
-        (["--search", "["], "error: --search '['; no letters or digits; give words, such as wine"),
-        (["show", "unobtainium"], "error: preset 'unobtainium'; not a known preset; use one of marble"),
+        (["show", "honney"], "error: preset 'honney'; no preset has this name; did you mean honey? 'translucent"),
+        (["--search", "["], "error: --search '['; the search text has no letters or digits; give words, such as wine"),
+        (["show", "unobtainium"], "error: preset 'unobtainium'; no preset has this name; use one of marble"),
         (["show"], "error: Missing argument 'NAME'"),
         (["shw", "merlot"], "error: No such command 'shw'"),
         (["--jsn"], "error: No such option"),

@@ -57,68 +57,101 @@ def test_a_channel_of_0_is_clamped_and_told(run: Run, cube: Path, tmp_path: Path
 
 
 BAD_RENDER_OPTIONS = [
-    (["--size", "0x0"], "frame size (0, 0); not two whole numbers above 0"),
-    (["--size", "-4x4"], "frame size (-4, 4); not two whole numbers above 0"),
-    (["--size", "abc"], "--size 'abc'; not WxH"),
-    (["--size", "64"], "--size '64'; not WxH"),
-    (["--size", "1.5x2"], "--size '1.5x2'; not WxH"),
-    (["--size", "1x2x3"], "--size '1x2x3'; not WxH"),
+    (["--size", "0x0"], "frame size (0, 0); the size must be two whole numbers above 0"),
+    (["--size", "-4x4"], "frame size (-4, 4); the size must be two whole numbers above 0"),
+    (["--size", "abc"], "--size 'abc'; the size must be WIDTHxHEIGHT"),
+    (["--size", "64"], "--size '64'; the size must be WIDTHxHEIGHT"),
+    (["--size", "1.5x2"], "--size '1.5x2'; the size must be WIDTHxHEIGHT"),
+    (["--size", "1x2x3"], "--size '1x2x3'; the size must be WIDTHxHEIGHT"),
     (["--color", "linear(0,0.5,0.5)", "--distance", "1cm", "--no-clamp"], "red = 0 is not in 0 < t <= 1"),
     (["--color", "linear(1.1,0.5,0.5)", "--distance", "1cm"], "red = 1.1 is not in 0 < t <= 1"),
-    (["--color", "linear(nan,0.5,0.5)", "--distance", "1cm"], "a channel is not finite"),
-    (["--color", "reddish", "--distance", "1cm"], "color 'reddish'; neither a hex color"),
-    (["--color", GREEN, "--distance", "0"], "length '0'; not positive and finite"),
-    (["--color", GREEN, "--distance", "-1cm"], "length '-1cm'; not positive and finite"),
-    (["--color", GREEN, "--distance", "abc"], "length 'abc'; not a number with a unit"),
-    (["--color", GREEN, "--distance", "2 furlong"], "unit 'furlong'; not a known unit"),
+    (["--color", "linear(nan,0.5,0.5)", "--distance", "1cm"], "a channel of the color is not a finite number"),
+    (
+        ["--color", "reddish", "--distance", "1cm"],
+        "color 'reddish'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)",
+    ),
+    (["--color", GREEN, "--distance", "0"], "length '0'; the length must be positive and finite"),
+    (["--color", GREEN, "--distance", "-1cm"], "length '-1cm'; the length must be positive and finite"),
+    (["--color", GREEN, "--distance", "abc"], "length 'abc'; the text is not a number with a unit"),
+    (["--color", GREEN, "--distance", "2 furlong"], "unit 'furlong'; no unit of length has this name"),
     (["--color", GREEN], "--color; --distance is missing; give both"),
     (["--distance", "1cm"], "--distance; --color is missing; give both"),
-    (["--preset", "unobtainium"], "preset 'unobtainium'; not a known preset; use one of marble"),
+    (["--preset", "unobtainium"], "preset 'unobtainium'; no preset has this name; use one of marble"),
     (["--preset", "jade", "--color", GREEN], "--preset jade; --color or --distance is given, too"),
-    (["--method", "magic"], "method 'magic'; not a known method; use one of signed-depth"),
-    (["--backend", "vulkan"], "backend 'vulkan'; not a known backend; use one of egl, window, osmesa"),
-    (["--unit", "furlong"], "unit 'furlong'; not a known unit"),
-    (["--background", "reddish"], "color 'reddish'; neither a hex color"),
+    (["--method", "magic"], "method 'magic'; no method has this name; use one of signed-depth"),
+    (["--backend", "vulkan"], "backend 'vulkan'; no backend has this name; use one of egl, window, osmesa"),
+    (["--unit", "furlong"], "unit 'furlong'; no unit of length has this name"),
+    (
+        ["--background", "reddish"],
+        "color 'reddish'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)",
+    ),
     (["--environment", "studoi"], "environment 'studoi'; neither one of light-table, studio, checkerboard nor a color"),
     (["--environment", "studoi,90"], "nor a color or a picture; did you mean studio?"),
     (["--background", "Light"], "did you mean light-table?"),
-    (["--eye", "1,2"], "--eye '1,2'; not three numbers"),
-    (["--eye", "a,b,c"], "--eye 'a,b,c'; not three numbers"),
-    (["--eye", "nan,0,0"], "camera eye, target or up; not three finite numbers"),
-    (["--eye", "0,0,0"], "eye and target are both at (0.0, 0.0, 0.0)"),
-    (["--eye", "0,5,0"], "is along the view; choose another up"),
-    (["--eye", "1e200,0,0"], "camera eye, target or up; a number beyond 1e+18"),
-    (["--up", "0,0,0"], "up (0.0, 0.0, 0.0)"),
-    (["--up", "0,0,0", "--stage", "none"], "up (0.0, 0.0, 0.0) is along the view"),
-    (["--up", "up"], "--up 'up'; not three numbers"),
-    (["--fov", "1e-300"], "camera eye, target or up; a number beyond 1e+18"),
-    (["--target", "0,0,0"], "--target; --eye is missing"),
-    (["--fov", "0", "--eye", "0,0,5"], "camera fov_y 0.0; not between 0 and 180"),
-    (["--fov", "180"], "camera fov_y 180.0; not between 0 and 180"),
-    (["--fov", "nan"], "camera fov_y nan; not between 0 and 180"),
+    (["--eye", "1,2"], "--eye '1,2'; the value is not three numbers"),
+    (["--eye", "a,b,c"], "--eye 'a,b,c'; the value is not three numbers"),
+    (["--eye", "nan,0,0"], "camera eye, target or up; each of them must be three finite numbers"),
+    (["--eye", "0,0,0"], "eye and target are at the same point (0.0, 0.0, 0.0)"),
+    (["--eye", "0,5,0"], "is parallel to the view direction; choose another up"),
+    (["--eye", "1e200,0,0"], "camera eye, target or up; a coordinate is beyond 1e+18"),
+    (["--up", "0,0,0"], "the up direction (0.0, 0.0, 0.0)"),
+    (["--up", "0,0,0", "--stage", "none"], "the up direction (0.0, 0.0, 0.0) is parallel to the view direction"),
+    (["--up", "up"], "--up 'up'; the value is not three numbers"),
+    (["--fov", "1e-300"], "camera eye, target or up; a coordinate is beyond 1e+18"),
+    (["--target", "0,0,0"], "--target; --target works only together with --eye"),
+    (["--fov", "0", "--eye", "0,0,5"], "camera fov_y 0.0; the angle must lie between 0 and 180 degrees"),
+    (["--fov", "180"], "camera fov_y 180.0; the angle must lie between 0 and 180 degrees"),
+    (["--fov", "nan"], "camera fov_y nan; the angle must lie between 0 and 180 degrees"),
     (["--fov", "wide"], "Invalid value for '--fov'"),
-    (["--samples", "0"], "samples 0; not a whole number in 1 to 4096"),
+    (["--samples", "0"], "samples 0; the number of samples must be a whole number in 1 to 4096"),
     (["--samples", "some"], "Invalid value for '--samples'"),
-    (["--camera", "0"], "cube.ply is no glTF file and has no cameras; use --eye"),
+    (["--camera", "0"], "cube.ply is not a glTF file, so it has no cameras; use --eye"),
     (["--camera", "first"], "Invalid value for '--camera'"),
     (
         ["--interfaces", "front", "--opaque-with", "pyrender"],
         "--interfaces front; --opaque-with, which finds interfaces in screen space",
     ),
     (["--interfaces", "both"], "Invalid value for '--interfaces': 'both' is not one of 'traced', 'screen', 'front'"),
-    (["--interface-depth", "3"], "--interface-depth; only --interfaces traced takes it; add --interfaces traced"),
-    (["--interfaces", "traced", "--interface-forks", "9"], "TracedInterfaces forks 9; not a whole number in 0 to 4"),
+    (
+        ["--interface-depth", "3"],
+        "--interface-depth; this option applies only to --interfaces traced; add --interfaces traced",
+    ),
+    (
+        ["--interfaces", "traced", "--interface-forks", "9"],
+        "TracedInterfaces forks 9; the value must be a whole number in 0 to 4",
+    ),
     (["--scattering", "many"], "Invalid value for '--scattering': 'many' is not one of 'diffusion', 'layer', 'single'"),
-    (["--diffusion-resolution", "9"], "--diffusion-resolution; only --scattering diffusion takes it; add --scattering"),
-    (["--scattering", "layer", "--diffusion-resolution", "9"], "only --scattering diffusion takes it"),
-    (["--scattering", "diffusion", "--diffusion-resolution", "4"], "Diffusion resolution 4; not a whole number in 8"),
-    (["--scattering", "diffusion", "--diffusion-resolution", "999"], "Diffusion resolution 999; a body would have"),
+    (
+        ["--diffusion-resolution", "9"],
+        "--diffusion-resolution; this option applies only to --scattering diffusion; add --scattering",
+    ),
+    (["--scattering", "layer", "--diffusion-resolution", "9"], "this option applies only to --scattering diffusion"),
+    (
+        ["--scattering", "diffusion", "--diffusion-resolution", "4"],
+        "Diffusion resolution 4; the value must be a whole number in 8",
+    ),
+    (
+        ["--scattering", "diffusion", "--diffusion-resolution", "999"],
+        "Diffusion resolution 999; at this resolution, a body would have",
+    ),
     (["--scattering-color", "white"], "--scattering-color; --mean-free-path is missing; give both"),
     (["--mean-free-path", "1mm"], "--mean-free-path; --scattering-color is missing; give both"),
-    (["--scattering-color", "white", "--color", GREEN], "--scattering-color; --color is given, too; give one medium"),
-    (["--mean-free-path", "1mm", "--preset", "jade"], "--mean-free-path; --preset is given, too; give one medium"),
-    (["--scattering-color", "white", "--mean-free-path", "0mm"], "length '0mm'; not positive and finite"),
-    (["--scattering-color", "reddish", "--mean-free-path", "1mm"], "color 'reddish'; neither a hex color"),
+    (
+        ["--scattering-color", "white", "--color", GREEN],
+        "--scattering-color; --color is given, too, and both options define a medium; give a single medium: either",
+    ),
+    (
+        ["--mean-free-path", "1mm", "--preset", "jade"],
+        "--mean-free-path; --preset is given, too, and both options define a medium; give a single medium: either",
+    ),
+    (
+        ["--scattering-color", "white", "--mean-free-path", "0mm"],
+        "length '0mm'; the length must be positive and finite",
+    ),
+    (
+        ["--scattering-color", "reddish", "--mean-free-path", "1mm"],
+        "color 'reddish'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)",
+    ),
     (["--no-such-option"], "--no-such-option'; see 'translucent render --help'"),
 ]
 
@@ -142,11 +175,15 @@ def test_render_refuses_a_bad_option_and_writes_nothing(
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("out.png", ["--size", "200000x200000"], "40000 million pixels, and 1074 million are the most; give a smaller"),
+        (
+            "out.png",
+            ["--size", "200000x200000"],
+            "40000 million pixels, and 1074 million are the most; choose a smaller picture size, at most about",
+        ),
         (
             "out.npz",
             ["--size", "8192x2048"],
-            "17 million pixels at once take about 1.56 GiB of memory, and 954 MiB are f",
+            "17 million pixels at once need about 1.56 GiB of memory, but only 954 MiB are f",
         ),
         ("out.gif", ["--size", "8192x2048", "--turntable", "4"], "are free; give a smaller size"),
     ],
@@ -164,7 +201,7 @@ def test_a_camera_of_the_file_excludes_one_that_options_place(
     run: Run, glass_box: Path, tmp_path: Path, placed: tuple[str, str]
 ) -> None:
     result = run("render", glass_box, "-o", tmp_path / "out.png", "--camera", "0", *placed)
-    assert f"--camera 0; {placed[0]} given, too; give one or the other" in one_error_line(result)
+    assert f"--camera 0; --camera cannot be combined with {placed[0]}; use one" in one_error_line(result)
 
 
 @pytest.mark.parametrize("number", ["2", "-1"])
@@ -172,7 +209,7 @@ def test_a_camera_that_is_not_there_is_refused_with_those_that_are(
     run: Run, glass_box: Path, tmp_path: Path, number: str
 ) -> None:
     result = run("render", glass_box, "-o", tmp_path / "out.png", "--camera", number)
-    assert "it has 0 of node 'Front', 1 of node 'Side'; give one of these numbers" in one_error_line(result)
+    assert "the file has 0 of node 'Front', 1 of node 'Side'; use one of these camera numbers" in one_error_line(result)
 
 
 @pytest.mark.parametrize(
@@ -180,10 +217,10 @@ def test_a_camera_that_is_not_there_is_refused_with_those_that_are(
     [
         ("picture.bmp", 2, "suffix '.bmp'; use .png, .exr or .npz"),
         ("picture", 2, "suffix ''; use .png, .exr or .npz"),
-        ("missing/picture.png", 2, "; make the folder first"),
-        ("cube.ply/picture.png", 2, "cube.ply' is no folder; choose another one"),
-        ("folder.png", 2, "folder.png'; a folder of that name is there; choose another name"),
-        (f"{'long' * 100}/picture.png", 2, "; make the folder first"),
+        ("missing/picture.png", 2, "; create the folder first"),
+        ("cube.ply/picture.png", 2, "cube.ply' is not a folder; choose another path"),
+        ("folder.png", 2, "folder.png'; a folder of this name already exists; choose another name"),
+        (f"{'long' * 100}/picture.png", 2, "; create the folder first"),
     ],
 )
 def test_a_bad_output_is_refused_before_any_work(
@@ -205,7 +242,7 @@ def test_a_file_where_a_folder_has_to_be_is_found_before_any_work(
 ) -> None:
     Path("taken").write_text("kept")
     result = run("render", cube, "-o", output, *option)
-    assert one_error_line(result).endswith("'taken' is no folder; choose another one")
+    assert one_error_line(result).endswith("'taken' is not a folder; choose another path")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.ply", "taken"]
     assert Path("taken").read_text() == "kept"
 
@@ -500,7 +537,7 @@ def test_the_model_is_seen_from_around_and_fills_what_is_requested(run: Run, tmp
     for wrong, message in (
         (("--orbit", "30"), "not two numbers"),
         (("--orbit", "30,90"), "a pitch beyond -90 to 90"),
-        (("--eye", "0,0,1", "--fit", "0.5"), "--eye is given, too"),
+        (("--eye", "0,0,1", "--fit", "0.5"), "this option cannot be combined with --eye"),
     ):
         assert message in one_error_line(run("render", "soap", "-o", output, *wrong))
 

@@ -55,17 +55,26 @@ def test_environments_have_names_colors_and_files(panorama: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--environment", "reddish"], "color 'reddish'; neither a hex color"),
-        (["--environment", "studio,left"], "environment 'studio,left'; rotation 'left'; give degrees"),
-        (["--environment", "none.hdr"], "environment 'none.hdr'; no such file"),
-        (["--environment", "none.exr,30"], "environment 'none.exr'; no such file"),
-        (["--exposure", "nan"], "exposure nan; not within 100 stops"),
+        (
+            ["--environment", "reddish"],
+            "color 'reddish'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)",
+        ),
+        (
+            ["--environment", "studio,left"],
+            "environment 'studio,left'; 'left' is not a rotation in degrees; write the rotation as in studio,90",
+        ),
+        (["--environment", "none.hdr"], "environment 'none.hdr'; no file has this path"),
+        (["--environment", "none.exr,30"], "environment 'none.exr'; no file has this path"),
+        (["--exposure", "nan"], "exposure nan; the exposure must lie within 100 stops"),
         (["--tone", "filmic"], "Invalid value for '--tone'"),
         (["--turntable", "1"], "Invalid value for '--turntable'"),
-        (["--fps", "12"], "--fps 12; only --turntable takes it; add --turntable, or leave it out"),
-        (["--turntable", "4", "--fps", "0"], "0.0 pictures per second; not in 1 to 100"),
+        (["--fps", "12"], "--fps 12; this option applies only to --turntable; add --turntable, or omit --fps"),
+        (["--turntable", "4", "--fps", "0"], "0.0 pictures per second; the frame rate must lie in 1 to 100"),
         (["--turntable", "4"], "animation 'a.png'; suffix '.png'; use .webp, .gif, .mp4, or a folder"),
-        (["--turntable", "4", "--aov", "aovs", "-o", "a.gif"], "--turntable 4; --aov is given, too"),
+        (
+            ["--turntable", "4", "--aov", "aovs", "-o", "a.gif"],
+            "--turntable 4; --aov writes the quantities of a single picture",
+        ),
     ],
 )
 def test_wrong_options_are_one_line(

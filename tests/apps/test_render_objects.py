@@ -142,7 +142,7 @@ def test_a_variant_and_its_names(shown: Any, scene: Any) -> None:
 
 
 def test_a_time(shown: Any, bar: Path) -> None:
-    assert "it has no animations; leave the time out" in one_error_line(shown("--time", "1"))
+    assert "the file has no animations; omit the time" in one_error_line(shown("--time", "1"))
 
 
 @pytest.mark.parametrize(
@@ -150,12 +150,15 @@ def test_a_time(shown: Any, bar: Path) -> None:
     [
         (
             "--object Glas --preset merlot",
-            "object 'Glas'; no object has that name; use one of 'Box 0', 'Box 1', 'Box 2'",
+            "object 'Glas'; no object has this name; use one of 'Box 0', 'Box 1', 'Box 2'",
         ),
         ("--object Box --preset merlot", "did you mean Box 2, Box 1 or Box 0?"),
-        ("--object Glass", "--object 'Glass'; no medium is named for it; add --preset NAME, or"),
-        ("--object A --preset merlot --object A --preset jade", "--object 'A'; it is named twice; give it one medium"),
-        ("--object A --preset merlott", "preset 'merlott'; not a known preset; did you mean merlot"),
+        ("--object Glass", "--object 'Glass'; no medium is given for this object; add --preset NAME, or"),
+        (
+            "--object A --preset merlot --object A --preset jade",
+            "--object 'A'; the object is named twice; give the object one medium",
+        ),
+        ("--object A --preset merlott", "preset 'merlott'; no preset has this name; did you mean merlot"),
         ("--object A --color red", "--color; --distance is missing"),
         ("--object A --roughness 2", "Invalid value for '--roughness'"),
         ("--object A --preset", "Option '--preset' requires an argument"),
@@ -169,4 +172,4 @@ def test_what_is_wrong_is_one_line(shown: Any, options: str, message: str) -> No
 @pytest.mark.parametrize(("option", "value"), [("--variant", "Red"), ("--time", "1.0")])
 def test_a_mesh_has_no_variants_and_no_time(run: Run, cube: Path, tmp_path: Path, option: str, value: str) -> None:
     line = one_error_line(run("render", cube, "-o", tmp_path / "a.png", option, value))
-    assert f"{option} {value}; {cube} is no glTF file; leave it out" in line
+    assert f"{option} {value}; {cube} is not a glTF file; omit the option" in line

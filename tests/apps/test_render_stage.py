@@ -141,7 +141,7 @@ def test_thickness_needs_no_stage() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--stage", "studoi"), "stage 'studoi'; no such stage; did you mean studio?"),
+        (("--stage", "studoi"), "stage 'studoi'; no stage has this name; did you mean studio?"),
         (
             ("--stage", "night", "--opaque-with", "pyrender"),
             "--stage night; --opaque-with, which draws no shadows of a stage",
@@ -177,8 +177,8 @@ def test_shadows_have_the_size_and_number_asked_for(run: Run, tmp_path: Path) ->
         == 0
     )
     for option, message in (
-        (("--shadow-size", 9), "ShadowMaps size 9; not a whole number in 64 to 8192"),
-        (("--environment-shadows", -1), "environment_shadows -1; not a whole number in 0 to 256"),
+        (("--shadow-size", 9), "ShadowMaps size 9; the size must be a whole number in 64 to 8192"),
+        (("--environment-shadows", -1), "environment_shadows -1; the number of directions must be a whole number"),
     ):
         refused = run("render", "soap", "-o", output, *option)
         assert refused.code == 2

@@ -141,8 +141,11 @@ OBJECT = '[[object]]\nmodel = "sphere"\n'
     ("text", "message"),
     [
         ("[[object]]\nmodel = 3\n", "line 2, model; no model is named"),
-        ('[[object]]\nmodel = "sfere"\n', "line 2, model; model 'sfere'; no file and no mesh of the toolkit; did you"),
-        (OBJECT + 'preset = "waxx"\n', "line 3, preset; preset 'waxx'; not a known preset; did you mean wax"),
+        (
+            '[[object]]\nmodel = "sfere"\n',
+            "line 2, model; model 'sfere'; no file and no built-in mesh has this name; did you",
+        ),
+        (OBJECT + 'preset = "waxx"\n', "line 3, preset; preset 'waxx'; no preset has this name; did you mean wax"),
         (OBJECT + OBJECT + 'colour = "red"\n', "line 5, colour; unknown key 'colour'; did you mean color?"),
         (OBJECT + 'color = "red"\n', "line 3, color; distance is missing; give both"),
         (OBJECT + 'color = "red"\ndistance = "2cm"\npreset = "wax"\n', "line 3, color; preset is given, too"),
@@ -152,11 +155,11 @@ OBJECT = '[[object]]\nmodel = "sphere"\n'
         (OBJECT + "surface = { roughnes = 1 }\n", "line 3, roughnes; unknown key 'roughnes'; did you mean roughness"),
         (OBJECT + "[[light]]\ntype = 'lamp'\n", "line 4, type; type 'lamp'; use one of directional, point, sphere"),
         (OBJECT + "[[light]]\ntype = 'point'\nposition = [0, 0, 0]\n", "line 4, type; a point light; "),
-        ("stage = 'nigth'\n" + OBJECT, "line 1, stage; stage 'nigth'; no such stage; did you mean night?"),
-        (OBJECT + "[camera]\neye = [0, 0, 1]\nfit = 1\n", "line 5, fit; fit; eye is given, too"),
+        ("stage = 'nigth'\n" + OBJECT, "line 1, stage; stage 'nigth'; no stage has this name; did you mean night?"),
+        (OBJECT + "[camera]\neye = [0, 0, 1]\nfit = 1\n", "line 5, fit; fit; the key eye is given, too"),
         ("objects = 1\n", "line 1, objects; unknown key 'objects'; did you mean object?"),
-        ("[[object]\n", "no TOML: "),
-        ("version = 1\n", "it is a session of the previewer; open it: translucent preview --session"),
+        ("[[object]\n", "the file is not valid TOML: "),
+        ("version = 1\n", "it is a session of the previewer; open the session with: translucent preview --session"),
     ],
 )
 def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, message: str) -> None:
@@ -168,9 +171,15 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, message:
 @pytest.mark.parametrize(
     ("models", "message"),
     [
-        (("goblett:crystal", "wine"), "model 'goblett:crystal'; no file 'goblett' and no mesh of the toolkit; did you"),
-        (("goblet:cristal", "wine"), "preset 'cristal'; not a known preset; did you mean crystal"),
-        (("goblet", "glass-of-milk"), "it is a scene; give it alone: translucent render glass-of-milk"),
+        (
+            ("goblett:crystal", "wine"),
+            "model 'goblett:crystal'; no file 'goblett' and no built-in mesh has this name; did you",
+        ),
+        (("goblet:cristal", "wine"), "preset 'cristal'; no preset has this name; did you mean crystal"),
+        (
+            ("goblet", "glass-of-milk"),
+            "the word names a whole scene, which cannot be combined with other models; render the scene alone:",
+        ),
         (("glass-of-mlik.toml",), "scene 'glass-of-mlik.toml'"),
     ],
 )

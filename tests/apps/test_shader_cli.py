@@ -87,19 +87,37 @@ def test_a_switch_without_a_value_is_on(run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["signed_depth"], "it asks for 2 switches more; add --define OPAQUE=0 --define SPECTRAL=0, or other values"),
-        (["signed_depth", "--define", "OPAQUE=0"], "it asks for 1 switch more; add --define SPECTRAL=0"),
-        ([*SIGNED, "--define", "SPECTRUM=1"], "no switch SPECTRUM is in it; switches: OPAQUE, SPECTRAL"),
-        (["optics", "--define", "FAST=1"], "no switch FAST is in it; switches: it has none"),
-        (["signed_depth", "--define", "OPAQUE=yes"], "--define 'OPAQUE=yes'; not a name with a whole number"),
-        (["signed_depth", "--define", "=1"], "--define '=1'; not a name with a whole number"),
-        (["--define", "OPAQUE=1"], "--define OPAQUE=1; no shader is named; add its NAME"),
-        (["../README.md"], "no such shader"),
+        (
+            ["signed_depth"],
+            "the shader needs 2 switches more switches; add --define OPAQUE=0 --define SPECTRAL=0, or choose other",
+        ),
+        (["signed_depth", "--define", "OPAQUE=0"], "the shader needs 1 switch more switches; add --define SPECTRAL=0"),
+        (
+            [*SIGNED, "--define", "SPECTRUM=1"],
+            "the shader has no switch SPECTRUM; the switches of this shader are: OPAQUE, SPECTRAL",
+        ),
+        (
+            ["optics", "--define", "FAST=1"],
+            "the shader has no switch FAST; the switches of this shader are: it has none",
+        ),
+        (
+            ["signed_depth", "--define", "OPAQUE=yes"],
+            "--define 'OPAQUE=yes'; the value must be a switch name and a whole number",
+        ),
+        (["signed_depth", "--define", "=1"], "--define '=1'; the value must be a switch name and a whole number"),
+        (["--define", "OPAQUE=1"], "--define OPAQUE=1; no shader name is given; add the NAME of a shader"),
+        (["../README.md"], "no shader has this name"),
         (["opticz"], "did you mean optics?"),
-        (["--target", "wgsl"], "--target wgsl; no shader is named; add its NAME"),
+        (["--target", "wgsl"], "--target wgsl; no shader name is given; add the NAME of a shader"),
         ([*SIGNED, "--target", "cg"], "'cg' is not one of 'glsl', 'webgl2', 'vulkan', 'hlsl', 'msl', 'wgsl'"),
-        (["k_buffer", "--define", "OPAQUE=0", "--target", "webgl2"], "it writes to buffers, which WebGL2 has none of"),
-        (["hierarchy", "--define", "ONE_OBJECT=1", "--target", "msl"], "it is a part of stages"),
+        (
+            ["k_buffer", "--define", "OPAQUE=0", "--target", "webgl2"],
+            "the shader writes to buffers, which WebGL2 has none of",
+        ),
+        (
+            ["hierarchy", "--define", "ONE_OBJECT=1", "--target", "msl"],
+            "the file is only a part of other shaders, and uses names that these shaders define",
+        ),
     ],
     ids=lambda v: " ".join(v) if isinstance(v, list) else None,
 )
@@ -122,7 +140,9 @@ def test_values_that_a_shader_refuses_are_told_in_its_words(run: Run) -> None:
         "SCATTERS_AGAIN",
     ]
     options = [word for key in given for word in ("--define", f"{key}=0")]
-    assert "a walk needs a slot; give other values" in one_error_line(run("fragment_lists_resolve", *options))
+    assert "a walk needs a slot; choose other values of the switches" in one_error_line(
+        run("fragment_lists_resolve", *options)
+    )
     options[options.index("SLOTS=0")] = "SLOTS=2"
     assert "winding[SLOTS]" in run("fragment_lists_resolve", *options).out
 

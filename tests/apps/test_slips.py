@@ -17,11 +17,11 @@ BOX = Box((0, 0, 0), (0.1, 0.1, 0.1)).tessellate()
 @pytest.mark.parametrize(
     ("slip", "answer"),
     [
-        (lambda: tl.Medium.from_color("#7b1e3a", "1cm"), "give the metres: 0.01"),  # type: ignore[arg-type]
+        (lambda: tl.Medium.from_color("#7b1e3a", "1cm"), "give the distance in metres: 0.01"),  # type: ignore[arg-type]
         (lambda: tl.Object(BOX, tl.Medium(), sheet_thickness="1mm"), "give metres: 0.001"),  # type: ignore[arg-type]
         (lambda: tl.load_mesh("a.obj", height="12cm"), "give metres: 0.12"),  # type: ignore[arg-type]
-        (lambda: tl.Medium.from_color((172, 229, 201), 0.1), "write '#ace5c9' for these numbers of 0 to 255"),
-        (lambda: tl.Medium.from_color((172, 229, 0), 0.1), "write '#ace500' for these numbers of 0 to 255"),
+        (lambda: tl.Medium.from_color((172, 229, 201), 0.1), "write '#ace5c9' if these are numbers from 0 to 255"),
+        (lambda: tl.Medium.from_color((172, 229, 0), 0.1), "write '#ace500' if these are numbers from 0 to 255"),
         (lambda: tl.Medium.from_color("172, 229, 201", 0.1), "write '#ace5c9'"),
         # A color that is merely too bright stays what it is.
         (lambda: tl.Medium.from_color((1.5, 1.0, 1.0), 0.1), "scale the color to at most 1"),

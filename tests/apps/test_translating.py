@@ -215,7 +215,7 @@ def test_what_a_stage_takes_and_gives_has_the_same_name_and_place_in_every_langu
     [
         ((), "hlsl", r"--target hlsl; glslang and SPIRV-Cross are not installed; install them: apt-get install "),
         (("glslang",), "msl", r"--target msl; SPIRV-Cross is not installed; install them: .* spirv-cross"),
-        ((), "wgsl", r"--target wgsl; naga is not installed; install Node.js, and 'npm install naga-wasm@"),
+        ((), "wgsl", r"--target wgsl; naga is not installed; install Node.js, then run 'npm install naga-wasm@"),
     ],
 )
 def test_a_translator_that_is_absent_is_told(
@@ -247,7 +247,7 @@ def test_what_a_translator_refuses_is_told_in_its_words(
 
 def test_a_part_of_stages_is_refused() -> None:
     with pytest.raises(
-        tl.InputError, match=r"part of stages, and asks them for .*; take a stage \(.vert, .frag\), a file"
+        tl.InputError, match=r"part of other shaders, .*; choose a complete shader \(.vert, .frag\), a file"
     ):
         translate("transport/hierarchy.glsl", {"ONE_OBJECT": 1}, "hlsl")
 

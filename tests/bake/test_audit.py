@@ -344,9 +344,9 @@ def test_the_verb_tells_findings_and_fails_for_errors(run: Run, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (("--fix",), "--fix; -o OUTPUT is missing; give both, or neither"),
-        (("-o", "out.glb"), "-o out.glb; --fix is missing; give both, or neither"),
-        (("--fix", "-o", "out.gltf"), "suffix '.gltf'; use .glb, which holds the maps, too"),
+        (("--fix",), "--fix; -o OUTPUT is missing; these options belong together: give both, or neither"),
+        (("-o", "out.glb"), "-o out.glb; --fix is missing; these options belong together: give both, or neither"),
+        (("--fix", "-o", "out.gltf"), "suffix '.gltf'; use .glb, which also holds the thickness maps"),
     ],
 )
 def test_what_is_asked_in_halves_is_refused(run: Run, tmp_path: Path, options: tuple[str, ...], told: str) -> None:

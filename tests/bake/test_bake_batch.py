@@ -245,27 +245,27 @@ def test_a_bad_asset_stops_no_other(make_jobs: Any, tmp_path: Path) -> None:
     jobs.append({**jobs[0], "model": str(tmp_path / "gone.obj"), "output": str(tmp_path / "maps" / "gone.npy")})
     report = bake_many(jobs, Serial())
     assert [asset["status"] for asset in report.assets] == ["baked", "failed", "baked", "failed"]
-    assert "it has no faces" in report.assets[1]["error"] or "cannot be read" in report.assets[1]["error"]
-    assert report.assets[3]["error"] == f"mesh {jobs[3]['model']!r}; no such file; check the path"
+    assert "the mesh has no faces" in report.assets[1]["error"] or "cannot be read" in report.assets[1]["error"]
+    assert report.assets[3]["error"] == f"mesh {jobs[3]['model']!r}; no file has this path; check the path"
     assert "2 baked, 0 suspect, 0 skipped, 2 failed" in str(report)
     whole([jobs[0], jobs[2]])
 
 
 def test_what_is_wrong_with_the_whole_batch_is_an_error(make_jobs: Any) -> None:
     jobs = make_jobs(2)
-    with pytest.raises(tl.InputError, match="rename one of them"):
+    with pytest.raises(tl.InputError, match="give each output a different name"):
         bake_many([jobs[0], {**jobs[1], "output": jobs[0]["output"].upper()}])
-    with pytest.raises(tl.InputError, match="bake job with 'sice'; not a known key"):
+    with pytest.raises(tl.InputError, match="bake job with 'sice'; a bake job has no such key"):
         bake_many([{**jobs[0], "sice": 3}])
     with pytest.raises(tl.InputError, match="bake setting 'sise'; not a known setting"):
         bake_many([{**jobs[0], "settings": {"sise": 3}}])
-    with pytest.raises(tl.InputError, match="bake job; no output"):
+    with pytest.raises(tl.InputError, match="bake job; the job has no key output"):
         bake_many([{"model": "a.obj"}])
-    with pytest.raises(tl.InputError, match="0 processes; below 1"):
+    with pytest.raises(tl.InputError, match="0 worker processes; the number must be at least 1"):
         bake_many(jobs, workers=0)
-    with pytest.raises(tl.InputError, match="max_distance '0%'; not a share such as '10%'"):
+    with pytest.raises(tl.InputError, match="max_distance '0%'; the value is not a percentage such as '10%'"):
         bake_many([{**jobs[0], "settings": {"max_distance": "0%"}}])
-    with pytest.raises(tl.InputError, match="mode 'transmittance'; no medium"):
+    with pytest.raises(tl.InputError, match="mode 'transmittance'; this mode needs a medium"):
         bake_many([{**jobs[0], "settings": {"mode": "transmittance"}}])
     assert not list(Path(jobs[0]["output"]).parent.iterdir())
 

@@ -106,8 +106,8 @@ def test_vertices(run: Run, ball: Path, ball_glb: Path, tmp_path: Path) -> None:
     assert run(ball_glb, "-o", tmp_path / "t.glb", "--vertices", "--mode", "normal").code == 0
     attributes = read_gltf(tmp_path / "t.glb").tree["meshes"][0]["primitives"][0]["attributes"]
     assert "_THICKNESS" in attributes
-    refused(run(ball, "-o", tmp_path / "x.ply", "--vertices", "--high", ball), "high is of maps")
-    refused(run(ball, "-o", tmp_path / "x.ply", "--vertices", "--invert"), "invert is of maps")
+    refused(run(ball, "-o", tmp_path / "x.ply", "--vertices", "--high", ball), "high applies only to thickness maps")
+    refused(run(ball, "-o", tmp_path / "x.ply", "--vertices", "--invert"), "invert applies only to thickness maps")
     refused(run(ball, "-o", tmp_path / "x.exr", "--vertices"), r"use \.ply, \.glb or \.npy")
     refused(run(ball, "-o", tmp_path / "x.ply"), r"suffix '\.ply'")
 
@@ -147,43 +147,75 @@ def test_the_medium_of_the_material_is_that_of_the_mode(run: Run, ball_glb: Path
 @pytest.mark.parametrize(
     ("arguments", "message", "code"),
     [
-        (["bear"], "neither is given; give one of the two", 2),
+        (["bear"], "neither is given; one of these two options is required", 2),
         (["bear", "-o", "{}/t.exr", "--out-dir", "{}"], "both are given", 2),
-        (["bear", "leaf", "-o", "{}/t.exr"], "2 models; give --out-dir instead", 2),
+        (["bear", "leaf", "-o", "{}/t.exr"], "2 models are given; use --out-dir", 2),
         (["bear", "-o", "{}/t.tif"], r"suffix '\.tif'", 2),
-        (["bear", "-o", "{}/no/t.exr"], "no folder", 2),
+        (["bear", "-o", "{}/no/t.exr"], "the folder .* does not exist", 2),
         (["bear", "-o", "{}/t.exr", "--size", "0"], "size 0; not a whole number in 1", 2),
         (["bear", "-o", "{}/t.exr", "--rays", "1"], "rays 1; not a whole number in 2", 2),
         (["bear", "-o", "{}/t.exr", "--rays", "0", "--mode", "normal"], "rays 0; not a whole number in 1", 2),
-        (["bear", "-o", "{}/t.exr", "--spread", "0"], "spread 0.0; not in 0 < spread", 2),
+        (["bear", "-o", "{}/t.exr", "--spread", "0"], "spread 0.0; the angle must satisfy 0 < spread", 2),
         (["bear", "-o", "{}/t.exr", "--max-distance", "far"], "--max-distance 'far'; length 'far'", 2),
-        (["bear", "-o", "{}/t.exr", "--max-distance", "-1cm"], "--max-distance '-1cm'; .*not positive", 2),
-        (["bear", "-o", "{}/t.exr", "--max-distance", "x%"], "max_distance 'x%'; not a share", 2),
+        (
+            ["bear", "-o", "{}/t.exr", "--max-distance", "-1cm"],
+            "--max-distance '-1cm'; .*the length must be positive",
+            2,
+        ),
+        (["bear", "-o", "{}/t.exr", "--max-distance", "x%"], "max_distance 'x%'; the value is not a percentage", 2),
         (["bear", "-o", "{}/t.exr", "--tolerance", "0"], "--tolerance '0'", 2),
         (["bear", "-o", "{}/t.exr", "--mode", "thick"], "'thick' is not one of", 2),
-        (["bear", "-o", "{}/t.exr", "--mode", "transmittance"], "mode 'transmittance'; no medium.* --color", 2),
-        (["bear", "-o", "{}/t.exr", "--cage", "bear"], "--cage bear; no --high; add --high MESH, or leave it out", 2),
-        (["bear", "-o", "{}/t.exr", "--high-distance", "1%"], "--high-distance 1%; no --high; add", 2),
-        (["bear", "-o", "{}/t.exr", "--unit", "furlong"], "comes with the toolkit, in metres", 2),
-        (["none.obj", "-o", "{}/t.exr"], "no such file", 2),
+        (
+            ["bear", "-o", "{}/t.exr", "--mode", "transmittance"],
+            "mode 'transmittance'; this mode needs a medium.* --color",
+            2,
+        ),
+        (
+            ["bear", "-o", "{}/t.exr", "--cage", "bear"],
+            "--cage bear; this option works only with --high",
+            2,
+        ),
+        (
+            ["bear", "-o", "{}/t.exr", "--high-distance", "1%"],
+            "--high-distance 1%; this option works only with --high; add",
+            2,
+        ),
+        (["bear", "-o", "{}/t.exr", "--unit", "furlong"], "is a built-in mesh, whose coordinates are in metres", 2),
+        (["none.obj", "-o", "{}/t.exr"], "no file has this path", 2),
         (
             ["slab", "-o", "{}/t.exr"],
-            "mesh 'slab'; no file and no mesh of the toolkit; give .* amber, ",
+            "mesh 'slab'; no file and no built-in mesh has this name; give .* amber, ",
             2,
         ),
         (["none.obj", "-o", "{}/t.exr", "--unit", "furlong"], "unit 'furlong'", 2),
-        (["bear", "-o", "{}/t.exr", "--high", "none.obj"], "no such file", 2),
-        (["bear", "-o", "{}/t.glb", "--mode", "local"], "mode 'local' has no unit", 2),
-        (["bear", "-o", "{}/t.glb", "--tile", "1001"], "glTF has no tiles", 2),
-        (["bear", "-o", "{}/t.exr", "--jobs", "2"], "--jobs 2; it is for many models", 2),
-        (["bear", "-o", "{}/t.exr", "--max-escaped", "2%"], "--max-escaped 2%; it is for many models", 2),
-        (["bear", "--out-dir", "{}/maps", "--max-escaped", "2"], "--max-escaped '2'; not a share", 2),
-        (["bear", "--out-dir", "{}/maps", "--max-escaped", "few"], "--max-escaped 'few'; not a share", 2),
-        (["bear", "--out-dir", "{}/maps/deep", "--jobs", "0", "--format", "npy"], "0 processes", 2),
-        (["bear", "--out-dir", "{}", "--check"], "it looks at one model", 2),
-        (["bear", "--out-dir", "{}", "--dask", "tcp://x:1", "--jobs", "2"], "--dask is given, too", 2),
-        (["bear", "-o", "{}/t.ply", "--vertices", "--check"], "it looks at maps", 2),
-        (["bear", "-o", "{}/t.npy", "--mode", "local", "--check"], "is no length", 2),
+        (["bear", "-o", "{}/t.exr", "--high", "none.obj"], "no file has this path", 2),
+        (
+            ["bear", "-o", "{}/t.glb", "--mode", "local"],
+            "mode 'local' bakes a fraction, which glTF cannot store as a thickness",
+            2,
+        ),
+        (["bear", "-o", "{}/t.glb", "--tile", "1001"], "a glTF file cannot hold UDIM tiles", 2),
+        (["bear", "-o", "{}/t.exr", "--jobs", "2"], "--jobs 2; this option works only with several models", 2),
+        (
+            ["bear", "-o", "{}/t.exr", "--max-escaped", "2%"],
+            "--max-escaped 2%; this option works only with several models",
+            2,
+        ),
+        (["bear", "--out-dir", "{}/maps", "--max-escaped", "2"], "--max-escaped '2'; the value is not a percentage", 2),
+        (
+            ["bear", "--out-dir", "{}/maps", "--max-escaped", "few"],
+            "--max-escaped 'few'; the value is not a percentage",
+            2,
+        ),
+        (["bear", "--out-dir", "{}/maps/deep", "--jobs", "0", "--format", "npy"], "0 worker processes", 2),
+        (["bear", "--out-dir", "{}", "--check"], "--check works with one model", 2),
+        (["bear", "--out-dir", "{}", "--dask", "tcp://x:1", "--jobs", "2"], "--dask already chooses the workers", 2),
+        (
+            ["bear", "-o", "{}/t.ply", "--vertices", "--check"],
+            "--check works only with thickness maps, not with thickness per vertex",
+            2,
+        ),
+        (["bear", "-o", "{}/t.npy", "--mode", "local", "--check"], "does not bake a length", 2),
     ],
 )
 def test_a_mistake_is_one_line_and_leaves_no_file(
@@ -234,7 +266,7 @@ def test_many_models_and_a_bad_one(
     assert "left" not in rows[3]
     told = sorted(row.split()[1:3] for row in rows)
     assert told == [["a.obj", "baked"], ["b.obj", "failed"], ["c.obj", "baked"], ["nobody", "failed"]]
-    assert "mesh 'nobody'; no file and no mesh of the toolkit" in rows[3]
+    assert "mesh 'nobody'; no file and no built-in mesh has this name" in rows[3]
     assert total.startswith("2 baked, 0 suspect, 0 skipped, 2 failed in ")
     assert sorted(path.name for path in out.iterdir()) == ["a.png", "a.png.json", "c.png", "c.png.json"]
     models[1].unlink()
@@ -245,7 +277,7 @@ def test_many_models_and_a_bad_one(
     assert [asset["status"] for asset in found["assets"]] == ["skipped", "baked", "skipped"]
     assert (found["failed"], result.code) == (0, 0)
     assert [line.split()[0] for line in result.err.splitlines()] == ["1/3", "2/3", "3/3"]
-    refused(run(*models, ball_twin(tmp_path), "--out-dir", out), "rename one of them")
+    refused(run(*models, ball_twin(tmp_path), "--out-dir", out), "give each output a different name")
 
 
 @pytest.mark.filterwarnings("ignore::translucent.TranslucentWarning")  # of the holes
@@ -266,7 +298,7 @@ def test_maps_that_cannot_be_right_are_suspect(
         rows = {row.split()[1]: row for row in result.out.splitlines()[:3]}
         assert [rows[f"{name}.obj"].split()[2] for name in ("whole", "opened", "sheet")] == [again, *2 * ["suspect"]]
         assert re.search(r"\d+% of the rays have no exit, more than 0\.05", rows["opened.obj"])
-        assert "the thickness is 0 everywhere" in rows["sheet.obj"]
+        assert "the thickness is 0 at all points" in rows["sheet.obj"]
     found = json.loads(run(*arguments, "--max-escaped", "100%", "--json").out)
     assert [asset["status"] for asset in found["assets"]] == ["skipped", "skipped", "suspect"]
     assert found["suspect"] == 1

@@ -71,7 +71,9 @@ def test_settings_and_their_keywords_are_one(bear: tl.Mesh) -> None:
     of_vertices = tl.bake_vertex_thickness(bear, asked)
     assert np.array_equal(of_vertices.values, tl.bake_vertex_thickness(bear, mode="normal").values)
     assert (of_vertices.settings.size, of_vertices.settings.padding) == (1, 0)
-    with pytest.raises(tl.InputError, match="thickness per vertex; padding is of maps; leave it out"):
+    with pytest.raises(
+        tl.InputError, match="thickness is baked per vertex; padding applies only to thickness maps; omit this setting"
+    ):
         tl.bake_vertex_thickness(bear, padding=2)
     with pytest.raises(TypeError, match="unexpected keyword argument 'colour'"):
         tl.bake_thickness(bear, colour="red")
@@ -170,13 +172,16 @@ def test_faces_without_area_are_left_out() -> None:
     with pytest.warns(tl.TranslucentWarning, match="2 faces without area are left out"):
         found = tl.bake_vertex_thickness(more)
     assert np.array_equal(found.values, tl.bake_vertex_thickness(solid).values)
-    with pytest.raises(tl.InputError, match="no face has an area"):
+    with pytest.raises(tl.InputError, match="no face of the mesh has an area"):
         tl.bake_vertex_thickness(tl.Mesh([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)]))
 
 
 def test_an_inverted_mesh_is_refused() -> None:
     solid = Sphere().tessellate(16)
-    with pytest.raises(tl.InputError, match=r"all its faces look inwards; turn it \(tl\.load_mesh does\)"):
+    with pytest.raises(
+        tl.InputError,
+        match=r"all faces of the mesh point inwards; flip the faces \(tl\.load_mesh does so automatically\), or",
+    ):
         tl.bake_thickness(tl.Mesh(solid.vertices, solid.faces[:, ::-1]), 16)
 
 
@@ -186,22 +191,22 @@ REFUSALS = [
     ({"rays": 2.5}, "rays 2.5; not a whole number"),
     ({"size": 0}, "size 0; not a whole number in 1 to"),
     ({"size": 10**6}, "size 1000000; not a whole number in 1 to"),
-    ({"spread": 0.0}, "spread 0.0; not in 0 < spread <= 180 degrees"),
-    ({"spread": 181}, "spread 181; not in 0 < spread <= 180 degrees"),
-    ({"spread": float("nan")}, "spread nan; not in 0 < spread"),
+    ({"spread": 0.0}, "spread 0.0; the angle must satisfy 0 < spread <= 180 degrees"),
+    ({"spread": 181}, "spread 181; the angle must satisfy 0 < spread <= 180 degrees"),
+    ({"spread": float("nan")}, "spread nan; the angle must satisfy 0 < spread <= 180 degrees"),
     ({"mode": "mean"}, "mode 'mean'; not known; use one of normal, cone, transmittance, inscribed, local"),
     ({"weighting": "linear"}, "weighting 'linear'; not known; use one of cosine, uniform"),
     ({"gaps": "all"}, "gaps 'all'; not known; use one of first-exit, total"),
-    ({"mode": "transmittance"}, "mode 'transmittance'; no medium"),
+    ({"mode": "transmittance"}, "mode 'transmittance'; this mode needs a medium"),
     ({"mode": "transmittance", "medium": tl.Medium()}, "a medium that takes no light away"),
-    ({"max_distance": 0.0}, "max_distance 0.0; not positive and finite"),
-    ({"tolerance": float("inf")}, "tolerance inf; not positive and finite"),
+    ({"max_distance": 0.0}, "max_distance 0.0; the value must be positive and finite"),
+    ({"tolerance": float("inf")}, "tolerance inf; the value must be positive and finite"),
     ({"seed": -1}, "seed -1; not a whole number"),
     ({"supersample": 0}, "supersample 0; not a whole number"),
     ({"padding": -1}, "padding -1; not a whole number"),
-    ({"tile": 5}, "tile 5; not a UDIM tile"),
-    ({"threads": 0}, "threads 0; not a whole number above 0"),
-    ({"high_distance": 1.0}, "a cage or a ray distance; no high mesh"),
+    ({"tile": 5}, "tile 5; this number is not a UDIM tile"),
+    ({"threads": 0}, "threads 0; the number of threads must be a whole number above 0"),
+    ({"high_distance": 1.0}, "a cage or a ray distance is set; no detailed mesh (high) is given"),
 ]
 
 
@@ -264,18 +269,21 @@ def test_a_checkpoint_of_another_bake_is_refused(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         tl.bake_thickness(mesh, 300, rays=4, checkpoint=path, progress=interrupted(1))
     for other, asked in ((mesh, {"seed": 1}), (Torus().tessellate(30), {})):
-        with pytest.raises(tl.InputError, match="it is of another mesh or other settings; remove it"):
+        with pytest.raises(
+            tl.InputError,
+            match="the file holds an unfinished bake of another mesh, or with other settings; delete the file",
+        ):
             tl.bake_thickness(other, 300, rays=4, checkpoint=path, **asked)
     path.write_bytes(path.read_bytes()[:100])
-    with pytest.raises(tl.InputError, match="it cannot be read"):
+    with pytest.raises(tl.InputError, match=r"the file cannot be read \("):
         tl.bake_thickness(mesh, 300, rays=4, checkpoint=path)
 
 
 def test_a_checkpoint_that_cannot_be_written_is_refused_before_the_bake(tmp_path: Path) -> None:
     for name, error, message in (
-        ("no/such.partial", tl.InputError, "no folder"),
-        ("", tl.InputError, "a folder of that name is there"),
-        ("x" * 300, tl.RenderError, "it cannot be written .File name too long"),
+        ("no/such.partial", tl.InputError, "does not exist"),
+        ("", tl.InputError, "a folder of this name already exists"),
+        ("x" * 300, tl.RenderError, "the file cannot be written .File name too long"),
     ):
         with pytest.raises(error, match=message):
             tl.bake_thickness(Box().tessellate(), 64, rays=2, checkpoint=tmp_path / name)

@@ -125,7 +125,7 @@ def test_the_local_mode_has_no_unit(make_map: MapMaker, ramp: np.ndarray, tmp_pa
     path = tmp_path / "t.npy"
     save_map(make_map(ramp, mode="local"), path)
     assert (told(path)["unit"], told(path)["encoding"]["unit"]) == ("1", "1")
-    with pytest.raises(tl.InputError, match="mode 'local' has no unit"):
+    with pytest.raises(tl.InputError, match="values of mode 'local' have no unit of length"):
         save_map(make_map(ramp, mode="local"), tmp_path / "t.glb")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["t.npy", "t.npy.json"]
 
@@ -135,9 +135,9 @@ def test_a_map_of_zeros_can_be_written_but_not_normalized(make_map: MapMaker, tm
     save_map(nothing, tmp_path / "t.png")
     assert (load_thickness_map(tmp_path / "t.png") == 0).all()
     assert told(tmp_path / "t.png")["range"] is None
-    with pytest.raises(tl.InputError, match="the largest; it is 0"):
+    with pytest.raises(tl.InputError, match="thickness as a fraction of its largest value; the largest thickness is 0"):
         save_map(nothing, tmp_path / "t.npy", normalize=True)
-    with pytest.raises(tl.InputError, match="the thickness is 0 everywhere"):
+    with pytest.raises(tl.InputError, match="the thickness is 0 at all points"):
         save_map(nothing, tmp_path / "t.glb")
 
 
@@ -157,10 +157,14 @@ def test_the_smallest_values_are_no_trouble() -> None:
     [
         ("t.tif", {}, "suffix '.tif'; use .exr, .png, .npy, .npz or .glb"),
         ("t", {}, "suffix ''"),
-        ("no/t.exr", {}, "no folder"),
-        ("folder.exr", {}, "a folder of that name is there"),
-        ("t.glb", {"invert": True}, "glTF stores t / max and the max; leave --normalize and --invert out"),
-        ("bad\0name/t.exr", {}, "no folder"),
+        ("no/t.exr", {}, "does not exist"),
+        ("folder.exr", {}, "a folder of this name already exists"),
+        (
+            "t.glb",
+            {"invert": True},
+            "glTF always stores fractions of the largest thickness; omit --normalize and --invert",
+        ),
+        ("bad\0name/t.exr", {}, "does not exist"),
     ],
 )
 def test_an_output_that_cannot_be_is_refused(
@@ -270,9 +274,9 @@ def test_a_map_its_uv_and_its_record_are_renamed_together(
 
 def test_what_says_nothing_of_its_scale_is_refused(ramp: np.ndarray, tmp_path: Path) -> None:
     Image.fromarray((ramp * 1000).astype(np.uint16)).save(tmp_path / "t.png")
-    with pytest.raises(tl.InputError, match="does not say its scale"):
+    with pytest.raises(tl.InputError, match="the image does not contain its scale from stored values to metres"):
         load_thickness_map(tmp_path / "t.png")
-    with pytest.raises(tl.InputError, match="no such file"):
+    with pytest.raises(tl.InputError, match="no file has this path"):
         load_thickness_map(tmp_path / "none.exr")
     with pytest.raises(tl.InputError, match=r"suffix '\.jpg'"):
         load_thickness_map(tmp_path / "t.jpg")

@@ -71,9 +71,9 @@ def test_high_to_low_where_nothing_is_found() -> None:
 
 def test_a_cage_of_another_mesh_is_refused() -> None:
     high, low = high_and_low()
-    with pytest.raises(tl.InputError, match="make the cage by moving the mesh's vertices outwards"):
+    with pytest.raises(tl.InputError, match="make the cage by moving the vertices of the mesh outwards"):
         tl.bake_thickness(low, 16, high=high, cage=Sphere().tessellate(20))
-    with pytest.raises(tl.InputError, match="both say where the high mesh is"):
+    with pytest.raises(tl.InputError, match="each of them determines where rays search for the detailed mesh"):
         tl.bake_thickness(low, 16, high=high, cage=low, high_distance=1.0)
 
 

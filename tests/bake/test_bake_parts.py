@@ -236,7 +236,9 @@ def test_the_check_notices_a_map_of_other_uvs_of_a_mesh(make_ball: Any, tmp_path
     assert found.empty == 0
     ball.visual.uv = 1 - ball.visual.uv
     ball.export(tmp_path / "a.obj")
-    with pytest.raises(tl.RenderError, match="the map does not belong to that file"):
+    with pytest.raises(
+        tl.RenderError, match="the thickness map was not baked for this file; bake it again with --unwrap"
+    ):
         check_output(job, record, results)
     trimesh.Trimesh(ball.vertices, ball.faces, process=False).export(tmp_path / "a.obj")
     with pytest.raises(tl.RenderError, match="has no texture coordinates"):
@@ -255,7 +257,10 @@ def test_faces_that_no_texel_shows_are_told(run: Run, vase: Vase, tmp_path: Path
 
 def test_a_high_mesh_is_for_one_part(run: Run, vase: Vase, tmp_path: Path) -> None:
     result = run(vase(*lit("A", "B")), "-o", tmp_path / "t.npy", *QUICK, "--high", "bear")
-    assert "2 objects get thickness; bake them one by one" in one_error_line(result)
+    assert (
+        "2 objects of the model get a thickness map, but a detailed mesh belongs to one object; bake these objects"
+        in one_error_line(result)
+    )
 
 
 # The files of others

@@ -72,9 +72,11 @@ def test_the_command_writes_what_slicers_read(run: Run, tmp_path: Path) -> None:
     assert seen[:, :39] == pytest.approx(seen[:, 39:], abs=0.02)
     words = run(*how, "--color", "#7b1e3a", "--distance", "2mm").out
     assert "rendered before an even white light" in words
-    assert "no medium; give --td" in one_error_line(run(*how))
+    assert "no medium; choose the material with --td, with --color and --distance, or with --preset" in one_error_line(
+        run(*how)
+    )
     assert "--color or --preset is given, too" in one_error_line(run(*how, "--td", "3", "--preset", "amber"))
-    assert "one length; write for example" in one_error_line(run(*how, "--td", "3", "--thickness", "3"))
+    assert "needs two lengths; write for example" in one_error_line(run(*how, "--td", "3", "--thickness", "3"))
 
 
 @pytest.mark.parametrize(
@@ -94,10 +96,10 @@ def test_the_command_writes_what_slicers_read(run: Run, tmp_path: Path) -> None:
             (THICK, THIN),
             0.1,
             0.001,
-            "3 mm to 0.6 mm thick, 100 mm wide, points every 1 mm; give a least thickness, a larger one",
+            "3 mm to 0.6 mm thick, 100 mm wide, points every 1 mm; give a smallest thickness, a larger one, and a",
         ),
         (tl.Medium(500.0), (THIN, THICK), 0.1, 0.1, "a width of several points"),
-        (tl.Medium(500.0), (THIN, THICK), 1.0, 1e-5, "at most 4000000: give a larger pitch"),
+        (tl.Medium(500.0), (THIN, THICK), 1.0, 1e-5, "use a larger --pitch: at most 4000000 points are allowed"),
     ],
 )
 def test_what_cannot_be_printed_is_refused(

@@ -257,10 +257,10 @@ def test_a_map_from_the_command_line(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "found"),
     [
-        (("-o", "a.exr"), r"--mode scatter; no medium; add --preset wax"),
-        (("-o", "a.exr", "--color", "#7b1e3a", "--distance", "1cm"), "its medium does not scatter"),
+        (("-o", "a.exr"), r"--mode scatter; scattered light needs a medium; add --preset wax"),
+        (("-o", "a.exr", "--color", "#7b1e3a", "--distance", "1cm"), "the medium of the body does not scatter light"),
         (("-o", "a.png", "--preset", "wax"), r"suffix '\.png'; use \.exr or \.glb"),
-        (("-o", "a.exr", "--preset", "wax", "--rays", 3), "--rays; --mode scatter has no use for it"),
+        (("-o", "a.exr", "--preset", "wax", "--rays", 3), "--rays; --mode scatter does not use this option"),
         (("-o", "a.exr", "--preset", "wax", "--vertices"), "--vertices; suffix"),
         (("-o", "a.exr", "--preset", "wax", "--resolution", 4), "Diffusion resolution 4"),
         (("--preset", "wax"), "no -o"),
@@ -274,18 +274,23 @@ def test_what_cannot_be_baked(options: tuple[Any, ...], found: str, run: Run, tm
 
 def test_bodies_in_which_light_cannot_diffuse() -> None:
     wax = tl.preset("wax").medium
-    with pytest.raises(tl.InputError, match="its mesh is not closed; give a closed mesh"):
+    with pytest.raises(
+        tl.InputError, match="its mesh is not closed; use a closed mesh, a thicker body, or a higher resolution"
+    ):
         tl.bake_scatter(tl.Mesh(BALL.vertices, BALL.faces[3:], name="open"), wax)
     sheet = trimesh.creation.box((1.0, 1.0, 1e-4))
     with pytest.raises(tl.InputError, match=r"thinner than 0\.25 cells everywhere"):
         tl.bake_vertex_scatter(tl.Mesh(sheet.vertices, sheet.faces), wax)
-    with pytest.raises(tl.InputError, match="its medium emits"):
+    with pytest.raises(
+        tl.InputError,
+        match="the medium emits light, which a scatter bake cannot store because it does not depend on the environment",
+    ):
         tl.bake_scatter(BALL, tl.Medium(scattering=50.0, emission=1.0))
     with pytest.warns(tl.TranslucentWarning, match=r"scattered 0\.0066 times on its way through"):
         assert tl.bake_vertex_scatter(BALL, tl.Medium(scattering=0.01), resolution=8).warnings
 
 
 def test_thickness_takes_nothing_of_it(run: Run, tmp_path: Path) -> None:
-    assert "--resolution; thickness has no use" in one_error_line(
+    assert "--resolution; this option does not apply to a bake of thickness" in one_error_line(
         run("bear", "-o", tmp_path / "a.exr", "--resolution", 16)
     )

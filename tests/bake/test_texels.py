@@ -143,7 +143,7 @@ def test_a_texture_that_repeats_on_a_face_is_refused() -> None:
 
 
 def test_texture_coordinates_without_area_or_not_finite_are_refused() -> None:
-    with pytest.raises(tl.InputError, match="no face has an area in UV"):
+    with pytest.raises(tl.InputError, match="no face of the mesh has an area in UV space"):
         tl.bake_thickness(box_with_uv(np.zeros((12, 3, 2))), 16)
     with pytest.raises(tl.InputError, match="36 texture coordinates are not finite"):
         tl.bake_thickness(box_with_uv(np.full((12, 3, 2), np.nan)), 16)
@@ -158,7 +158,7 @@ def test_no_texture_coordinates_and_no_xatlas(uninstalled: Callable[[str], None]
 
 def test_a_mesh_without_area_gets_no_texture_coordinates() -> None:
     line = tl.Mesh([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)], name="line")
-    with pytest.raises(tl.InputError, match=r"mesh 'line'; no face has an area; export the mesh again"):
+    with pytest.raises(tl.InputError, match="mesh 'line'; no face of the mesh has an area; export the mesh again"):
         unwrap(line, 64, None)
 
 

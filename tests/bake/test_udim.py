@@ -60,9 +60,9 @@ def test_each_tile_has_a_file_and_all_have_one_scale(run: Run, slabs: Path, tmp_
 
 def test_a_model_without_tiles_is_refused(run: Run, tmp_path: Path) -> None:
     line = one_error_line(run("bake", "bear", "-o", tmp_path / "t.<UDIM>.png", *FAST))
-    assert "has no texture coordinates; leave out <UDIM>" in line
+    assert "has no texture coordinates, so it has no UDIM tiles; remove <UDIM> from the name" in line
     line = one_error_line(run("bake", "leaf", "-o", tmp_path / "t.<UDIM>.png", "--check", *FAST))
-    assert "has tiles; check one of them: --tile 1001" in line
+    assert "has several tiles; check a single tile: --tile 1001" in line
 
 
 @pytest.mark.parametrize(

@@ -341,7 +341,7 @@ def test_cost_is_measured_along_an_axis_and_limits_are_told(
     assert [point.x for point in found["SignedDepth"]] == [2, 20, 30]
     assert [point.ratio is not None for point in found["SignedDepth"]] == [True, True, False]
     assert found["depth only"][0].ratio.median == 1  # type: ignore[union-attr]
-    assert "OpenGL has no room" in str(found["KBuffer"][0].refusal)
+    assert "OpenGL does not have enough memory for" in str(found["KBuffer"][0].refusal)
     assert [point.failure for point in found["KBuffer"]] == [None, None, "OSError: gone"]
 
 

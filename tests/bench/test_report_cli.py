@@ -129,7 +129,7 @@ def test_a_truncated_record_is_an_error_before_any_work(run: Run, new: Path, tmp
     more = ["--from", new] if option == "--compare" else []
     result = run(option, cut, *more, "-o", tmp_path / "out")
     assert result.code == 2
-    assert "cut.json; it is cut off or no JSON" in result.err
+    assert "cut.json; the file is cut off, or is not JSON (" in result.err
     assert result.err.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
@@ -139,28 +139,34 @@ def test_a_folder_that_cannot_be_is_an_error_before_any_work(run: Run, new: Path
     (tmp_path / "a file").write_text("kept")
     result = run("--from", new, "-o", tmp_path / name)
     assert result.code == 2
-    assert "a file' is no folder; choose another one" in result.err
+    assert "a file' is not a folder; choose another path" in result.err
     assert (tmp_path / "a file").read_text() == "kept"
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--from", "x.json", "-o", "out", "--quick"], "nothing is measured"),
-        (["--from", "x.json", "-o", "out", "knot"], "nothing is measured"),
-        (["--from", "x.json", "--preset", "jade"], "nothing is measured"),
-        (["--from", "x.json", "--only", "shadow"], "'shadow' is no part of a report; did you mean shadows?"),
-        (["knot", "--only", "shadows"], "a MODEL is measured among the scenes; add scenes"),
-        (["--preset", "jade"], "--preset jade; no MODEL to fill; the toolkit's scenes keep their media; add a MODEL"),
+        (["--from", "x.json", "-o", "out", "--quick"], "--from measures nothing, so this option has no effect"),
+        (["--from", "x.json", "-o", "out", "knot"], "--from measures nothing, so this option has no effect"),
+        (["--from", "x.json", "--preset", "jade"], "--from measures nothing, so this option has no effect"),
+        (["--from", "x.json", "--only", "shadow"], "the report has no part 'shadow'; did you mean shadows?"),
+        (
+            ["knot", "--only", "shadows"],
+            "a MODEL is measured as one of the scenes, so the part 'scenes' is needed; add scenes",
+        ),
+        (
+            ["--preset", "jade"],
+            "--preset jade; the command needs a MODEL for this medium, because the built-in scenes keep their own",
+        ),
         (["knot", "--color", "teal"], "--distance is missing"),
         (["knot", "--preset", "skim_mlik"], "did you mean skim_milk"),
-        (["--from", "absent.json", "-o", "out"], "no such file"),
-        (["--limit", "0"], "--limit 0; not above 0; give seconds, such as 600"),
-        (["--from", "x.json", "--limit", "5"], "nothing is measured"),
+        (["--from", "absent.json", "-o", "out"], "no file has this path"),
+        (["--limit", "0"], "--limit 0; the time must be above 0; give seconds, such as 600"),
+        (["--from", "x.json", "--limit", "5"], "--from measures nothing, so this option has no effect"),
     ],
     ids=[
         *("from and quick", "from and a model", "from a medium", "no such part", "a model in no part"),
-        *("no model", "no distance", "preset", "no such file", "no time", "from and a limit"),
+        *("no model", "no distance", "preset", "no file has this path", "no time", "from and a limit"),
     ],
 )
 def test_bad_usage(run: Run, arguments: list[str], message: str, tmp_path: Path, in_tmp_path: Path) -> None:
@@ -312,7 +318,7 @@ def test_a_case_that_fails_leaves_the_others(run: Run, tmp_path: Path, monkeypat
 def test_a_model_that_is_no_solid_is_a_row_that_failed(run: Run, tmp_path: Path) -> None:
     result = run("leaf", "bear", "-o", tmp_path, *SMALL)
     assert result.code == 1
-    assert "measuring 'leaf'; no method can treat it as solid" in result.err
+    assert "measuring 'leaf'; no method can render it as solid:" in result.err
     assert "246 open edges" in result.err
     assert "model bear" in result.out
     assert "246 open edges" in (tmp_path / "report.html").read_text()
@@ -346,7 +352,7 @@ def test_media_decide_what_is_worth_measuring() -> None:
     [
         (["absent.stl"], "absent.stl"),
         (["--size", "0x5"], "size"),
-        (["--methods", "magic"], "method 'magic'; not one that is measured"),
+        (["--methods", "magic"], "method 'magic'; the report does not measure this method"),
         (["--backend", "magic"], "magic"),
     ],
     ids=["model", "size", "method", "backend"],

@@ -67,9 +67,9 @@ def test_a_scene_that_has_changed_is_told() -> None:
         dataclasses.replace(jade, environment=WHITE),
         dataclasses.replace(jade, lights=[tl.DirectionalLight((0, -1, 0), 1.0)]),
     ):
-        with pytest.raises(InputError, match="the scene has changed since its truth was path traced"):
+        with pytest.raises(InputError, match="the scene has changed since its true picture was path traced"):
             stored_truth("jade ring", other)
-    with pytest.raises(InputError, match="none is stored"):
+    with pytest.raises(InputError, match="no true picture of this scene is stored"):
         stored_truth("nothing", jade)
 
 

@@ -26,9 +26,9 @@ def body(monkeypatch: pytest.MonkeyPatch) -> trimesh.Trimesh:
 @pytest.mark.parametrize(
     ("suffix", "needed", "found"),
     [
-        ("stl", 1280 * PER_SOUP_TRIANGLE, "its 1280 triangles take about 438 kiB of memory"),
-        ("ply", 1280 * PER_TRIANGLE, "its 1280 faces take about 188 kiB of memory"),
-        ("glb", 1280 * PER_TRIANGLE, "the 1280 triangles of 'mesh 0' take about 188 kiB of memory"),
+        ("stl", 1280 * PER_SOUP_TRIANGLE, "its 1280 triangles need about 438 kiB of memory"),
+        ("ply", 1280 * PER_TRIANGLE, "its 1280 faces need about 188 kiB of memory"),
+        ("glb", 1280 * PER_TRIANGLE, "the 1280 triangles of 'mesh 0' need about 188 kiB of memory"),
     ],
 )
 def test_a_mesh_is_read_where_there_is_memory_and_refused_where_not(
@@ -48,7 +48,7 @@ def test_a_text_is_counted_by_its_length(
 ) -> None:
     body.export(path := tmp_path / "ball.obj")
     monkeypatch.setattr(reading, "free_memory", lambda: 1000)
-    with pytest.raises(tl.InputError, match=r"its [\d.]+ kiB of text take about"):
+    with pytest.raises(tl.InputError, match=r"its [\d.]+ kiB of text need about"):
         tl.load_mesh(path)
 
 
@@ -70,7 +70,7 @@ def test_fifty_million_triangles_are_refused_from_the_header_alone(
         stream.truncate(84 + 50 * count)  # sparse: it takes no room on the disk
     monkeypatch.setattr(reading, "free_memory", lambda: 8 << 30)
     with pytest.raises(
-        tl.InputError, match=r"its 50000000 triangles take about 16.3 GiB of memory, and 8 GiB are free"
+        tl.InputError, match=r"its 50000000 triangles need about 16\.3 GiB of memory, but only 8 GiB are free"
     ):
         tl.load_mesh(path)
 

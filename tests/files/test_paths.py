@@ -41,19 +41,19 @@ def directory(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("check", "name", "message"),
     [
-        (require_file, "folder", "it is a folder; give a file in it"),
-        (require_file, "absent", "no such file; check the path"),
-        (require_file, "dangling", "no such file; check the path"),
-        (require_file, "a\0b", "no such file; check the path"),
-        (require_file, "long" * 100, "no such file; check the path"),
-        (require_output, "folder", "a folder of that name is there; choose another name"),
-        (require_output, "loop", "links of that name lead to each other; choose another name"),
-        (require_output, "absent/x", "absent'; make the folder first"),
-        (require_output, "file/x", "file' is no folder; choose another one"),
-        (require_output, "a\0b/x", "make the folder first"),
-        (require_output, "long" * 100 + "/x", "make the folder first"),
-        (require_folder, "file", "file' is no folder; choose another one"),
-        (require_folder, "file/x/y", "file' is no folder; choose another one"),
+        (require_file, "folder", "the path is a folder; give the path of a file"),
+        (require_file, "absent", "no file has this path; check the path"),
+        (require_file, "dangling", "no file has this path; check the path"),
+        (require_file, "a\0b", "no file has this path; check the path"),
+        (require_file, "long" * 100, "no file has this path; check the path"),
+        (require_output, "folder", "a folder of this name already exists; choose another name"),
+        (require_output, "loop", "the symbolic links of this path point at each other; choose another path"),
+        (require_output, "absent/x", "absent' does not exist; create the folder first"),
+        (require_output, "file/x", "file' is not a folder; choose another path"),
+        (require_output, "a\0b/x", "create the folder first"),
+        (require_output, "long" * 100 + "/x", "create the folder first"),
+        (require_folder, "file", "file' is not a folder; choose another path"),
+        (require_folder, "file/x/y", "file' is not a folder; choose another path"),
     ],
 )
 def test_a_name_that_cannot_be_used_is_refused(
@@ -74,7 +74,7 @@ def test_a_folder_that_takes_nothing_is_found_at_once(
         raise OSError(errno.EROFS, "Read-only file system")
 
     monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(tl.RenderError, match=r"asked; it cannot be written \(Read-only file system\)"):
+    with pytest.raises(tl.RenderError, match=r"asked; the file cannot be written \(Read-only file system\)"):
         require_folder(directory / name, "asked")
 
 
@@ -103,7 +103,10 @@ def test_only_files_are_replaced(directory: Path, name: str) -> None:
         pytest.skip("no pipes with a name here")
     before = sorted((path.name, path.lstat().st_mode) for path in directory.iterdir())
     for write in (require_output, write_text_atomically):
-        with pytest.raises(tl.InputError, match=r"of that name (is there|lead to each other); choose another name$"):
+        with pytest.raises(
+            tl.InputError,
+            match=r"(of this name already exists; choose another name|point at each other; choose another path)$",
+        ):
             write(directory / name, "")
     assert before == sorted((path.name, path.lstat().st_mode) for path in directory.iterdir())
 

@@ -132,7 +132,7 @@ def test_colors_tint_what_enters_a_body(tmp_path: Path) -> None:
 def test_as_many_colors_as_vertices(tmp_path: Path) -> None:
     with pytest.raises(tl.InputError, match="'Box': 7 colors for 8 vertices"):
         colored(tmp_path, np.full((7, 3), 0.5))
-    with pytest.raises(tl.InputError, match="a color of a vertex is not in 0 to 1"):
+    with pytest.raises(tl.InputError, match="a vertex color is outside 0 to 1"):
         tl.Mesh(BOX.vertices, BOX.faces, colors=np.full((8, 4), 1.5))
 
 
@@ -169,9 +169,11 @@ def test_media_fill_bodies_and_leave_layers(tmp_path: Path) -> None:
 
 def test_only_thin_sheets_cover() -> None:
     mesh = tl.Mesh(BOX.vertices, BOX.faces, name="Crate")
-    with pytest.raises(tl.InputError, match="opacity of 'Crate'; it is opaque, and only thin sheets cover"):
+    with pytest.raises(
+        tl.InputError, match="opacity of 'Crate'; the object is opaque, and only thin-walled sheets can have an opacity"
+    ):
         tl.Object(mesh, None, surface=tl.Surface(opacity=0.5))
-    with pytest.raises(tl.InputError, match="opacity of 'Crate'; it is a solid"):
+    with pytest.raises(tl.InputError, match="opacity of 'Crate'; the object is a solid"):
         tl.Object(mesh, tl.Medium(), surface=tl.Surface(opacity=0.5))
     with pytest.raises(tl.InputError, match="surface opacity 2"):
         tl.Surface(opacity=2)

@@ -41,7 +41,10 @@ from tests.gltf.gltf_writer import BOX, Json, Writer, box_file, lit_scene, load,
         ({"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]}, "type 'SCALAR' where VEC3 belongs"),
         ({"meshes": [{"primitives": [{"attributes": {"POSITION": 1}, "indices": 1}]}]}, "'VEC3' where SCALAR belongs"),
         ({"meshes": [{"primitives": [{"attributes": {"POSITION": 1}, "material": 4}]}]}, "materials 4 is not one of 0"),
-        ({"buffers": [{"byteLength": 99, "uri": "gone.bin"}]}, "'gone.bin' cannot be read.*keep its files together"),
+        (
+            {"buffers": [{"byteLength": 99, "uri": "gone.bin"}]},
+            "'gone.bin' cannot be read.*keep all files of the model together",
+        ),
         ({"buffers": [{"byteLength": 9, "uri": "data:;base64,AAAA"}]}, "accessor 1 leaves its buffer"),
         ({"buffers": []}, "buffers 0 is not one of 0"),
     ],
@@ -158,17 +161,17 @@ def test_a_bad_base_color_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["model.obj", "model", "missing.stl"])
 def test_what_is_no_gltf_is_sent_to_load_mesh(tmp_path: Path, name: str) -> None:
     (tmp_path / "model.obj").write_text("v 0 0 0\n")
-    with pytest.raises(tl.InputError, match=r"scenes are glTF files; .*tl\.load_mesh"):
+    with pytest.raises(tl.InputError, match=r"is not that of a glTF file; .*tl\.load_mesh"):
         tl.load_scene(tmp_path / name)
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "no such file"),
-        (b"\x00\xff" * 200, "its JSON is broken"),
-        (b"glTF\x02\0\0\0\xff\xff\0\0", "cut short"),
-        (b"{}", "no asset, so it is not glTF 2.0"),
+        (None, "no file has this path"),
+        (b"\x00\xff" * 200, r"the JSON of the file is broken \("),
+        (b"glTF\x02\0\0\0\xff\xff\0\0", "the file is cut off after"),
+        (b"{}", r"the JSON of the file has no 'asset', so the file is not glTF 2\.0"),
     ],
 )
 def test_a_file_that_is_none_is_refused(tmp_path: Path, content: bytes | None, message: str) -> None:

@@ -384,13 +384,13 @@ def test_a_picture_in_a_missing_buffer_is_an_error(tmp_path: Path) -> None:
     tree["buffers"].append({"byteLength": 9, "uri": "gone.bin"})
     tree["bufferViews"][3]["buffer"] = 1
     path.write_text(json.dumps(tree))
-    with pytest.raises(tl.InputError, match=r"'gone.bin' cannot be read .*keep its files together"):
+    with pytest.raises(tl.InputError, match=r"'gone.bin' cannot be read .*keep all files of the model together"):
         tl.load_scene(path)
 
 
 def test_a_picture_beyond_all_measure_is_refused(tmp_path: Path) -> None:
     black = png(np.zeros((7000, 7000), np.uint8))
-    with pytest.raises(tl.InputError, match=r"7000x7000 pixels take 561 MiB; .* at most 512 MiB are read; make it sm"):
+    with pytest.raises(tl.InputError, match=r"7000x7000 pixels need 561 MiB; .* at most 512 MiB are read; make it sm"):
         tl.load_scene(plate(tmp_path, base_color(), black))
 
 

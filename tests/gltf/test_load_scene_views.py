@@ -61,7 +61,9 @@ def test_cameras_count_in_the_order_of_the_file(tmp_path: Path) -> None:
     framed = load(writer, tmp_path, camera=None).camera
     assert framed.fov_y == 30.0
     for index in (2, -1, True, "Front", 1.0):
-        with pytest.raises(tl.InputError, match=r"it has 0 of node 'F', 1 of node 'S'; give one of these numbers"):
+        with pytest.raises(
+            tl.InputError, match="the file has 0 of node 'F', 1 of node 'S'; use one of these camera numbers"
+        ):
             load(writer, tmp_path, camera=index)
 
 
@@ -78,7 +80,10 @@ def test_without_cameras_all_objects_are_framed(tmp_path: Path) -> None:
     narrow = load(writer, tmp_path, size=(10, 100)).camera
     assert np.linalg.norm(narrow.eye) > 2 * np.linalg.norm(scene.camera.eye)
     assert scene.environment is LIGHT_TABLE
-    with pytest.raises(tl.InputError, match=r"camera 1 of '.*model.glb'; it has no cameras; leave the camera out"):
+    with pytest.raises(
+        tl.InputError,
+        match=r"camera 1 of '.*model.glb'; the file has no cameras; omit the camera: the view then shows all objects",
+    ):
         load(writer, tmp_path, camera=1)
 
 
@@ -147,5 +152,5 @@ def test_a_camera_below_a_singular_transform_is_refused_unless_another_is_chosen
 
 
 def test_an_object_with_a_singular_transform_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match=r"transform of 'Sheet'; it flattens the mesh .*; give every axis"):
+    with pytest.raises(tl.InputError, match=r"transform of 'Sheet'; the transform flattens the mesh .*; use a scale"):
         load(box_file(tmp_path, name="Sheet", scale=FLAT), tmp_path)

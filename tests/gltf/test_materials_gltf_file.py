@@ -53,7 +53,7 @@ def test_links_hold_from_another_folder(tmp_path: Path) -> None:
     write_gltf(read_gltf(saved(tmp_path / "in" / "m.gltf", tree)), tmp_path / "out" / "m.gltf")
     moved = read_gltf(tmp_path / "out" / "m.gltf")
     assert moved.tree["buffers"][0]["uri"] == "../in/a%20b/mesh.bin"
-    with pytest.raises(tl.InputError, match="is outside its folder"):
+    with pytest.raises(tl.InputError, match="leads outside the folder of the model"):
         moved.resource(moved.tree["buffers"][0])
     trusted = read_gltf(tmp_path / "out" / "m.gltf", allow_outside=True)
     assert trusted.resource(trusted.tree["buffers"][0]) == b"1234"
@@ -216,19 +216,19 @@ def test_an_image_without_a_kind_stays_as_it_is(tmp_path: Path) -> None:
 def test_broken_files_are_refused_in_one_line(two_boxes: Path, tmp_path: Path) -> None:
     whole = two_boxes.read_bytes()
     cases = {
-        "cut.glb": (whole[:-10], "cut short"),
-        "head.glb": (whole[:14], "cut short"),
-        "json.glb": (whole.replace(b'"asset":', b'"asset";', 1), "its JSON is broken"),
+        "cut.glb": (whole[:-10], "the file is cut off after"),
+        "head.glb": (whole[:14], "the file is cut off after"),
+        "json.glb": (whole.replace(b'"asset":', b'"asset";', 1), "the JSON of the file is broken ("),
         "old.glb": (whole[:4] + b"\1\0\0\0" + whole[8:], "GLB version 1"),
-        "kind.glb": (whole[:16] + b"BIN\0" + whole[20:], "first chunk is not JSON"),
+        "kind.glb": (whole[:16] + b"BIN\0" + whole[20:], "first chunk of the file is not JSON"),
         "nan.gltf": (b'{"asset": {}, "materials": [{"a": NaN}]}', "NaN is no JSON number"),
         "long.gltf": (b'{"asset": {}, "a": 1' + b"0" * 999 + b"}", "whole number is too long"),
         "huge.gltf": (b'{"asset": {}, "a": 1e999}', "beyond the range"),
-        "deep.gltf": (b"[" * 100000, "its JSON is broken"),
-        "bytes.gltf": (b"\xff\xfe\xff", "its JSON is broken"),
-        "list.gltf": (b"[]", "no asset"),
+        "deep.gltf": (b"[" * 100000, "the JSON of the file is broken ("),
+        "bytes.gltf": (b"\xff\xfe\xff", "the JSON of the file is broken ("),
+        "list.gltf": (b"[]", "has no 'asset'"),
         "materials.gltf": (b'{"asset": {}, "materials": 3}', "materials is not a list"),
-        "empty.gltf": (b"", "it is empty"),
+        "empty.gltf": (b"", "the file is empty"),
         "model.obj": (b"v 0 0 0", "suffix '.obj'"),
     }
     for name, (content, message) in cases.items():
@@ -239,7 +239,7 @@ def test_broken_files_are_refused_in_one_line(two_boxes: Path, tmp_path: Path) -
         assert message in str(caught.value)
         assert name in str(caught.value)
         assert "\n" not in str(caught.value)
-    with pytest.raises(tl.InputError, match="no such file"):
+    with pytest.raises(tl.InputError, match="no file has this path"):
         read_materials(tmp_path / "missing.glb")
 
 

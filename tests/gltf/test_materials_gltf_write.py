@@ -143,17 +143,17 @@ def test_a_bad_request_writes_nothing(two_boxes: Path, tmp_path: Path) -> None:
     before = sorted(tmp_path.iterdir())
     for model, options, message in (
         (two_boxes, {"object_name": "Nobody"}, "object 'Nobody'.*use one of Left, Other, Right"),
-        (two_boxes, {"thickness": 0.0}, "thickness 0.0; not above 0"),
-        (two_boxes, {"thickness": math.inf}, "not above 0 and finite"),
-        (two_boxes, {"distance": -1.0}, "distance -1.0; not above 0"),
-        (tmp_path / "unlit.glb", {}, "KHR_materials_unlit excludes a volume"),
-        (tmp_path / "missing.glb", {}, "no such file"),
+        (two_boxes, {"thickness": 0.0}, "thickness 0.0; the thickness must be finite and above 0"),
+        (two_boxes, {"thickness": math.inf}, "the thickness must be finite and above 0"),
+        (two_boxes, {"distance": -1.0}, "distance -1.0; the distance must be above 0"),
+        (tmp_path / "unlit.glb", {}, "the extension KHR_materials_unlit of the material excludes a volume"),
+        (tmp_path / "missing.glb", {}, "no file has this path"),
     ):
         with pytest.raises(tl.InputError, match=message):
             write_medium(model, out, JADE, **options)
     assert out.read_bytes() == b"precious"
     assert sorted(tmp_path.iterdir()) == before
-    for name, message in (("out.obj", "suffix '.obj'"), ("none/out.glb", "no folder")):
+    for name, message in (("out.obj", "suffix '.obj'"), ("none/out.glb", "does not exist")):
         with pytest.raises(tl.InputError, match=message):
             write_medium(two_boxes, tmp_path / name, JADE)
 

@@ -19,5 +19,5 @@ def test_a_mesh_is_no_scene(renderer: tl.Renderer, tmp_path: Path, what: str) ->
         "reference": lambda mesh: tl.reference.render(mesh, (8, 8)),
         "write_page": lambda mesh: tl.write_page(mesh, tmp_path / "page.html"),
     }
-    with pytest.raises(tl.InputError, match=r"it is a Mesh; give a tl\.Scene, for example tl\.showcase"):
+    with pytest.raises(tl.InputError, match=r"the object is a Mesh; give a tl\.Scene, for example tl\.showcase"):
         asked[what](Box().tessellate())

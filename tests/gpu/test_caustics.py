@@ -397,7 +397,7 @@ def test_a_frame_without_caustics_has_no_pass_of_them(renderer: tl.Renderer) -> 
     assert not frame.plan.has(PassName.CAUSTICS)
     assert "caustics" not in frame.seconds
     backdrop = tl.Backdrop(np.zeros((8, 8, 3)), np.full((8, 8), np.inf))
-    with pytest.raises(tl.InputError, match="caustics before a backdrop; the objects of a backdrop have no mesh"):
+    with pytest.raises(tl.InputError, match="caustics in front of a backdrop; the objects of a backdrop have no mesh"):
         renderer.render(scene(ball()), (8, 8), backdrop=backdrop, caustics=tl.Caustics(100))
 
 

@@ -102,7 +102,7 @@ def test_what_has_no_noise_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     with tl.Renderer() as renderer:
         frame = renderer.render(glass, (8, 8), denoise=True)
     assert "denoiser" not in frame.provenance
-    assert "not denoised: this picture has no random noise" in str(frame.plan)
+    assert "the picture is not denoised, because it has no random noise" in str(frame.plan)
 
 
 def test_a_missing_package_is_a_sentence(frosted: tl.Scene, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -213,7 +213,9 @@ def test_a_grid_that_no_texture_holds(renderer: tl.Renderer) -> None:
         limit = int(gl.info["GL_MAX_3D_TEXTURE_SIZE"])
     long = tl.DensityGrid(np.ones((1, 1, limit + 1)))
     scene = tl.Scene([tl.Object(Box().tessellate(), EMBER, density=long)], CAMERA, [], DUSK)
-    with pytest.raises(tl.RenderError, match=rf"density grids of 1x1x{limit + 1} voxels .* use coarser grids"):
+    with pytest.raises(
+        tl.RenderError, match=rf"density grids of 1x1x{limit + 1} voxels .* use grids with fewer voxels"
+    ):
         renderer.render(scene, SIZE, tl.RayMarched(steps=8))
 
 

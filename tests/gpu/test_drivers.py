@@ -156,4 +156,7 @@ def test_what_opengl_has_no_memory_for_is_called_so(monkeypatch: pytest.MonkeyPa
         monkeypatch.setattr(renderers, "FrameJob", fail)
         with pytest.raises(RenderError) as error:
             renderer.render(scene, (4, 4))
-        assert str(error.value) == f"rendering; OpenGL has no memory for it ({words}); render smaller"
+        assert (
+            str(error.value)
+            == f"rendering; OpenGL does not have enough memory for the picture ({words}); choose a smaller picture"
+        )

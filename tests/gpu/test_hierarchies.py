@@ -271,7 +271,9 @@ def test_textures_that_turn_out_not_to_fit_are_refused(monkeypatch: pytest.Monke
 def test_much_memory_is_told_before_it_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hierarchies, "build_hierarchy", None)
     monkeypatch.setattr(module, "MUCH_MEMORY", 1 << 20)
-    with pytest.warns(tl.TranslucentWarning, match=r"20,480 triangles takes up to 18.6 MiB of memory; use"):
+    with pytest.warns(
+        tl.TranslucentWarning, match=r"20,480 triangles takes up to 18.6 MiB of memory; to save memory, use"
+    ):
         module._require_room(fake(16384), [ball(5)])
 
 

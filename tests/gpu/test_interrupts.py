@@ -135,7 +135,7 @@ def test_what_was_interrupted_says_so() -> None:
         engine = renderer.gpu
         with interrupted_at(8), pytest.raises(KeyboardInterrupt):
             picture(renderer)
-        with pytest.raises(tl.RenderError, match=r"^rendering; it was interrupted; make a new one$"):
+        with pytest.raises(tl.RenderError, match=r"^rendering; it was interrupted; create a new renderer$"):
             engine.render(renderer.plan(SCENE), SIZE)
         assert renderer.gpu is not engine
 
@@ -264,7 +264,7 @@ def test_two_threads_do_not_use_one_renderer_at_once(monkeypatch: pytest.MonkeyP
         np.testing.assert_array_equal(picture(renderer), expected)
         monkeypatch.undo()
         assert [str(error) for error in met] == [
-            "rendering; another thread uses this renderer; give each thread one of its own"
+            "rendering; another thread is using this renderer; create one renderer for each thread"
         ]
         assert isinstance(met[0], tl.RenderError)
         # One after the other they may.
@@ -298,7 +298,7 @@ def test_a_forked_process_is_refused_at_once() -> None:
         assert os.waitpid(child, 0)[1] == 0
         assert len(lines) == 3
         assert set(lines) == {
-            f"OpenGL in a forked process; process {os.getpid()} has opened it before the fork, which its driver does "
-            'not survive; start processes with multiprocessing.get_context("spawn")'
+            f"OpenGL in a forked process; process {os.getpid()} opened OpenGL before the fork, and the driver does "
+            'not work after a fork; start processes with multiprocessing.get_context("spawn")'
         }
         np.testing.assert_array_equal(picture(renderer), expected)

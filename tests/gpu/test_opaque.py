@@ -257,7 +257,10 @@ def test_too_many_lights_are_refused(renderer: tl.Renderer) -> None:
 
 
 def test_a_scene_of_opaque_objects_only_is_refused(renderer: tl.Renderer) -> None:
-    with pytest.raises(tl.InputError, match="nothing there has a medium; give an object one"):
+    with pytest.raises(
+        tl.InputError,
+        match=r"none of these objects has a medium; give at least one object a medium: medium=tl\.Medium\(\.\.\.\)",
+    ):
         renderer.render(tl.Scene([opaque(BODY)], CAMERAS["perspective"]), SIZE)
 
 

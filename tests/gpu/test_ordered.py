@@ -231,7 +231,9 @@ def test_more_layers_than_asked_for_are_marked_not_wrong(renderer: tl.Renderer, 
     scene, size = shells(100), (24, 18)
     counts = references.hit_counts(scene, size)
     truth = references.render(scene, size)
-    with pytest.warns(tl.TranslucentWarning, match="more than 8 surfaces are marked invalid"):
+    with pytest.warns(
+        tl.TranslucentWarning, match="pixels whose rays cross more than 8 surfaces are marked as invalid"
+    ):
         frame = renderer.render(scene, size, method)
     inside = interior(counts)
     np.testing.assert_array_equal(frame.layers[inside], counts[inside])
@@ -404,7 +406,9 @@ def test_without_shader_storage_the_planner_peels(monkeypatch: pytest.MonkeyPatc
     with tl.Renderer() as renderer:
         frame = renderer.render(shells(3), (32, 24))
         assert frame.plan.method == tl.DepthPeeling()
-        with pytest.raises(tl.InputError, match=r"FragmentLists; this OpenGL has no shader storage.*use DepthPeeling"):
+        with pytest.raises(
+            tl.InputError, match=r"FragmentLists; this OpenGL has no shader storage.*use the method DepthPeeling"
+        ):
             renderer.render(shells(3), (32, 24), tl.FragmentLists())
 
 

@@ -171,9 +171,11 @@ def test_what_cannot_be_had_is_refused_or_told(renderer: tl.Renderer, monkeypatc
     assert tl.plan(scene, interfaces=tl.ScreenInterfaces()).hits == ""
     with pytest.raises(tl.InputError, match=r"no compute shaders, which came with 4\.3; leave hits out"):
         tl.plan(scene, capabilities=Capabilities(shader_storage=False), interfaces=tl.TracedInterfaces(hits="embree"))
-    with pytest.raises(tl.InputError, match="this renderer has no OpenGL; leave hits out"):
+    with pytest.raises(tl.InputError, match="this renderer does not use OpenGL; omit hits"):
         tl.plan(scene, capabilities=Capabilities(opengl=False), interfaces=tl.TracedInterfaces(hits="gl"))
-    with pytest.raises(tl.InputError, match="TracedInterfaces hits 'cuda'; not a known one; use 'embree' or 'gl'"):
+    with pytest.raises(
+        tl.InputError, match="TracedInterfaces hits 'cuda'; no ray caster has this name; use 'embree' or 'gl'"
+    ):
         tl.TracedInterfaces(hits="cuda")
     monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
     told = tl.plan(scene, capabilities=software)

@@ -431,12 +431,12 @@ def test_maps_that_do_not_fit_are_smaller(renderer: tl.Renderer) -> None:
 
 @pytest.mark.parametrize("size", [0, 63, 8193, 100.0, True, "large"])
 def test_sizes_that_are_none_are_refused(size: Any) -> None:
-    with pytest.raises(tl.InputError, match=r"ShadowMaps size .* not a whole number in 64 to 8192"):
+    with pytest.raises(tl.InputError, match=r"ShadowMaps size .* the size must be a whole number in 64 to 8192"):
         tl.ShadowMaps(size)
 
 
 def test_other_choices_of_shadows_are_refused(renderer: tl.Renderer) -> None:
-    with pytest.raises(tl.InputError, match="shadows 1024; not a choice of shadows; give for example"):
+    with pytest.raises(tl.InputError, match="shadows 1024; the value must be a choice of shadows; give for example"):
         renderer.render(scene("ball", "sun"), (16, 12), shadows=1024)  # type: ignore[arg-type]
 
 

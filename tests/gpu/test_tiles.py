@@ -142,5 +142,5 @@ def test_an_interrupted_picture_leaves_no_file(renderer: tl.Renderer, tmp_path: 
     with pytest.raises(KeyboardInterrupt):
         write_tiles(tmp_path / "half.exr", SIZE, broken())
     assert list(tmp_path.iterdir()) == []
-    with pytest.raises(InputError, match="holds all arrays at once"):
+    with pytest.raises(InputError, match="this file format needs all arrays at once"):
         write_tiles(tmp_path / "whole.npz", SIZE, tl.render_tiles(renderer, scene(), SIZE, TILE))

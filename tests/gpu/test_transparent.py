@@ -55,5 +55,5 @@ def test_files_hold_alpha(renderer: tl.Renderer, scene: tl.Scene, tmp_path: Path
 def test_a_backdrop_is_refused(renderer: tl.Renderer) -> None:
     body = tl.Scene([tl.Object(BALL, GRAY)], CAMERA)
     backdrop = tl.Backdrop(np.zeros((72, 96, 3)), np.full((72, 96), np.inf))
-    with pytest.raises(tl.InputError, match="a transparent frame; a backdrop is behind it"):
+    with pytest.raises(tl.InputError, match="a transparent frame; the frame also has a backdrop"):
         renderer.render(body, SIZE, backdrop=backdrop, transparent=True)

@@ -174,7 +174,7 @@ def test_the_plan_says_where_opaque_objects_come_from(renderer: tl.Renderer) -> 
     assert [step.name for step in chosen.passes] == ["shadow_maps", "backdrop", "signed_depth", "transmittance"]
     assert "1. shadow_maps: 1 light on the picture drawn elsewhere" in str(chosen)
     assert "2. backdrop: opaque objects are a picture drawn elsewhere" in str(chosen)
-    assert "not modelled: shadows that the objects of the backdrop throw onto media" in str(chosen)
+    assert "not modelled: shadows that the objects in the backdrop cast onto media" in str(chosen)
     assert chosen == plan_over_backdrop(scene)
     assert "backdrop" not in str(renderer.plan(scene))
 
@@ -183,18 +183,18 @@ def test_bad_backdrops_are_refused() -> None:
     radiance, depth = np.ones((4, 5, 3)), np.ones((4, 5))
     nan = np.where(np.eye(4, 5) > 0, np.nan, 1.0)
     for arguments, message in (
-        ((radiance, depth[0]), r"depth of shape \(5,\); give shape \(h, w\)"),
-        ((radiance[1:], depth), r"radiance of shape \(3, 5, 3\) for depth of shape \(4, 5\)"),
-        ((radiance[..., 0], depth), r"radiance of shape \(4, 5\)"),
-        ((-radiance, depth), "60 numbers of its radiance are not in 0 to 1e"),
-        ((1e40 * radiance, depth), "60 numbers of its radiance"),
-        ((radiance * nan[..., None], depth), "12 numbers of its radiance"),
-        ((radiance, nan), "its depth is not above 0 in 4 pixels; .* and inf where nothing is"),
-        ((radiance, 0.0 * depth), "its depth is not above 0 in 20 pixels"),
-        (("red", depth), "its radiance are not numbers"),
+        ((radiance, depth[0]), r"the depth has shape \(5,\); use the shape \(h, w\)"),
+        ((radiance[1:], depth), r"the radiance has shape \(3, 5, 3\), and the depth has shape \(4, 5\)"),
+        ((radiance[..., 0], depth), r", and the depth has shape \(4, 5\)"),
+        ((-radiance, depth), "60 numbers of the radiance are outside 0 to 1e"),
+        ((1e40 * radiance, depth), "60 numbers of the radiance"),
+        ((radiance * nan[..., None], depth), "12 numbers of the radiance"),
+        ((radiance, nan), "the depth is not above 0 in 4 pixels; .* and inf for pixels without a surface"),
+        ((radiance, 0.0 * depth), "the depth is not above 0 in 20 pixels"),
+        (("red", depth), "the values of radiance are not numbers"),
         ((radiance, depth, depth), r"coverage of shape \(4, 5\) and type float64"),
         ((radiance, depth, depth[0] > 0), r"coverage of shape \(5,\)"),
-        ((np.ones((0, 5, 3)), np.ones((0, 5))), r"depth of shape \(0, 5\)"),
+        ((np.ones((0, 5, 3)), np.ones((0, 5))), r"the depth has shape \(0, 5\)"),
     ):
         with pytest.raises(tl.InputError, match=message):
             tl.Backdrop(*arguments)
@@ -213,17 +213,20 @@ def test_a_backdrop_cannot_be_changed_afterwards() -> None:
 def test_backdrops_that_do_not_fit_are_refused(renderer: tl.Renderer) -> None:
     scene = with_objects(PERSPECTIVE)
     backdrop = tl.Backdrop(np.ones((*SIZE[::-1], 3)), np.full(SIZE[::-1], np.inf))
-    with pytest.raises(tl.InputError, match=r"a backdrop; the scene has opaque objects of its own: .*'wall'"):
+    with pytest.raises(tl.InputError, match=r"a backdrop; the scene itself has opaque objects: .*'wall'"):
         renderer.render(scene, SIZE, backdrop=backdrop)
-    with pytest.raises(tl.InputError, match="backdrop of 64x48; the frame is 48x64; draw both in the same size"):
+    with pytest.raises(
+        tl.InputError, match="backdrop of 64x48; the frame has 48x64 pixels; render both in the same size"
+    ):
         renderer.render(bodies_of(scene), SIZE[::-1], backdrop=backdrop)
-    with pytest.raises(tl.InputError, match=r"of type ndarray; give a tl\.Backdrop"):
+    with pytest.raises(tl.InputError, match=r"of type ndarray; give an object of type tl\.Backdrop"):
         renderer.render(bodies_of(scene), SIZE, backdrop=backdrop.depth)  # type: ignore[arg-type]
     pytest.importorskip("embreex")
     with (
         tl.Renderer("cpu") as without,
         pytest.raises(
-            tl.RenderError, match='a backdrop; this renderer works on the CPU; use another backend than "cpu"'
+            tl.RenderError,
+            match='a backdrop; this renderer works on the CPU, and has no OpenGL; use a backend other than "cpu"',
         ),
     ):
         without.render(bodies_of(scene), SIZE, backdrop=backdrop)

@@ -260,7 +260,7 @@ def test_the_command_writes_a_scene_in_place_of_a_picture(run: Run, tmp_path: Pa
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (["-o", "scene.json"], "not an .xml file"),
+        (["-o", "scene.json"], "the name must end in .xml"),
         (["-o", "scene.xml", "--scattering", "diffusion"], "--scattering; --as mitsuba"),
         (["-o", "scene.xml", "--turntable", "4"], "--turntable; --as mitsuba"),
         (["-o", "scene.xml", "--stage", "studio"], "or no stage"),

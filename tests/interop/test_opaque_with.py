@@ -74,7 +74,10 @@ def test_it_needs_something_opaque_and_a_known_name(pyrender: ModuleType, run: R
     model, output = write(tmp_path / "scene.glb", {"extensions": GLASS}), tmp_path / "a.png"
     code, _, err = run("render", model, "-o", output, "--size", "32x24", "--opaque-with", "pyrender")
     assert code == 2
-    assert err == ("error: drawing opaque objects with pyrender; 'Box 0': all have media; render without pyrender\n")
+    assert err == (
+        "error: drawing opaque objects with pyrender; all nodes have a medium, so no opaque node is left: 'Box 0'; "
+        "render without pyrender\n"
+    )
     code, _, err = run("render", model, "-o", output, "--opaque-with", "blender")
     assert code == 2
     assert "'blender' is not" in err

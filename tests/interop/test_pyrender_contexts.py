@@ -114,7 +114,9 @@ def test_a_failure_leaves_scene_and_contexts_as_they_were(
     before = _state(scene)
     with monkeypatch.context() as patch:
         patch.setattr(drawing.OpaqueRenderer, "_read_main_framebuffer", fail)
-        with pytest.raises(tl.RenderError, match=r"drawing with pyrender; OpenGL refused \(.*refused on purpose"):
+        with pytest.raises(
+            tl.RenderError, match=r"drawing with pyrender; OpenGL reported an error \(.*refused on purpose"
+        ):
             render(scene, MEDIA, SIZE, renderer=renderer, shared=shared)
     assert _same(before, _state(scene))
     np.testing.assert_array_equal(_thickness(renderer, studio), alone)
@@ -158,10 +160,14 @@ def test_an_adopted_context_is_shared_or_left_alone(studio: Any) -> None:
         frame = render(scene, MEDIA, SIZE, renderer=guest)
         assert frame.provenance["opaque"] == "pyrender 0.1.45 in the same OpenGL context"
         np.testing.assert_array_equal(frame.radiance, render(scene, MEDIA, SIZE, renderer=owner).radiance)
-        with pytest.raises(tl.RenderError, match="asked for; the renderer draws in a context of somebody else"):
+        with pytest.raises(
+            tl.RenderError, match="asked for; the renderer draws in the OpenGL context of another library"
+        ):
             render(scene, MEDIA, SIZE, renderer=guest, shared=False)
         ours = tl.Scene([tl.Object(studio.floor), tl.Object(studio.ball, medium=GREEN)], tl.Camera(studio.pose))
-        with pytest.raises(tl.RenderError, match="always come so; the renderer draws in a context of somebody else"):
+        with pytest.raises(
+            tl.RenderError, match="always come so; the renderer draws in the OpenGL context of another library"
+        ):
             render_scene(ours, SIZE, renderer=guest)
 
 
@@ -195,7 +201,10 @@ def test_nothing_is_left_behind(pyrender: ModuleType, studio: Any) -> None:
 @pytest.mark.parametrize("shared", [True, False])
 def test_frames_that_are_too_large_are_refused(renderer: tl.Renderer, studio: Any, shared: bool) -> None:
     alone = _thickness(renderer, studio)
-    with pytest.raises(tl.RenderError, match=r"frame size 1000000x2; this OpenGL allows at most \d+; render in parts"):
+    with pytest.raises(
+        tl.RenderError,
+        match=r"frame size 1000000x2; this OpenGL allows at most \d+ pixels along a side; render the picture in parts",
+    ):
         render(studio.scene(), MEDIA, (1_000_000, 2), renderer=renderer, shared=shared)
     np.testing.assert_array_equal(_thickness(renderer, studio), alone)
 
@@ -221,7 +230,10 @@ def test_a_renderer_without_opengl_is_refused(pyrender: ModuleType, studio: Any)
     pytest.importorskip("embreex")
     with (
         tl.Renderer("cpu") as renderer,
-        pytest.raises(tl.RenderError, match="drawing with OpenGL; this renderer works on the CPU; use another backend"),
+        pytest.raises(
+            tl.RenderError,
+            match="drawing with OpenGL; this renderer works on the CPU, and has no OpenGL; use a backend other",
+        ),
     ):
         render(studio.scene(), MEDIA, SIZE, renderer=renderer)
 
@@ -244,7 +256,8 @@ def test_another_pyrender_is_told_by_what_it_lacks(pyrender: ModuleType, monkeyp
     monkeypatch.delattr(pyrender.Renderer, "_read_main_framebuffer")
     monkeypatch.delattr(pyrender.Texture, "_add_to_context")
     with pytest.raises(
-        tl.RenderError, match=r"it has no Renderer\._read_main_framebuffer, Texture\._add_to_context; pip"
+        tl.RenderError,
+        match=r"this version of pyrender has no Renderer\._read_main_framebuffer, Texture\._add_to_context; run pip",
     ):
         load_pyrender()
 
@@ -306,8 +319,8 @@ def test_programs_that_bind_pyopengl_to_windows_are_told(program: Callable[[str]
     shared, either = program("glx")
     bound = "PyOpenGL is bound to GLXPlatform since it was imported, and the renderer's context is 'egl'"
     assert shared == (
-        f"sharing an OpenGL context with pyrender; {bound}; leave shared out, or bind PyOpenGL to the same "
+        f"sharing an OpenGL context with pyrender; {bound}; omit shared=, or bind PyOpenGL to the same "
         "window system: without a window, set PYOPENGL_PLATFORM=egl before anything imports pyrender"
     )
-    assert either.startswith("drawing with pyrender in a context of its own; there is none (")
+    assert either.startswith("drawing with pyrender in a separate OpenGL context; no such context can be created (")
     assert either.endswith("; without a window, set PYOPENGL_PLATFORM=egl before anything imports pyrender")

@@ -159,37 +159,45 @@ def test_unknown_names_are_told_with_those_there_are(studio: Any) -> None:
     (ball,) = scene.get_nodes(name="ball")
     ball.mesh.name = "glass"
     with pytest.raises(
-        tl.InputError, match=r"media for 'bowl', 'lamp'; .*; it has 'ball', 'box', 'floor', 'glass'; use"
+        tl.InputError, match=r"media for 'bowl', 'lamp'; .*; the scene has 'ball', 'box', 'floor', 'glass'; use"
     ):
         scene_from_pyrender(scene, {"bowl": GREEN, "ball": GREEN, "lamp": GREEN}, SIZE)
     with pytest.raises(tl.InputError, match="media for 'bowl'"):
         backdrop_from_pyrender(scene, ["bowl"], SIZE)
     ball.mesh.is_visible = False
-    with pytest.raises(tl.InputError, match=r"no visible node or mesh .* it has 'box', 'floor'; "):
+    with pytest.raises(tl.InputError, match=r"no visible node or mesh .* the scene has 'box', 'floor'; "):
         scene_from_pyrender(scene, {"ball": GREEN}, SIZE)
-    with pytest.raises(tl.InputError, match="no medium is given; give media="):
+    with pytest.raises(tl.InputError, match="no medium is given for any node; give media="):
         scene_from_pyrender(scene, {}, SIZE)
 
 
 def test_nameless_nodes_are_told(pyrender: ModuleType, studio: Any) -> None:
     scene = pyrender.Scene()
     scene.add(studio.mesh(studio.ball, (1, 1, 1)))
-    with pytest.raises(tl.InputError, match=r"it has no names: give nodes some, scene.add\(mesh, name=\.\.\.\)"):
+    with pytest.raises(tl.InputError, match=r"the scene has no names: give nodes some, scene.add\(mesh, name=\.\.\.\)"):
         scene_from_pyrender(scene, {"ball": GREEN}, SIZE)
 
 
 def test_bad_cameras_are_refused(pyrender: ModuleType, studio: Any) -> None:
     tilted = studio.pose @ np.diag((2.0, 2.0, 2.0, 1.0))
     for camera, pose, message in (
-        (pyrender.PerspectiveCamera(0.7, aspectRatio=1.0), np.eye(4), "aspectRatio 1 for a picture of 80x60, which it"),
+        (pyrender.PerspectiveCamera(0.7, aspectRatio=1.0), np.eye(4), "aspectRatio 1 would stretch a picture of 80x60"),
         (
             pyrender.IntrinsicsCamera(90.0, 90.0, 41.0, 30.0),
             np.eye(4),
-            "cx 41, cy 30 do not look through the middle of",
+            "cx 41, cy 30 do not describe square pixels and a view through the middle of",
         ),
-        (pyrender.IntrinsicsCamera(90.0, 91.0, 40.0, 30.0), np.eye(4), "fx 90, fy 91, .* with square pixels"),
-        (pyrender.PerspectiveCamera(0.7), tilted, "camera pose; it scales, shears or mirrors"),
-        (pyrender.PerspectiveCamera(0.7), np.diag((0.0, 1.0, 1.0, 1.0)), "camera pose; it scales"),
+        (
+            pyrender.IntrinsicsCamera(90.0, 91.0, 40.0, 30.0),
+            np.eye(4),
+            "fx 90, fy 91, .* do not describe square pixels and a view through the middle of",
+        ),
+        (pyrender.PerspectiveCamera(0.7), tilted, "camera pose; the pose scales, shears or mirrors"),
+        (
+            pyrender.PerspectiveCamera(0.7),
+            np.diag((0.0, 1.0, 1.0, 1.0)),
+            "camera pose; the pose scales, shears or mirrors",
+        ),
     ):
         scene = pyrender.Scene()
         scene.add(studio.mesh(studio.ball, (1, 1, 1)), name="ball")
@@ -198,7 +206,9 @@ def test_bad_cameras_are_refused(pyrender: ModuleType, studio: Any) -> None:
             scene_from_pyrender(scene, {"ball": GREEN}, SIZE)
     scene = pyrender.Scene()
     scene.add(studio.mesh(studio.ball, (1, 1, 1)), name="ball")
-    with pytest.raises(tl.InputError, match=r"it has no camera; add one: scene\.add\(camera, pose=\.\.\.\)"):
+    with pytest.raises(
+        tl.InputError, match=r"the scene has no camera; add a camera: scene\.add\(camera, pose=\.\.\.\)"
+    ):
         scene_from_pyrender(scene, {"ball": GREEN}, SIZE)
 
 
@@ -207,22 +217,27 @@ def test_singular_lights_and_points_are_refused(pyrender: ModuleType, studio: An
     flat = scene.add(pyrender.DirectionalLight(color=np.ones(3), intensity=1.0), name="flat")
     scene.set_pose(flat, np.diag((1.0, 0.0, 1.0, 1.0)))
     with pytest.raises(
-        tl.InputError, match="light 'flat' of the pyrender scene; the transform of its node is singular"
+        tl.InputError,
+        match="light 'flat' of the pyrender scene; the transform of the light's node is singular: it, or a node",
     ):
         scene_from_pyrender(scene, {"ball": GREEN}, SIZE)
     scene = studio.scene()
     scene.add(pyrender.Mesh.from_points(studio.ball.vertices), name="cloud")
-    with pytest.raises(tl.InputError, match="the medium of 'cloud'; its mesh has a primitive of mode 0; give it tri"):
+    with pytest.raises(
+        tl.InputError, match="the medium of 'cloud'; the mesh has a primitive of mode 0; use a mesh of triangles"
+    ):
         scene_from_pyrender(scene, {"cloud": GREEN}, SIZE)
 
 
 def test_what_is_no_scene_or_no_picture_is_refused(pyrender: ModuleType, studio: Any) -> None:
-    with pytest.raises(tl.InputError, match=r"of type str; give a pyrender\.Scene"):
+    with pytest.raises(tl.InputError, match=r"of type str; give an object of type pyrender\.Scene"):
         backdrop_from_pyrender("scene.glb", ["ball"], SIZE)
-    with pytest.raises(tl.InputError, match=r"of type NoneType; give a pyrender\.Scene"):
+    with pytest.raises(tl.InputError, match=r"of type NoneType; give an object of type pyrender\.Scene"):
         scene_from_pyrender(None, {"ball": GREEN}, SIZE)
     for flags in (pyrender.RenderFlags.SEG, pyrender.RenderFlags.DEPTH_ONLY, pyrender.RenderFlags.SHADOWS_ALL):
-        with pytest.raises(tl.InputError, match="is not for shadows of directional or spot lights, culling or wirefr"):
+        with pytest.raises(
+            tl.InputError, match="do not concern shadows of directional or spot lights, culling or wireframes"
+        ):
             backdrop_from_pyrender(studio.scene(), ["ball"], SIZE, flags=flags)
 
 
@@ -257,8 +272,13 @@ def test_opaque_objects_and_lights_become_a_scene_of_pyrender(studio: Any) -> No
 
 def test_scenes_that_pyrender_cannot_draw_are_refused(pyrender: ModuleType, studio: Any) -> None:
     camera = tl.Camera(studio.pose)
-    with pytest.raises(tl.InputError, match="'sphere': all have media; render without pyrender"):
+    with pytest.raises(
+        tl.InputError, match="all nodes have a medium, so no opaque node is left: 'sphere'; render without pyrender"
+    ):
         to_pyrender(tl.Scene([tl.Object(studio.ball, medium=GREEN)], camera))
     many = [tl.PointLight((0, 0, 1), 1.0)] * 5
-    with pytest.raises(tl.InputError, match="drawing with pyrender; 5 of PointLight; use at most 4 of each kind"):
+    with pytest.raises(
+        tl.InputError,
+        match="drawing with pyrender; the scene has 5 lights of type PointLight; use at most 4 lights of each type",
+    ):
         to_pyrender(tl.Scene([tl.Object(studio.floor)], camera, many))

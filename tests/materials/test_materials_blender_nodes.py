@@ -53,7 +53,7 @@ def test_blender_principled_there_and_back(
 
 
 def test_blender_values_out_of_range_are_refused() -> None:
-    with pytest.raises(tl.InputError, match=r"not three numbers in 0\.\.1"):
+    with pytest.raises(tl.InputError, match=r"the color must be three numbers in 0\.\.1"):
         from_absorption_node((1.5, 0, 0), 1.0)
     with pytest.raises(tl.InputError, match="Density"):
         from_absorption_node((0.5, 0, 0), -1.0)

@@ -132,5 +132,7 @@ def test_a_later_openpbr_that_scatters_is_refused() -> None:
         if readable:
             np.testing.assert_allclose(OPENPBR.read(text).extinction, medium.extinction, rtol=1e-12)
         else:
-            with pytest.raises(tl.InputError, match=f"version {version}, whose scatter color means another thing"):
+            with pytest.raises(
+                tl.InputError, match=f"version {version}, in which the scatter color has another meaning"
+            ):
                 OPENPBR.read(text)

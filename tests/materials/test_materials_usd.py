@@ -99,18 +99,26 @@ def test_usd_as_another_writer_has_it_is_read() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("#usda", "PXR-USDC", "not .usda text; convert it"),
-        ("ND_open_pbr_surface_surfaceshader", "UsdPreviewSurface", "it has no shader ND_open_pbr"),
-        ("inputs:transmission_color =", "inputs:transmission_color.connect =", "comes from a node or changes"),
-        ("inputs:transmission_depth =", "inputs:transmission_depth.timeSamples =", "comes from a node or changes"),
-        ("(0.18, 0.62, 0.35)", "(0.18, 0.62)", "not three numbers"),
-        ("(0.18, 0.62, 0.35)", "(0.18, 0.62, 0.35", "not three numbers"),
-        ("= 0.02", "= None", "transmission_depth is 'None', not a number"),
-        ("= 0.02", "= -1", "negative depth"),
+        ("#usda", "PXR-USDC", r"not .usda text; convert the file, for example with usdcat -o out\.usda FILE"),
+        ("ND_open_pbr_surface_surfaceshader", "UsdPreviewSurface", "the file has no shader ND_open_pbr"),
+        (
+            "inputs:transmission_color =",
+            "inputs:transmission_color.connect =",
+            "is connected to a node or changes with time",
+        ),
+        (
+            "inputs:transmission_depth =",
+            "inputs:transmission_depth.timeSamples =",
+            "is connected to a node or changes with time",
+        ),
+        ("(0.18, 0.62, 0.35)", "(0.18, 0.62)", "not of type three numbers"),
+        ("(0.18, 0.62, 0.35)", "(0.18, 0.62, 0.35", "not of type three numbers"),
+        ("= 0.02", "= None", "the value of transmission_depth is 'None', and not of type a number"),
+        ("= 0.02", "= -1", r"the transmission color is outside 0\.\.1, or the depth is negative"),
         ("= 0.02", "= 1e-320", "absorption .* not finite"),
         ("metersPerUnit = 1", "metersPerUnit = 0", "metersPerUnit is 0"),
-        ("metersPerUnit = 1", "metersPerUnit = one", "metersPerUnit is 'one', not a number"),
-        ("transmission_weight = 1.0", "transmission_weight = 0", "so it is opaque"),
+        ("metersPerUnit = 1", "metersPerUnit = one", "the value of metersPerUnit is 'one', and not of type a number"),
+        ("transmission_weight = 1.0", "transmission_weight = 0", "is 0, so the material is opaque"),
     ],
 )
 def test_a_bad_usd_layer_is_refused_in_one_line(old: str, new: str, message: str) -> None:

@@ -250,7 +250,7 @@ def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> 
         time.sleep(0.002)
     compiler.lane.close()
     assert found[0].programs is None
-    assert "and the window with a card from the future" in found[0].problem
+    assert "but the window uses a card from the future" in found[0].problem
 
 
 def test_what_looks_like_the_material_is_on_show_until_its_picture_is_compiled(

@@ -38,7 +38,7 @@ def test_hiding_is_a_step_of_undo_and_kept_in_sessions(tmp_path: Path) -> None:
     assert hidden.hidden == (0, 2)
     save_session(tmp_path / "a.toml", hidden)
     assert load_session(tmp_path / "a.toml") == hidden
-    with pytest.raises(tl.InputError, match="list numbers of objects"):
+    with pytest.raises(tl.InputError, match=r"give a list of object numbers, such as \[0, 2\]"):
         from_table({**to_table(SEEN), "hidden": [True]}, "session")
 
 

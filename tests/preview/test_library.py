@@ -153,12 +153,12 @@ def test_a_material_is_saved_and_found(tmp_path: Path) -> None:
     assert next(iter(own.groups().values()))[0].name == "wax"
     own.search = "my marb"
     assert list(own.groups()) == ["own"]
-    with pytest.raises(tl.InputError, match="one of the toolkit's has that name"):
+    with pytest.raises(tl.InputError, match="a built-in preset already has this name"):
         own.save("Marble", material)
     (tmp_path / "presets" / "bad.toml").write_text('[a]\nkind = "guessed"\n')
     own._checked = -1e9
     assert own.find("my_marble") is not None
-    assert "bad.toml', line 1, [a]; no key" in str(refused[0])
+    assert "bad.toml', line 1, [a]; the preset has no key" in str(refused[0])
     assert len(refused) == 1
 
 
@@ -201,7 +201,7 @@ def test_a_drag_on_an_object_is_one_step() -> None:
 @pytest.mark.parametrize("entry", [3, {"object": 0}, {"object": -1, "material": {}}, {"object": True, "material": {}}])
 def test_a_session_with_half_an_assignment_is_refused(entry: object) -> None:
     table = {**to_table(Document()), "assigned": [entry]}
-    with pytest.raises(tl.InputError, match="no object and material"):
+    with pytest.raises(tl.InputError, match="the entry names no object and no material"):
         from_table(table, "session")
 
 
@@ -224,7 +224,7 @@ def test_a_preset_on_the_selected_object_leaves_the_others(work: Workspace) -> N
     assert state.get("material.preset") == "merlot"
     state.select(1)
     state.choose_preset("no such")
-    assert "not a known preset" in work.messages[-1].text
+    assert "no preset has this name" in work.messages[-1].text
     wait(work, lambda: True)
 
 

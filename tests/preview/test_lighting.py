@@ -82,7 +82,7 @@ def test_a_file_that_cannot_be_read_is_told_once_and_the_one_before_stays(worksp
         kind(workspace)
         wait(workspace, lambda: workspace.lanes["light"].task is None)
     assert [m.text for m in workspace.messages if m.kind == "error"] == [
-        f"environment {str(tmp_path / 'none.hdr')!r}; no such file; check the path"
+        f"environment {str(tmp_path / 'none.hdr')!r}; no file has this path; check the path"
     ]
     assert kind(workspace) == before
     workspace.undo()

@@ -48,7 +48,7 @@ def test_a_size_that_is_none_is_refused(work: Workspace) -> None:
     before = work.document
     work.resize(0.0)
     assert work.document == before
-    assert "height 0.0; not positive and finite" in work.messages[-1].text
+    assert "height 0.0; the length must be positive and finite" in work.messages[-1].text
 
 
 def test_a_rescaled_model_is_the_one_that_is_read_with_that_unit() -> None:

@@ -65,7 +65,7 @@ def preview(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callab
 @pytest.mark.parametrize(
     ("actions", "code", "message"),
     [
-        (_wrong_preset, 2, "preset 'unobtainium'; not a known preset"),
+        (_wrong_preset, 2, "preset 'unobtainium'; no preset has this name"),
         (_model_that_is_none, 2, "absent.glb"),
         (_lost_file, 1, "No space left on device"),
         (_defect, 1, "unexpected RuntimeError: no luck"),

@@ -271,8 +271,8 @@ def test_the_last_stage_is_remembered(tmp_path: Path, own_config: Path) -> None:
     ("arguments", "message"),
     [
         (("preview", "leaf", "--stage", "studo"), "did you mean studio"),
-        (("render", "leaf", "-o", "a.png", "--stage", "studio,left"), "'left' is no number of degrees"),
-        (("render", "leaf", "-o", "a.png", "--stage", "studio,inf"), "not finite"),
+        (("render", "leaf", "-o", "a.png", "--stage", "studio,left"), "'left' is not a number of degrees"),
+        (("render", "leaf", "-o", "a.png", "--stage", "studio,inf"), "the angle must be finite"),
     ],
 )
 def test_stages_that_are_none_are_refused(

@@ -66,9 +66,9 @@ def test_places_lights_and_snapshots_are_steps_of_undo_and_kept_in_sessions(tmp_
     with pytest.raises(tl.InputError, match=r"snapshot '7'.*use one of: 1"):
         apply(document, Recall("7"))
     for key, value, message in (
-        ("lights", [{"radius": -1.0}], "out of its range"),
+        ("lights", [{"radius": -1.0}], "the value is outside its range"),
         ("placed", [{"object": "a"}], "the number of an object"),
-        ("snapshots", [{"name": ""}], "give each a name"),
+        ("snapshots", [{"name": ""}], "give each snapshot a name"),
     ):
         with pytest.raises(tl.InputError, match=message):
             from_table({**to_table(SEEN), key: value}, "session")

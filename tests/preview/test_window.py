@@ -152,11 +152,11 @@ def test_no_display_names_the_way_without_one(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--script", "none.toml"), "no such file"),
-        (("--session", "none.toml"), "no such file"),
+        (("--script", "none.toml"), "no file has this path"),
+        (("--session", "none.toml"), "no file has this path"),
         (("--session", "none.toml", "goblet"), "goblet is given, too"),
-        (("--screenshot", "a.jpg"), "no .png"),
-        (("--scale", "9"), "not in 0.5 to 4"),
+        (("--screenshot", "a.jpg"), "this is not a .png file in an existing folder"),
+        (("--scale", "9"), "the scale must lie in 0.5 to 4"),
     ],
 )
 def test_bad_arguments_are_told_before_a_window_opens(

@@ -112,11 +112,16 @@ def test_a_picture_holds_the_power_that_it_shows() -> None:
 
 
 def test_what_no_photon_can_follow_is_refused() -> None:
-    with pytest.raises(InputError, match=r"0 photons; no light without any; use for example 100_000"):
+    with pytest.raises(
+        InputError, match="0 photons; the number of photons must be above 0; use a value such as 100_000"
+    ):
         trace_photons(scene(Medium(ior=1.5)), 0)
     ball = Mesh(BALL.vertices, BALL.faces[1:], name="sphere")
     open_scene = Scene([Object(ball, Medium(ior=1.5)), GROUND], CAMERA, [SUN])
-    with pytest.raises(InputError, match=r"photons through 'sphere'; not closed; close it"):
+    with pytest.raises(
+        InputError,
+        match="photons through 'sphere'; the mesh is not closed; close the mesh, or declare it a thin-walled sheet",
+    ):
         trace_photons(open_scene)
 
 

@@ -200,20 +200,26 @@ def test_sheets_and_arguments_that_cannot_be() -> None:
     sheet = Scene([Object(SLAB, MEDIUM, sheet_thickness=1e-3)], CAMERA)
     glowing = slab(None, None, Medium(emission=1.0))
     cases: list[tuple[Callable[[], Any], str]] = [
-        (lambda: march(sheet, (2, 2)), "ray marching; the scene has sheets"),
+        (lambda: march(sheet, (2, 2)), "ray marching; the scene has thin-walled sheets, which have no inside"),
         (lambda: march(slab(), (2, 2), RayMarched(8), compositing="sideways"), "compositing 'sideways'"),  # type: ignore[arg-type]
-        (lambda: march(slab(), (2, 2), termination=1.0), "termination 1.0; not in 0 to 1"),
+        (lambda: march(slab(), (2, 2), termination=1.0), "termination 1.0; the value must lie in 0 to 1"),
         (lambda: march(slab(), (2, 2), termination=float("nan")), "termination nan"),
         (lambda: march(slab(), (2, 2), termination=0.1, compositing="back-to-front"), "from back to front"),
         (lambda: march(slab(), (2, 2), "midpoint"), "marching by 'midpoint'"),  # type: ignore[arg-type]
         (lambda: march(slab(), (0, 2)), "size"),
-        (lambda: march(glowing, (2, 2), associated=False), "unassociated colors; a step emits light"),
+        (
+            lambda: march(glowing, (2, 2), associated=False),
+            "unassociated colors; a step of the ray emits light, although its opacity is 0",
+        ),
         (lambda: RayMarched(0), "RayMarched steps 0"),
         (lambda: RayMarched(-4), "RayMarched steps -4"),
         (lambda: RayMarched(2.5), "RayMarched steps 2.5"),  # type: ignore[arg-type]
         (lambda: RayMarched(1 << 20), "RayMarched steps 1048576"),
-        (lambda: RayMarched(257, "gauss"), "steps of gauss 257; not a whole number in 1 to 256"),
-        (lambda: RayMarched(8, "simpson"), "quadrature 'simpson'; not known; use one of left, midpoint"),  # type: ignore[arg-type]
+        (lambda: RayMarched(257, "gauss"), "steps of gauss 257; the value must be a whole number in 1 to 256"),
+        (
+            lambda: RayMarched(8, "simpson"),
+            "quadrature 'simpson'; no quadrature has this name; use one of left, midpoint",
+        ),  # type: ignore[arg-type]
         (lambda: RayMarched(8, "gauss", jitter=True), "'gauss' with jitter"),
         (lambda: RayMarched(8, "jittered", jitter=True), "'jittered' with jitter"),
         (lambda: RayMarched(8, seed=-1), "seed -1"),
@@ -324,7 +330,7 @@ def test_one_voxel_marches_as_a_homogeneous_medium() -> None:
 def test_frames_say_what_they_are() -> None:
     frame = march(slab(SUN), (3, 2), RayMarched(4, "left"))
     assert frame.plan.method == RayMarched(4, "left")
-    assert frame.plan.limits == ("sums over 4 steps in each interval",)
+    assert frame.plan.limits == ("optical depth is summed over 4 steps in each interval",)
     assert frame.provenance["backend"] == "reference"
     assert frame.radiance.shape == (2, 3, 3)
     assert frame.valid.all()

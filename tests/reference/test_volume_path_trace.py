@@ -136,13 +136,16 @@ def test_refusals() -> None:
     scene = Scene([Object(BOX, medium)], CAMERA)
     cases: list[tuple[Callable[[], Any], str]] = [
         (lambda: path_trace(scene, (2, 2), paths=1), "path tracing with 1 paths"),
-        (lambda: path_trace(scene, (2, 2), max_events=-1), "max_events -1; below 0"),
+        (lambda: path_trace(scene, (2, 2), max_events=-1), "max_events -1; the number of events must be 0 or above"),
         (lambda: path_trace(scene, (2, 0)), "size"),
-        (lambda: path_trace(Scene([Object(BOX, Medium(0.0, 1e9))], CAMERA), (2, 2)), "deep, .* give max_events"),
+        (
+            lambda: path_trace(Scene([Object(BOX, Medium(0.0, 1e9))], CAMERA), (2, 2)),
+            "optical depth of .* with max_events",
+        ),
         (lambda: path_trace(Scene([Object(opened, medium)], CAMERA), (2, 2)), "not closed"),
         (
             lambda: path_trace(Scene([Object(BOX, medium, sheet_thickness=1e-3)], CAMERA), (2, 2)),
-            "a sheet that scatters",
+            "the sheet scatters light",
         ),
     ]
     for call, message in cases:

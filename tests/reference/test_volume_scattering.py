@@ -98,7 +98,7 @@ def test_the_error_that_is_told() -> None:
 
 @pytest.mark.parametrize("tolerance", [0.0, 1e-13, 2.0, float("nan")])
 def test_tolerances_that_cannot_be(tolerance: float) -> None:
-    with pytest.raises(InputError, match=r"^tolerance .*not in 1e-12 to 1"):
+    with pytest.raises(InputError, match=r"^tolerance .*the tolerance must lie in 1e-12 to 1"):
         render(slab(SUN), (1, 1), tolerance=tolerance)
 
 

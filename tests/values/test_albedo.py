@@ -81,18 +81,20 @@ def test_near_white_absorption_has_no_cancellation(g: float) -> None:
 
 
 def test_values_outside_the_domain_are_refused() -> None:
-    with pytest.raises(tl.InputError, match=r"color 1.1; not in 0 to 1"):
+    with pytest.raises(tl.InputError, match=r"color 1.1; the value must lie in 0 to 1"):
         hulst_albedo([0.5, 1.1])
-    with pytest.raises(tl.InputError, match="color nan; not in 0 to 1"):
+    with pytest.raises(tl.InputError, match="color nan; the value must lie in 0 to 1"):
         chiang_albedo(math.nan)
-    with pytest.raises(tl.InputError, match=r"albedo -0.1; not in 0 to 1"):
+    with pytest.raises(tl.InputError, match=r"albedo -0.1; the value must lie in 0 to 1"):
         hulst_color(-0.1)
-    with pytest.raises(tl.InputError, match=r"albedo 0.999; not in 0 to 0.99888"):
+    with pytest.raises(tl.InputError, match=r"albedo 0.999; the value must lie in 0 to 0\.99888"):
         chiang_color(0.999)
-    with pytest.raises(tl.InputError, match=r"anisotropy 1.0; not between -1 and 1"):
+    with pytest.raises(tl.InputError, match=r"anisotropy 1.0; the anisotropy must lie between -1 and 1"):
         hulst_albedo(0.5, 1.0)
-    with pytest.raises(tl.InputError, match=r"anisotropy 0.5; Chiang's map is isotropic"):
+    with pytest.raises(tl.InputError, match=r"anisotropy 0.5; Chiang's formula is only for isotropic scattering"):
         scattering_medium((0.5,) * 3, 1, anisotropy=0.5, model="chiang")
     for path in (0, -1, math.inf, math.nan, (1, 2)):
-        with pytest.raises(tl.InputError, match=r"mean free path .*; not one or three lengths above 0"):
+        with pytest.raises(
+            tl.InputError, match=r"mean free path .*; the mean free path must be one length or three lengths above 0"
+        ):
             scattering_medium((0.5,) * 3, path)

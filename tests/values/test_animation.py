@@ -79,10 +79,10 @@ def test_an_interrupted_animation_harms_nothing(tmp_path: Path, name: str) -> No
 def test_refusals(tmp_path: Path) -> None:
     for name, fps, pictures, message in [
         ("spin.avi", 24, frames(), r"animation .*spin.avi'; suffix '.avi'; use .webp, .gif, .mp4, or a folder"),
-        ("none/spin.gif", 24, frames(), r"no folder .*none'; make the folder first"),
-        ("spin.gif", 0, frames(), "0 pictures per second; not in 1 to 100"),
+        ("none/spin.gif", 24, frames(), r"the folder .*none' does not exist; create the folder first"),
+        ("spin.gif", 0, frames(), "0 pictures per second; the frame rate must lie in 1 to 100"),
         ("spin.gif", float("nan"), frames(), "nan pictures per second"),
-        ("spin.gif", 24, iter(()), "animation; it has no frames"),
+        ("spin.gif", 24, iter(()), "animation; the animation has no frames"),
         ("spin.gif", 24, [np.zeros((2, 2, 3), np.uint8), np.zeros((2, 3, 3), np.uint8)], r"frame 1 .*\(2, 3, 3\)"),
         ("spin.gif", 24, [np.zeros((2, 2, 3))], "frame 0 of an animation; shape .* and type float64"),
     ]:

@@ -100,7 +100,7 @@ def test_they_are_saved_into_a_folder(tmp_path: Path) -> None:
             np.testing.assert_array_equal(np.asarray(picture), aov_pictures(made.arrays)[file.stem])
     assert {file.name for file in (tmp_path / "new" / "folder").iterdir()} == {file.name for file in files}
     (tmp_path / "taken").write_text("")
-    with pytest.raises(tl.InputError, match=r"folder .*taken'; '.*taken' is no folder; choose another one$"):
+    with pytest.raises(tl.InputError, match=r"folder .*taken'; '.*taken' is not a folder; choose another path$"):
         made.save_aovs(tmp_path / "taken")
 
 
@@ -113,6 +113,6 @@ def test_pictures_are_exposed_and_toned(tmp_path: Path) -> None:
     assert not np.array_equal(made.to_srgb8(0.0, "agx"), made.to_srgb8())
     with pytest.raises(tl.InputError, match="tone 'filmic'"):
         made.save(tmp_path / "b.png", tone="filmic")
-    with pytest.raises(tl.InputError, match="exposure nan; not within 100 stops"):
+    with pytest.raises(tl.InputError, match="exposure nan; the exposure must lie within 100 stops"):
         made.save(tmp_path / "b.png", exposure=float("nan"))
     assert not (tmp_path / "b.png").exists()

@@ -69,13 +69,13 @@ def test_a_darker_target_needs_more_extinction() -> None:
 @pytest.mark.parametrize(
     ("thickness", "color", "message"),
     [
-        ([0.1], (0.0, 0.5, 0.5), "red = 0; not in 0.0001 <= t <= 1; give 0.0001 or more"),
-        ([0.1], (0.5, 5e-5, 0.5), "green = 5e-05; not in"),
+        ([0.1], (0.0, 0.5, 0.5), r"red = 0; the value must satisfy 0\.0001 <= t <= 1; give 0.0001 or more"),
+        ([0.1], (0.5, 5e-5, 0.5), "green = 5e-05; the value must satisfy"),
         ([0.1], (0.5, 0.5, 1.5), "blue = 1.5; .*a medium cannot add light"),
         ([0.0, 0.1], (0.5, 0.9, 0.9), "red = 0.5; 50 % of the pixels have no thickness and stay white"),
         ([0.0, 0.0], (0.9,) * 3, "100 % of the pixels have no thickness"),
         ([1e-320], (0.5,) * 3, "so thin that the extinction overflows"),
-        ([], (0.5,) * 3, "no covered, valid pixel"),
+        ([], (0.5,) * 3, "no pixel shows a valid part of the model"),
         ([-1.0], (0.5,) * 3, "negative or not finite"),
         ([math.nan], (0.5,) * 3, "negative or not finite"),
     ],
@@ -89,7 +89,10 @@ def test_a_mesh_that_is_invalid_everywhere_says_so() -> None:
     color, flag = np.zeros((1, 2, 3)), np.array([[True, True]])
     thickness = np.ones((1, 2), dtype=np.float32)
     plan = tl.plan(tl.showcase(Sphere().tessellate(8), stage="none"))
-    with pytest.raises(tl.InputError, match="all 2 pixels that the mesh covers are marked invalid; close its holes"):
+    with pytest.raises(
+        tl.InputError,
+        match="all 2 pixels that the mesh covers are marked invalid; close the holes of the mesh, which",
+    ):
         thickness_samples(tl.Frame(color, color, color, thickness, flag, ~flag, plan))
 
 

@@ -257,7 +257,10 @@ def test_any_value_has_a_short_text() -> None:
 
 def test_vectors_are_finite_and_of_one_width() -> None:
     assert vectors("points", [[1, 2, 3]]).tolist() == [[1.0, 2.0, 3.0]]
-    for value, message in ((1.0, r"of shape \(\); not \(\.\.\., 3\)"), ([1, 2], "give points of 3 numbers each")):
+    for value, message in (
+        (1.0, r"of shape \(\); the last axis must have 3 numbers: \(\.\.\., 3\)"),
+        ([1, 2], "give points of 3 numbers each"),
+    ):
         with pytest.raises(tl.InputError, match=message):
             vectors("points", value)
     with pytest.raises(tl.InputError, match="points; not finite"):

@@ -164,24 +164,48 @@ TARGET_ABOVE = ((0, 0, 0), (0, 5, 0))
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Camera.look_at((1, 2, 3), (1, 2, 3)), "eye and target are both at (1.0, 2.0, 3.0); move one of them"),
-        (lambda: Camera.look_at(*TARGET_ABOVE), "up (0.0, 1.0, 0.0) is along the view; choose another up"),
-        (lambda: Camera.look_at((0, 0, 1), (0, 0, 0), up=(0, 0, 0)), "up (0.0, 0.0, 0.0) is along the view"),
-        (lambda: Camera.look_at((0, 0, np.nan), (0, 0, 0)), "not three finite numbers"),
-        (lambda: Camera.look_at((0, 0, np.inf), (0, 0, 0)), "not three finite numbers"),
-        (lambda: Camera.look_at((0, 0), (0, 0, 0)), "not three finite numbers"),
-        (lambda: Camera.look_at((0, 0, 1e200), (0, 0, 0)), "a number beyond 1e+18"),
-        (lambda: Camera.look_at((0, 0, 1), (0, 0, 0), fov_y=0), "camera fov_y 0; not between 0 and 180"),
-        (lambda: Camera.look_at((0, 0, 1), (0, 0, 0), fov_y=180), "camera fov_y 180; not between"),
-        (lambda: Camera.look_at((0, 0, 1), (0, 0, 0), fov_y=np.nan), "camera fov_y nan; not between"),
-        (lambda: Camera.orthographic((0, 0, 1), (0, 0, 0), height=0), "camera height 0; not positive"),
-        (lambda: Camera.orthographic((0, 0, 1), (0, 0, 0), height=np.inf), "camera height inf; not positive"),
-        (lambda: Camera(POSE, fov_y=45, height=1), "camera; needs either fov_y or height"),
-        (lambda: Camera(POSE, fov_y=None), "camera; needs either fov_y or height"),
-        (lambda: Camera(SCALED), "camera pose; it scales, shears or mirrors"),
-        (lambda: Camera(MIRRORED), "camera pose; it scales, shears or mirrors"),
-        (lambda: Camera(SHORT), "camera pose; not a finite 4x4 matrix"),
-        (lambda: Camera(NAN_POSE), "camera pose; not a finite 4x4 matrix"),
+        (
+            lambda: Camera.look_at((1, 2, 3), (1, 2, 3)),
+            "eye and target are at the same point (1.0, 2.0, 3.0); move one of them",
+        ),
+        (
+            lambda: Camera.look_at(*TARGET_ABOVE),
+            "the up direction (0.0, 1.0, 0.0) is parallel to the view direction; choose another up",
+        ),
+        (
+            lambda: Camera.look_at((0, 0, 1), (0, 0, 0), up=(0, 0, 0)),
+            "the up direction (0.0, 0.0, 0.0) is parallel to the view direction",
+        ),
+        (lambda: Camera.look_at((0, 0, np.nan), (0, 0, 0)), "each of them must be three finite numbers"),
+        (lambda: Camera.look_at((0, 0, np.inf), (0, 0, 0)), "each of them must be three finite numbers"),
+        (lambda: Camera.look_at((0, 0), (0, 0, 0)), "each of them must be three finite numbers"),
+        (lambda: Camera.look_at((0, 0, 1e200), (0, 0, 0)), "a coordinate is beyond 1e+18"),
+        (
+            lambda: Camera.look_at((0, 0, 1), (0, 0, 0), fov_y=0),
+            "camera fov_y 0; the angle must lie between 0 and 180 degrees",
+        ),
+        (
+            lambda: Camera.look_at((0, 0, 1), (0, 0, 0), fov_y=180),
+            "camera fov_y 180; the angle must lie between 0 and 180 degrees",
+        ),
+        (
+            lambda: Camera.look_at((0, 0, 1), (0, 0, 0), fov_y=np.nan),
+            "camera fov_y nan; the angle must lie between 0 and 180 degrees",
+        ),
+        (
+            lambda: Camera.orthographic((0, 0, 1), (0, 0, 0), height=0),
+            "camera height 0; the height must be positive and finite",
+        ),
+        (
+            lambda: Camera.orthographic((0, 0, 1), (0, 0, 0), height=np.inf),
+            "camera height inf; the height must be positive and finite",
+        ),
+        (lambda: Camera(POSE, fov_y=45, height=1), "camera; a camera needs either fov_y or height"),
+        (lambda: Camera(POSE, fov_y=None), "camera; a camera needs either fov_y or height"),
+        (lambda: Camera(SCALED), "camera pose; the pose scales, shears or mirrors"),
+        (lambda: Camera(MIRRORED), "camera pose; the pose scales, shears or mirrors"),
+        (lambda: Camera(SHORT), "camera pose; the pose must be a finite 4x4 matrix"),
+        (lambda: Camera(NAN_POSE), "camera pose; the pose must be a finite 4x4 matrix"),
     ],
 )
 def test_there_is_no_such_camera(make: Callable[[], Camera], message: str) -> None:
@@ -214,5 +238,5 @@ def test_framing_takes_the_part_of_the_picture_that_is_requested() -> None:
     for size, fit in (((64, 48), 0.8), ((48, 64), 0.5)):
         camera = Camera.framing(points, size, fit=fit)
         assert np.abs(_in_picture(camera, points, size)).max() == pytest.approx(fit, abs=1e-12)
-    with pytest.raises(tl.InputError, match=r"fit 1\.5; not above 0 and at most 1"):
+    with pytest.raises(tl.InputError, match=r"fit 1\.5; the value must be above 0 and at most 1"):
         Camera.framing(points, fit=1.5)

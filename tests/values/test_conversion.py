@@ -101,15 +101,23 @@ def test_one_color_at_many_distances() -> None:
 @pytest.mark.parametrize(
     ("colors", "distance", "message"),
     [
-        ([0.0, 0.5, 0.5], 1, "1 of 3 channels; not in 0 < t <= 1, the first red = 0; clamp zeros on purpose"),
-        ([[0.5] * 3, [0.5, 1.5, math.nan]], 1, "2 of 6 channels; .*first green = 1.5 in color 1"),
+        (
+            [0.0, 0.5, 0.5],
+            1,
+            r"1 of 3 channels; transmitted colors must satisfy 0 < t <= 1, but the first wrong value is red = 0;",
+        ),
+        ([[0.5] * 3, [0.5, 1.5, math.nan]], 1, "2 of 6 channels; .*green = 1.5 in color 1"),
         ([0.5, 0.5, -0.1], 1, "blue = -0.1"),
-        ([0.5, np.nextafter(1, 2), 0.5], 1, "1 of 3 channels; not in 0 < t <= 1, the first green = 1"),
-        ([0.5, 0.5], 1, r"colors of shape \(2,\); not \(..., 3\)"),
+        (
+            [0.5, np.nextafter(1, 2), 0.5],
+            1,
+            "1 of 3 channels; transmitted colors must satisfy 0 < t <= 1, but the first wrong value is green = 1",
+        ),
+        ([0.5, 0.5], 1, r"colors of shape \(2,\); the last axis must have three numbers: \(\.\.\., 3\)"),
         (0.5, 1, r"colors of shape \(\)"),
-        ([0.5] * 3, 0, "distance 0 m; not above 0"),
-        ([[0.5] * 3] * 2, [1, math.nan], "distance nan m; not above 0"),
-        ([0.5] * 3, 1e-320, "it overflows; check the unit"),
+        ([0.5] * 3, 0, "distance 0 m; a distance must be above 0"),
+        ([[0.5] * 3] * 2, [1, math.nan], "distance nan m; a distance must be above 0"),
+        ([0.5] * 3, 1e-320, "the extinction is too large for a number; check the unit"),
     ],
 )
 def test_bad_colors_and_distances_are_refused(colors: object, distance: object, message: str) -> None:
@@ -157,9 +165,12 @@ def test_a_color_that_the_medium_never_has_gets_the_nearest() -> None:
     assert match.per_channel[2] == math.inf
     assert match.residual == pytest.approx(np.log(np.exp(-sigma * match.distance) / color), abs=1e-15)
     assert distance_for_color(sigma, (1, 1, 1)).per_channel == (0, 0, None)
-    with pytest.raises(tl.InputError, match=r"extinction .* not three numbers >= 0, one above"):
+    with pytest.raises(
+        tl.InputError,
+        match=r"extinction .* the extinction must be three numbers >= 0, of which at least one is above 0",
+    ):
         distance_for_color((0, 0, 0), color)
-    with pytest.raises(tl.InputError, match="it overflows"):
+    with pytest.raises(tl.InputError, match="the distance is too large for a number"):
         distance_for_color((1e-309, 0, 0), color)
 
 
@@ -309,7 +320,7 @@ def test_a_picked_pixel_of_16_bits_follows_the_turn(
 def test_a_clear_pixel_of_16_bits_is_not_picked(tmp_path: Path) -> None:
     _png16(tmp_path / "a.png", np.array([[[9000, 9, 9, 0], [9000, 9, 9, 65535]]]))
     assert parse_color(f"{tmp_path / 'a.png'}@1,0").tolist() == srgb_to_linear(np.array([9000, 9, 9]) / 65535).tolist()
-    with pytest.raises(tl.InputError, match="wholly transparent"):
+    with pytest.raises(tl.InputError, match="the pixel is fully transparent"):
         parse_color(f"{tmp_path / 'a.png'}@0,0")
 
 
@@ -340,14 +351,14 @@ def test_pixels_that_cannot_be_picked(tmp_path: Path) -> None:
     whole = (tmp_path / "clear.png").read_bytes()
     (tmp_path / "cut.png").write_bytes(whole[: len(whole) // 2])
     for name, message in [
-        ("clear.png@0,0", "wholly transparent"),
-        ("clear.png@2,0", "the image has 2 x 2 pixels; count from 0"),
-        ("print.tif@0,0", "pixels of the kind"),
-        ("deep.tif@0,0", "pixels of the kind RGB of 16 bits"),
-        ("gray_alpha.png@0,0", "pixels of a kind that is not read"),
+        ("clear.png@0,0", "the pixel is fully transparent"),
+        ("clear.png@2,0", "the image has 2 x 2 pixels; count pixels from 0, starting at the top left corner"),
+        ("print.tif@0,0", "the pixel format"),
+        ("deep.tif@0,0", "the pixel format RGB of 16 bits is not supported"),
+        ("gray_alpha.png@0,0", r"the pixel format is not supported \("),
         ("text.png@0,0", "not an image that can be read"),
         ("cut.png@0,0", "not an image that can be read"),
-        ("none.png@0,0", "no such file; check the path"),
+        ("none.png@0,0", "no file has this path; check the path"),
         (".@0,0", "pixel 0,0 of"),
     ]:
         with pytest.raises(tl.InputError, match=message):

@@ -117,11 +117,11 @@ def test_the_array_is_a_copy() -> None:
 @pytest.mark.parametrize(
     ("values", "found"),
     [
-        (np.zeros((0, 1, 1)), r"shape \(0, 1, 1\), not \(nx, ny, nz\)"),
+        (np.zeros((0, 1, 1)), r"shape \(0, 1, 1\), and not \(nx, ny, nz\)"),
         (np.ones((2, 2)), r"shape \(2, 2\)"),
         (1.0, r"shape \(\)"),
-        ("smoke", "not numbers"),
-        ([[[1.0, -1e-9]]], r"1 values not in 0 to 1e\+12, the first is -1e-09 at \(0, 0, 1\)"),
+        ("smoke", "does not contain numbers"),
+        ([[[1.0, -1e-9]]], r"1 values are outside 0 to 1e\+12; the first is -1e-09 at \(0, 0, 1\)"),
         ([[[NAN]], [[NAN]]], r"2 values .* the first is nan at \(0, 0, 0\)"),
         ([[[math.inf]]], "the first is inf"),
     ],
@@ -132,25 +132,25 @@ def test_grids_that_cannot_be(values: Any, found: str) -> None:
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match=r"^density grid '.*no\.npy'; no such file; check the path"):
+    with pytest.raises(tl.InputError, match=r"^density grid '.*no\.npy'; no file has this path; check the path"):
         tl.DensityGrid.load(tmp_path / "no.npy")
     (tmp_path / "text.npy").write_text("smoke")
     with pytest.raises(tl.InputError, match="not a NumPy array"):
         tl.DensityGrid.load(tmp_path / "text.npy")
     np.save(tmp_path / "object.npy", np.array([{}], dtype=object), allow_pickle=True)
-    with pytest.raises(tl.InputError, match="its type is 'object', not numbers"):
+    with pytest.raises(tl.InputError, match="its values are of type 'object', and does not contain numbers"):
         tl.DensityGrid.load(tmp_path / "object.npy")
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: tl.LinearDensity(3, 0, 1), "LinearDensity axis 3; not known"),
-        (lambda: tl.LinearDensity(0, -1, 1), "LinearDensity start -1; not at least 0"),
+        (lambda: tl.LinearDensity(3, 0, 1), "LinearDensity axis 3; the axis must be 0, 1 or 2"),
+        (lambda: tl.LinearDensity(0, -1, 1), "LinearDensity start -1; the density must be at least 0"),
         (lambda: tl.LinearDensity(0, 1, NAN), "LinearDensity end nan"),
-        (lambda: tl.ExponentialDensity(0, 0.0, 1), "ExponentialDensity start 0.0; not above 0"),
+        (lambda: tl.ExponentialDensity(0, 0.0, 1), "ExponentialDensity start 0.0; the density must be above 0"),
         (lambda: tl.ExponentialDensity(0, 1, math.inf), "ExponentialDensity end inf"),
-        (lambda: tl.Object(MESH, density=tl.LinearDensity(0, 0, 1)), "it is opaque"),
+        (lambda: tl.Object(MESH, density=tl.LinearDensity(0, 0, 1)), "the object is opaque"),
         (lambda: tl.Object(MESH, tl.Medium(1.0), sheet_thickness=1e-3, density=tl.LinearDensity(0, 0, 1)), "a sheet"),
         (lambda: tl.Object(MESH, tl.Medium(1.0), density=np.ones((2, 2, 2))), "(?s)density of an object .* ndarray"),  # type: ignore[arg-type]
     ],

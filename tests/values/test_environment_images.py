@@ -137,15 +137,21 @@ def test_a_picture_of_another_shape_is_stretched_with_a_warning() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: tl.Environment.image(np.zeros((0, 0, 3))), r"environment image; shape \(0, 0, 3\)"),
-        (lambda: tl.Environment.image(np.ones((2, 4))), r"environment image; shape \(2, 4\)"),
-        (lambda: tl.Environment.image(np.full((2, 4, 3), "x")), "environment image; its pixels are not numbers"),
-        (lambda: tl.Environment.image(np.full((2, 4, 3), NAN)), "environment image; no pixel holds a finite radiance"),
+        (lambda: tl.Environment.image(np.zeros((0, 0, 3))), r"environment image; the array has shape \(0, 0, 3\)"),
+        (lambda: tl.Environment.image(np.ones((2, 4))), r"environment image; the array has shape \(2, 4\)"),
+        (lambda: tl.Environment.image(np.full((2, 4, 3), "x")), "environment image; the pixels are not numbers"),
+        (
+            lambda: tl.Environment.image(np.full((2, 4, 3), NAN)),
+            "environment image; no pixel has a finite radiance of 0 or above",
+        ),
         (lambda: tl.Environment.image("sky.tga"), r"environment 'sky.tga'; suffix '.tga'; use one of .hdr"),
-        (lambda: tl.Environment.image("no such.hdr"), "environment 'no such.hdr'; no such file"),
+        (lambda: tl.Environment.image("no such.hdr"), "environment 'no such.hdr'; no file has this path"),
         (lambda: tl.Environment.image(np.ones((2, 4, 3)), rotation=INF), "rotation inf of an environment"),
-        (lambda: tl.Environment.image(np.ones((2, 4, 3)), exposure=99), "exposure 99 of an environment; not within 32"),
-        (lambda: tl.Environment("image", 0.0, 0.0), "image environment; an image goes with its pixels"),
+        (
+            lambda: tl.Environment.image(np.ones((2, 4, 3)), exposure=99),
+            "exposure 99 of an environment; the exposure must lie within 32",
+        ),
+        (lambda: tl.Environment("image", 0.0, 0.0), "image environment; an image environment needs its pixels"),
         (lambda: tl.Environment.constant(1.0).with_background("red"), "background 'red'; of type str"),
     ],
 )
@@ -184,11 +190,11 @@ def test_broken_exr_files_are_refused(tmp_path: Path) -> None:
     import OpenEXR
 
     (tmp_path / "broken.exr").write_bytes(b"nothing")
-    with pytest.raises(tl.InputError, match=r"broken.exr'; not an OpenEXR file"):
+    with pytest.raises(tl.InputError, match=r"broken.exr'; the file is not an OpenEXR file \("):
         tl.Environment.image(tmp_path / "broken.exr")
     with OpenEXR.File({"type": OpenEXR.scanlineimage}, {"Z": np.ones((2, 4), np.float32)}) as file:
         file.write(str(tmp_path / "depth.exr"))
-    with pytest.raises(tl.InputError, match=r"depth.exr'; channels Z; give channels R, G and B"):
+    with pytest.raises(tl.InputError, match=r"depth.exr'; the file has the channels Z; use the channels R, G and B"):
         tl.Environment.image(tmp_path / "depth.exr")
 
 

@@ -46,7 +46,7 @@ def test_what_stays_brighter_has_no_td() -> None:
 
 @pytest.mark.parametrize("share", [0.0, 1.0, -1.0, math.nan])
 def test_a_share_that_is_none_is_refused(share: float) -> None:
-    with pytest.raises(tl.InputError, match="not between 0 and 1"):
+    with pytest.raises(tl.InputError, match="the transmittance must lie between 0 and 1"):
         medium_of_td(1e-3, share)
-    with pytest.raises(tl.InputError, match="not between 0 and 1"):
+    with pytest.raises(tl.InputError, match="the transmittance must lie between 0 and 1"):
         td_of((1, 1, 1), share)

@@ -80,10 +80,10 @@ def test_texts_are_colors_and_lengths_may_be_extreme() -> None:
     [
         ([], [], None, "fit to 0 distances, 0 colors and 0 weights"),
         ([1], [(0.5,) * 3, (0.2,) * 3], None, "fit to 1 distances, 2 colors and 2 weights"),
-        ([1, 0], [(0.5,) * 3] * 2, None, "a distance is not above 0"),
-        ([1, math.inf], [(0.5,) * 3] * 2, None, "a distance is not above 0 and finite"),
-        ([1], [(0.5, 0, 0.5)], None, r"color \[0.5, 0.0, 0.5\]; a channel is not above 0"),
-        ([1], [(0.5,) * 3], [0], "weights of a fit; negative, not finite or all 0"),
+        ([1, 0], [(0.5,) * 3] * 2, None, "a distance is not finite, or not above 0"),
+        ([1, math.inf], [(0.5,) * 3] * 2, None, "a distance is not finite, or not above 0"),
+        ([1], [(0.5, 0, 0.5)], None, r"color \[0.5, 0.0, 0.5\]; a channel of the color is not above 0"),
+        ([1], [(0.5,) * 3], [0], "weights of a fit; a weight is negative or not finite, or all weights are 0"),
         ([1, 1], [(0.5,) * 3] * 2, [1, -1], "weights of a fit"),
     ],
 )
@@ -109,15 +109,24 @@ def test_a_photographed_wedge(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("", "no column 'distance': it is empty"),
-        ("distance,color\n", "no rows; give at least one"),
+        ("distance,color\n", "no rows; add at least one row"),
         ("distance,r,g\n1,1,1\n", "no column 'color' or 'b': its first line says distance, r, g"),
-        ("distance,color\n1,red\n", r"wedge.csv line 2: fit to color \[1.0, 0.0, 0.0\]; a channel is not above 0"),
-        ("distance,color\n1,teal2\n", "line 2: color 'teal2'; neither"),
-        ("distance,color\n1,gray\n-1,gray\n", "line 3: length '-1'; not positive"),
-        ("distance,color\n1,linear(.1,.2,.3)\n", "line 2: cells; more than there are columns; quote a color"),
-        ("distance,color,weight\n1,gray,much\n", "line 2: weight 'much'; not a number"),
-        ("distance,color\n,gray\n", "line 2: distance; missing; fill it in"),
-        ("distance,color\n1,\n", "line 2: color; missing; fill it in"),
+        (
+            "distance,color\n1,red\n",
+            r"wedge.csv line 2: fit to color \[1.0, 0.0, 0.0\]; a channel of the color is not above 0",
+        ),
+        (
+            "distance,color\n1,teal2\n",
+            r"line 2: color 'teal2'; the text is neither a hex color, a CSS name, srgb\(r,g,b\) nor linear\(r,g,b\)",
+        ),
+        ("distance,color\n1,gray\n-1,gray\n", "line 3: length '-1'; the length must be positive"),
+        (
+            "distance,color\n1,linear(.1,.2,.3)\n",
+            r"line 2: cells of a table row; the row has more cells than there are columns; .*into quotes",
+        ),
+        ("distance,color,weight\n1,gray,much\n", "line 2: weight 'much'; the value is not a number"),
+        ("distance,color\n,gray\n", "line 2: distance; a value is missing; fill in the missing value"),
+        ("distance,color\n1,\n", "line 2: color; a value is missing; fill in the missing value"),
     ],
 )
 def test_a_bad_wedge_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:

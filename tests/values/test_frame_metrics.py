@@ -121,7 +121,8 @@ def test_a_failing_write_leaves_the_old_file_and_no_other(tmp_path: Path, error:
         write_atomically(path, fail)
     if expected is tl.RenderError:
         assert (
-            str(caught.value) == f"output {str(path)!r}; it cannot be written (No space left on device); check the disk"
+            str(caught.value)
+            == f"output {str(path)!r}; the file cannot be written (No space left on device); check the disk"
         )
     assert path.read_bytes() == b"precious"
     assert list(tmp_path.iterdir()) == [path]
@@ -146,7 +147,7 @@ def test_a_folder_that_takes_no_files_is_a_run_time_error() -> None:
     folder = Path("/proc")
     if not (folder / "self").exists():
         pytest.skip("no /proc, the only folder that refuses root, on this system")
-    with pytest.raises(tl.RenderError, match=re.escape("output '/proc/a.png'; it cannot be written (")):
+    with pytest.raises(tl.RenderError, match=re.escape("output '/proc/a.png'; the file cannot be written (")):
         frame().save(folder / "a.png")
     with pytest.raises(tl.RenderError, match="cannot be written"):  # before anything is drawn
         check_output(folder / "a.png")
@@ -160,7 +161,7 @@ def test_an_unknown_suffix_names_the_known_ones(tmp_path: Path, name: str) -> No
 
 
 def test_a_missing_folder_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match=r"no folder .*; make the folder first"):
+    with pytest.raises(tl.InputError, match=r"the folder .* does not exist; create the folder first"):
         check_output(tmp_path / "missing" / "a.png")
 
 
@@ -231,7 +232,12 @@ def test_a_mask_narrows_the_comparison() -> None:
 
 def test_what_cannot_be_compared_is_refused() -> None:
     small = frame(thickness=np.zeros((1, 3)))
-    with pytest.raises(tl.InputError, match=re.escape("compare; sizes (3, 1) and (3, 2); render both at one size")):
+    with pytest.raises(
+        tl.InputError,
+        match=re.escape(
+            "compare; the frame has size (3, 1), and the truth has size (3, 2); render both at the same size"
+        ),
+    ):
         tl.compare(small, frame())
     with pytest.raises(tl.InputError, match="compare; no pixel is covered and valid in both"):
         tl.compare(frame(valid=np.zeros((2, 3), dtype=bool)), frame())

@@ -71,21 +71,45 @@ def test_an_environment_takes_text_as_srgb_and_numbers_as_linear_radiance() -> N
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: tl.Environment.constant((-1, 0, 0)), "environment radiance (-1.0, 0.0, 0.0); not in 0 to 1e+18"),
+        (
+            lambda: tl.Environment.constant((-1, 0, 0)),
+            "environment radiance (-1.0, 0.0, 0.0); the value must lie in 0 to 1e+18",
+        ),
         (lambda: tl.Environment.constant((NAN, 0, 0)), "environment radiance"),
-        (lambda: tl.Environment.constant("reddish"), "color 'reddish'; neither"),
-        (lambda: tl.Environment.gradient((0, 0, 0), (0, 0)), "environment radiance (0, 0); not one or three numbers"),
-        (lambda: tl.Environment.checkerboard(0, 1, tiles=0), "checkerboard of 0 tiles; not in 0 to 1e6"),
-        (lambda: tl.Environment.checkerboard(0, 1, tiles=NAN), "checkerboard of nan tiles; not in 0 to 1e6"),
-        (lambda: tl.PointLight((0, 0), 1), "light position (0, 0); not three finite numbers"),
-        (lambda: tl.PointLight((0, 0, NAN), 1), "not three finite numbers"),
-        (lambda: tl.PointLight((0, 0, 0), -1), "light intensity (-1.0, -1.0, -1.0); not in 0 to 1e+18"),
-        (lambda: tl.PointLight((0, 0, 0), (1, 2)), "light intensity (1, 2); not one or three numbers"),
-        (lambda: tl.PointLight((0, 0, 0), "bright"), "light intensity 'bright'; not one or three numbers"),
-        (lambda: tl.PointLight("here", 1), "light position 'here'; not three finite numbers"),
-        (lambda: tl.DirectionalLight((0, 0, 0), 1), "light direction; its length is 0"),
-        (lambda: tl.DirectionalLight((0, 0, math.inf), 1), "light direction (0, 0, inf); not three finite"),
-        (lambda: tl.DirectionalLight((0, 0, 1), (1, -1, 0)), "light irradiance (1.0, -1.0, 0.0); not in 0 to 1e+18"),
+        (
+            lambda: tl.Environment.constant("reddish"),
+            "color 'reddish'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)",
+        ),
+        (
+            lambda: tl.Environment.gradient((0, 0, 0), (0, 0)),
+            "environment radiance (0, 0); the value must be one or three numbers",
+        ),
+        (
+            lambda: tl.Environment.checkerboard(0, 1, tiles=0),
+            "checkerboard of 0 tiles; the number of tiles must lie in 0 to 1e6",
+        ),
+        (
+            lambda: tl.Environment.checkerboard(0, 1, tiles=NAN),
+            "checkerboard of nan tiles; the number of tiles must lie in 0 to 1e6",
+        ),
+        (lambda: tl.PointLight((0, 0), 1), "light position (0, 0); the value must be three finite numbers"),
+        (lambda: tl.PointLight((0, 0, NAN), 1), "the value must be three finite numbers"),
+        (lambda: tl.PointLight((0, 0, 0), -1), "light intensity (-1.0, -1.0, -1.0); the value must lie in 0 to 1e+18"),
+        (lambda: tl.PointLight((0, 0, 0), (1, 2)), "light intensity (1, 2); the value must be one or three numbers"),
+        (
+            lambda: tl.PointLight((0, 0, 0), "bright"),
+            "light intensity 'bright'; the value must be one or three numbers",
+        ),
+        (lambda: tl.PointLight("here", 1), "light position 'here'; the value must be three finite numbers"),
+        (lambda: tl.DirectionalLight((0, 0, 0), 1), "light direction; the direction has the length 0"),
+        (
+            lambda: tl.DirectionalLight((0, 0, math.inf), 1),
+            "light direction (0, 0, inf); the value must be three finite",
+        ),
+        (
+            lambda: tl.DirectionalLight((0, 0, 1), (1, -1, 0)),
+            "light irradiance (1.0, -1.0, 0.0); the value must lie in 0 to 1e+18",
+        ),
     ],
 )
 def test_there_is_no_such_light(make: Callable[[], object], message: str) -> None:
@@ -203,14 +227,17 @@ def test_the_faintest_light_does_not_underflow_aloud() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"transform": np.diag([1, 0, 1, 1])}, "transform of 'box'; it flattens the mesh (a scale of 0)"),
-        ({"transform": np.eye(3)}, "transform of 'box'; not a finite 4x4 matrix"),
-        ({"transform": np.eye(4) * NAN}, "transform of 'box'; not a finite 4x4 matrix"),
-        ({"transform": np.eye(4)[:, ::-1]}, "transform of 'box'; last row (1.0, 0.0, 0.0, 0.0)"),
-        ({"transform": np.eye(4) * 2}, "transform of 'box'; last row (0.0, 0.0, 0.0, 2.0)"),
-        ({"sheet_thickness": 0}, "sheet_thickness 0 of 'box'; not above 0"),
-        ({"sheet_thickness": -1e-3}, "sheet_thickness -0.001 of 'box'; not above 0"),
-        ({"sheet_thickness": NAN}, "sheet_thickness nan of 'box'; not above 0"),
+        ({"transform": np.diag([1, 0, 1, 1])}, "transform of 'box'; the transform flattens the mesh (a scale of 0)"),
+        ({"transform": np.eye(3)}, "transform of 'box'; the transform must be a finite 4x4 matrix"),
+        ({"transform": np.eye(4) * NAN}, "transform of 'box'; the transform must be a finite 4x4 matrix"),
+        (
+            {"transform": np.eye(4)[:, ::-1]},
+            "transform of 'box'; the last row of the transform is (1.0, 0.0, 0.0, 0.0)",
+        ),
+        ({"transform": np.eye(4) * 2}, "transform of 'box'; the last row of the transform is (0.0, 0.0, 0.0, 2.0)"),
+        ({"sheet_thickness": 0}, "sheet_thickness 0 of 'box'; the thickness must be above 0"),
+        ({"sheet_thickness": -1e-3}, "sheet_thickness -0.001 of 'box'; the thickness must be above 0"),
+        ({"sheet_thickness": NAN}, "sheet_thickness nan of 'box'; the thickness must be above 0"),
         ({"priority": "high"}, "priority of an object 'high'; of type str; give a whole number, such as 1"),
     ],
 )
@@ -238,13 +265,19 @@ def test_a_color_is_text_or_linear(color: Any, linear: list[float]) -> None:
 
 @pytest.mark.parametrize("color", [(1.1, 0, 0), (-1e-9, 0, 0), (NAN, 0, 0), (1, 1), 0.5, None, [("a", "b", "c")]])
 def test_no_object_reflects_more_than_it_receives(color: Any) -> None:
-    message = f"color of 'box' {color!r}; not three numbers in 0 to 1; give for example (0.6, 0.6, 0.6)"
+    message = (
+        f"color of 'box' {color!r}; the value must be three numbers in 0 to 1; use a value such as (0.6, 0.6, 0.6)"
+    )
     with pytest.raises(tl.InputError, match=re.escape(message)):
         tl.Object(BOX, None, color=color)
 
 
 @pytest.mark.parametrize(
-    ("color", "message"), [("reddish", "color 'reddish'; neither"), ("linear(2, 0, 0)", "not three numbers in 0 to 1")]
+    ("color", "message"),
+    [
+        ("reddish", "color 'reddish'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)"),
+        ("linear(2, 0, 0)", "the value must be three numbers in 0 to 1"),
+    ],
 )
 def test_the_text_of_a_color_is_checked(color: str, message: str) -> None:
     with pytest.raises(tl.InputError, match=re.escape(message)):
@@ -320,9 +353,11 @@ def test_on_its_surface_a_body_contains_a_fraction() -> None:
 
 
 def test_a_scene_needs_an_object_and_a_known_overlap() -> None:
-    with pytest.raises(tl.InputError, match="scene; it has no objects"):
+    with pytest.raises(tl.InputError, match="scene; the scene has no objects"):
         tl.Scene([], CAMERA)
-    with pytest.raises(tl.InputError, match=r"overlap 'xor'; not a known policy; use one of add, union, priority"):
+    with pytest.raises(
+        tl.InputError, match="overlap 'xor'; no overlap rule has this name; use one of add, union, priority"
+    ):
         tl.Scene([tl.Object(BOX, GLASS)], CAMERA, overlap="xor")  # type: ignore[arg-type]
 
 

@@ -107,7 +107,7 @@ def test_coordinates_are_in_the_given_unit(tmp_path: Path, unit: str, size: floa
 
 
 def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match="unit 'furlong'; not a known unit"):
+    with pytest.raises(tl.InputError, match="unit 'furlong'; no unit of length has this name"):
         load_mesh(save(tmp_path / "cube.obj", cube()), unit="furlong")
 
 
@@ -185,16 +185,16 @@ def test_a_uv_seam_survives_welding(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("missing.obj", None, "no such file; check the path"),
-        ("mesh.xyzw", b"", "format '.xyzw' is not known; use glb, gltf, obj, stl, ply or off"),
-        ("mesh", b"", "format 'without suffix' is not known"),
-        ("empty.obj", b"", "it has no faces"),
-        ("empty.stl", b"", "it has no faces"),
-        ("empty.ply", b"", "it cannot be read"),
-        ("garbage.glb", b"\x00\xff" * 200, "its JSON is broken"),
-        ("garbage.ply", b"\x00\xff" * 200, "it cannot be read"),
-        ("garbage.off", b"\x00\xff" * 200, "it cannot be read"),
-        ("points.obj", b"v 0 0 0\nv 1 0 0\n", "it has no faces; give a triangle mesh, not points or lines"),
+        ("missing.obj", None, "no file has this path; check the path"),
+        ("mesh.xyzw", b"", "the mesh format '.xyzw' is not supported; use glb, gltf, obj, stl, ply or off"),
+        ("mesh", b"", "the mesh format 'without suffix' is not supported"),
+        ("empty.obj", b"", "the mesh has no faces"),
+        ("empty.stl", b"", "the mesh has no faces"),
+        ("empty.ply", b"", "the file cannot be read ("),
+        ("garbage.glb", b"\x00\xff" * 200, "the JSON of the file is broken ("),
+        ("garbage.ply", b"\x00\xff" * 200, "the file cannot be read ("),
+        ("garbage.off", b"\x00\xff" * 200, "the file cannot be read ("),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\n", "the mesh has no faces; use a mesh of triangles, not of points or lines"),
         ("nan.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "1 vertices are not finite (first: 0)"),
         ("huge.obj", b"v 0 0 1e30\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "beyond 1e+18 m"),
     ],
@@ -247,7 +247,7 @@ def test_an_interrupted_import_of_trimesh_is_whole_and_interrupts(tmp_path: Path
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match="it is a folder; give a file in it"):
+    with pytest.raises(tl.InputError, match="the path is a folder; give the path of a file"):
         load_mesh(tmp_path)
 
 

@@ -40,9 +40,12 @@ def test_color_distance_and_extinction_agree(color: tuple[float, ...], distance:
 @pytest.mark.parametrize(
     ("distance", "told"),
     [
-        (-1, "what passes -1 m; below 0; give lengths of paths through the medium, 0 or more"),
-        ([0.0, -0.5, np.nan, -2.0], "what passes -0.5 m; below 0 at 2 of 4 places; give"),
-        (-np.inf, "what passes -inf m; below 0;"),
+        (-1, "transmittance after -1 m; the length is below 0; give lengths of paths through the medium, 0 or above"),
+        (
+            [0.0, -0.5, np.nan, -2.0],
+            "transmittance after -0.5 m; the length is below 0 at 2 of 4 places; give lengths of paths through the",
+        ),
+        (-np.inf, "transmittance after -inf m; the length is below 0;"),
     ],
 )
 def test_no_way_is_shorter_than_nothing(distance: Any, told: str) -> None:
@@ -101,22 +104,34 @@ def test_tiny_and_huge_distances_are_fine_while_the_extinction_is_finite() -> No
 @pytest.mark.parametrize(
     ("color", "distance", "message"),
     [
-        ((0.0, 0.5, 0.5), 1, "color (0.0, 0.5, 0.5); red = 0 is not in 0 < t <= 1; no finite extinction gives 0"),
+        (
+            (0.0, 0.5, 0.5),
+            1,
+            "color (0.0, 0.5, 0.5); red = 0 is not in 0 < t <= 1; a channel of 0 would need an infinite extinction;",
+        ),
         ((0.5, -0.0, 0.5), 1, "green = -0 is not in 0 < t <= 1"),
-        ((0.5, 0.5, -0.1), 1, "blue = -0.1 is not in 0 < t <= 1; no finite extinction gives 0 or above 1"),
-        ((0.5, 1.5, 0.5), 1, "green = 1.5 is not in 0 < t <= 1; a medium cannot add light"),
-        ((0.5, 0.5, NAN), 1, "a channel is not finite"),
-        ((0.5, 0.5, INF), 1, "a channel is not finite"),
+        (
+            (0.5, 0.5, -0.1),
+            1,
+            "blue = -0.1 is not in 0 < t <= 1; a channel of 0 would need an infinite extinction; use a value such",
+        ),
+        (
+            (0.5, 1.5, 0.5),
+            1,
+            "green = 1.5 is not in 0 < t <= 1; a medium cannot amplify light; scale the color to at most 1",
+        ),
+        ((0.5, 0.5, NAN), 1, "a channel of the color is not a finite number"),
+        ((0.5, 0.5, INF), 1, "a channel of the color is not a finite number"),
         ("#ff0000", 1, "color '#ff0000'; green = 0 is not in 0 < t <= 1"),
-        ("nonsense", 1, "color 'nonsense'; neither a hex color"),
+        ("nonsense", 1, "color 'nonsense'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)"),
         ((0.5, 0.5), 1, "not (3,)"),
-        (JADE, 0, "distance 0; not above 0; give the distance in metres"),
-        (JADE, -0.02, "distance -0.02; not above 0"),
-        (JADE, -INF, "distance -inf; not above 0"),
-        (JADE, NAN, "distance nan; not above 0"),
-        (JADE, "2cm", "distance '2cm'; a text with a unit; give the metres: 0.02"),
-        (JADE, None, "distance None; not above 0"),
-        (JADE, 1e-309, "distance 1e-309 m; so short that the extinction overflows"),
+        (JADE, 0, "distance 0; the distance must be above 0; give the distance in metres"),
+        (JADE, -0.02, "distance -0.02; the distance must be above 0"),
+        (JADE, -INF, "distance -inf; the distance must be above 0"),
+        (JADE, NAN, "distance nan; the distance must be above 0"),
+        (JADE, "2cm", "distance '2cm'; the distance is a text with a unit; give the distance in metres: 0.02"),
+        (JADE, None, "distance None; the distance must be above 0"),
+        (JADE, 1e-309, "distance 1e-309 m; the distance is so short that the extinction overflows"),
         ((1e-300,) * 3, 1e-306, "so short that the extinction overflows"),
     ],
     ids=str,
@@ -129,17 +144,17 @@ def test_no_medium_has_such_a_color(color: Any, distance: Any, message: str) -> 
 @pytest.mark.parametrize(
     ("given_", "message"),
     [
-        ({"absorption": (1, -1, 0)}, "medium absorption (1.0, -1.0, 0.0); negative or not finite"),
-        ({"absorption": (1, NAN, 0)}, "medium absorption (1.0, nan, 0.0); negative or not finite"),
-        ({"absorption": INF}, "medium absorption (inf, inf, inf); negative or not finite"),
+        ({"absorption": (1, -1, 0)}, "medium absorption (1.0, -1.0, 0.0); a value is negative or not finite"),
+        ({"absorption": (1, NAN, 0)}, "medium absorption (1.0, nan, 0.0); a value is negative or not finite"),
+        ({"absorption": INF}, "medium absorption (inf, inf, inf); a value is negative or not finite"),
         ({"scattering": (0, 0, -1e-9)}, "medium scattering"),
         ({"emission": (-1, 0, 0)}, "medium emission"),
-        ({"absorption": (1, 2)}, "medium absorption (1, 2); not one or three numbers"),
-        ({"absorption": "red"}, "medium absorption 'red'; not one or three numbers"),
-        ({"anisotropy": 1.0}, "medium anisotropy 1.0; not between -1 and 1"),
+        ({"absorption": (1, 2)}, "medium absorption (1, 2); the value must be one or three numbers"),
+        ({"absorption": "red"}, "medium absorption 'red'; the value must be one or three numbers"),
+        ({"anisotropy": 1.0}, "medium anisotropy 1.0; the anisotropy must lie between -1 and 1"),
         ({"anisotropy": -1.0}, "medium anisotropy -1.0"),
         ({"anisotropy": NAN}, "medium anisotropy nan"),
-        ({"ior": 0.9}, "medium ior 0.9; not in 1 to 100"),
+        ({"ior": 0.9}, "medium ior 0.9; the index of refraction must lie in 1 to 100"),
         ({"ior": INF}, "medium ior inf"),
         ({"ior": NAN}, "medium ior nan"),
     ],
@@ -192,9 +207,9 @@ def test_an_infinite_way_through_nothing_loses_nothing() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"absorption": 1e301}, "medium absorption .* above 1e\\+300"),
-        ({"emission": 1e19}, "medium emission .* above 1e\\+18"),
-        ({"ior": 1e3}, "medium ior 1000.0; not in 1 to 100"),
+        ({"absorption": 1e301}, r"medium absorption .* the value is above the limit of 1e\+300"),
+        ({"emission": 1e19}, r"medium emission .* the value is above the limit of 1e\+18"),
+        ({"ior": 1e3}, "medium ior 1000.0; the index of refraction must lie in 1 to 100"),
     ],
 )
 def test_what_no_float32_could_carry_is_refused(values: dict[str, float], message: str) -> None:
@@ -215,7 +230,7 @@ def test_particles_cover_what_they_project() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"number_density": -1.0, "radius": 1.0}, "number_density -1.0; not a number of 0 and above"),
+        ({"number_density": -1.0, "radius": 1.0}, "number_density -1.0; the value must be a number of 0 or above"),
         ({"number_density": 1.0, "radius": NAN}, "radius nan"),
         ({"number_density": 1.0, "radius": INF}, "radius inf"),
         ({"number_density": 1.0, "radius": 1.0, "albedo": 1.5}, "albedo .* above 1"),

@@ -155,18 +155,18 @@ def test_near_a_surface(distance: float, near: bool) -> None:
 @pytest.mark.parametrize(
     ("vertices", "faces", "uv", "message"),
     [
-        (CORNERS, [], None, "mesh 'mesh'; it has no faces"),
-        ([], [[0, 1, 2]], None, "face 0 = (0, 1, 2) points outside the 0 vertices"),
-        (CORNERS, [[0, 1, 2], [0, 1, 8]], None, "face 1 = (0, 1, 8) points outside the 8 vertices"),
-        (CORNERS, [[0, 1, -1]], None, "face 0 = (0, 1, -1) points outside"),
-        (CORNERS[:, :2], CUBE, None, "vertices of shape (8, 2); give shape (n, 3)"),
-        (CORNERS, [[0, 1, 2, 3]], None, "faces of shape (1, 4); give shape (n, 3)"),
-        (CORNERS, [0, 1, 2], None, "faces of shape (3,)"),
-        (CORNERS, CUBE, CORNERS, "uv of shape (8, 3); give shape (n, 2)"),
+        (CORNERS, [], None, "mesh 'mesh'; the mesh has no faces"),
+        ([], [[0, 1, 2]], None, "face 0 = (0, 1, 2) refers to points outside the 0 vertices"),
+        (CORNERS, [[0, 1, 2], [0, 1, 8]], None, "face 1 = (0, 1, 8) refers to points outside the 8 vertices"),
+        (CORNERS, [[0, 1, -1]], None, "face 0 = (0, 1, -1) refers to points outside"),
+        (CORNERS[:, :2], CUBE, None, "vertices has the shape (8, 2); use the shape (n, 3)"),
+        (CORNERS, [[0, 1, 2, 3]], None, "faces has the shape (1, 4); use the shape (n, 3)"),
+        (CORNERS, [0, 1, 2], None, "faces has the shape (3,)"),
+        (CORNERS, CUBE, CORNERS, "uv has the shape (8, 3); use the shape (n, 2)"),
         (CORNERS, CUBE, CORNERS[:4, :2], "4 uv for 8 vertices"),
-        ([["a", "b", "c"]], CUBE, None, "vertices are not numbers of float64"),
-        (CORNERS, [[0, 1, 2**40]], None, "faces are not numbers of int32"),
-        ([[0, 0, 0], [1, 1]], CUBE, None, "vertices are not numbers"),
+        ([["a", "b", "c"]], CUBE, None, "the values of vertices cannot be converted to float64"),
+        (CORNERS, [[0, 1, 2**40]], None, "the values of faces cannot be converted to int32"),
+        ([[0, 0, 0], [1, 1]], CUBE, None, "the values of vertices cannot be converted"),
     ],
 )
 def test_such_arrays_are_no_mesh(vertices: Any, faces: Any, uv: Any, message: str) -> None:
@@ -208,5 +208,5 @@ def test_the_summary_can_be_written_as_json() -> None:
 
 @pytest.mark.parametrize("faces", [[[0, 1, 2**63]], [[0.5, 1, 2.7]], [[True, False, True]], [["a", "b", "c"]]])
 def test_indices_that_are_no_indices_are_refused(faces: list[list[object]]) -> None:
-    with pytest.raises(tl.InputError, match="faces are not numbers of int32"):
+    with pytest.raises(tl.InputError, match="the values of faces cannot be converted to int32"):
         Mesh(np.eye(3), np.array(faces))

@@ -56,14 +56,16 @@ def test_traits_agree_with_each_other(method: type[Method]) -> None:
 
 def test_a_misspelt_method_is_guessed() -> None:
     for name in ("signed depth", "Fragment-List", "kbuffer"):
-        with pytest.raises(tl.InputError, match=r"not a known method; did you mean (signed-depth|fragment|k-buffer)"):
+        with pytest.raises(
+            tl.InputError, match=r"no method has this name; did you mean (signed-depth|fragment|k-buffer)"
+        ):
             method_from_name(name)
 
 
 @pytest.mark.parametrize("name", ["magic", ""])
 def test_an_unknown_method_names_the_known_ones(name: str) -> None:
     known = ", ".join(METHODS)
-    with pytest.raises(tl.InputError, match=f"^method '{name}'; not a known method; use one of {known}$"):
+    with pytest.raises(tl.InputError, match=f"^method '{name}'; no method has this name; use one of {known}$"):
         method_from_name(name)
 
 
@@ -75,7 +77,9 @@ def test_methods_of_equal_parameters_are_equal_and_hash_alike() -> None:
 
 @pytest.mark.parametrize("thickness", [0, -1.0, np.nan, np.inf])
 def test_a_sheet_has_a_positive_thickness(thickness: float) -> None:
-    with pytest.raises(tl.InputError, match=re.escape(f"ThinLayer thickness {thickness}; not above 0")):
+    with pytest.raises(
+        tl.InputError, match=re.escape(f"ThinLayer thickness {thickness}; the thickness must be above 0")
+    ):
         tl.ThinLayer(thickness)
 
 
@@ -86,13 +90,15 @@ def test_a_sheet_has_a_positive_thickness(thickness: float) -> None:
 def test_layers_are_counted_in_whole_numbers(method: Any, what: str, most: int) -> None:
     assert method(1) != method(most)
     for wrong in (0, -1, most + 1, 2.0, np.nan, np.inf, "8", None, True, [8]):
-        message = f"{what} {wrong!r}; not a whole number in 1 to {most}; give for example 8"
+        message = f"{what} {wrong!r}; the value must be a whole number in 1 to {most}; use a value such as 8"
         with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
             method(wrong)
 
 
 @pytest.mark.parametrize("order", ["sideways", "", "Both-Ends", None, 2, ["both-ends"]])
 def test_an_unknown_order_of_peeling_names_the_known_ones(order: Any) -> None:
-    message = f"DepthPeeling order {order!r}; not known; use one of both-ends, front-to-back, back-to-front"
+    message = (
+        f"DepthPeeling order {order!r}; no order has this name; use one of both-ends, front-to-back, back-to-front"
+    )
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
         tl.DepthPeeling(order=order)

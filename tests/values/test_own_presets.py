@@ -50,13 +50,13 @@ def test_what_is_wrong_is_told_with_its_line_and_the_others_are_read(folder: Pat
     assert "a.toml', line 11, [tea]; unknown key 'colour'; did you mean 'color'?" in tea
     assert "b.toml" in broken
     assert "line 1" in broken
-    assert "d.toml'; [mint] is in another file, too" in twice
+    assert "d.toml'; the preset [mint] is also defined in another file" in twice
     assert "not UTF-8" in binary
     assert read_own_presets(folder / "none") == ({}, [])
 
 
 def test_own_presets_are_found_by_name_and_listed(folder: Path, run: Run) -> None:
-    with pytest.raises(tl.InputError, match="not a known preset"):
+    with pytest.raises(tl.InputError, match="no preset has this name"):
         tl.preset("Green mint")
     mint = read_presets(GOOD)["mint"]
     save_own_preset(Preset(preset_name("Green mint!"), mint.medium, "estimated", "by eye", group="own"))
@@ -66,7 +66,11 @@ def test_own_presets_are_found_by_name_and_listed(folder: Path, run: Run) -> Non
     assert [line.split()[0] for line in result.out.splitlines()] == ["name", "green_mint"]
     assert "bad.toml" in result.err
     (folder / "bad.toml").write_text("[tea]\nior = 1\n")
-    for name, words in (("bad", "yours cannot be read"), ("tea", "yours cannot be read"), ("cup", "are not all read")):
+    for name, words in (
+        ("bad", "your own preset of this name cannot be read"),
+        ("tea", "your own preset of this name cannot be read"),
+        ("cup", "are not all read"),
+    ):
         told = run("presets", "show", name).err
         assert words in told
         assert "bad.toml', line 1, [tea]; " in told

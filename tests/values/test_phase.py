@@ -121,14 +121,14 @@ def test_phase_functions_as_text(phase: PhaseFunction) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "none of that name"),
-        ("mie 3", "none of that name"),
-        ("henyey_greenstein", "not 1 numbers"),
-        ("henyey_greenstein a", "not 1 numbers"),
-        ("henyey_greenstein 1", "not between -1 and 1"),
-        ("draine 1 2", "not between -1 and 1"),
-        ("draine 0.5 -1", "not in 0 to"),
-        ("water_droplets 20", "not of 5e-6 to 5e-5 m"),
+        ("", "no phase function has this name"),
+        ("mie 3", "no phase function has this name"),
+        ("henyey_greenstein", "this phase function needs 1 numbers"),
+        ("henyey_greenstein a", "this phase function needs 1 numbers"),
+        ("henyey_greenstein 1", "the (anisotropy|parameter) must lie between -1 and 1"),
+        ("draine 1 2", "the (anisotropy|parameter) must lie between -1 and 1"),
+        ("draine 0.5 -1", "the parameter must lie in 0 to"),
+        ("water_droplets 20", "the droplet diameter must lie in 5e-6 to 5e-5 m"),
     ],
 )
 def test_text_that_is_no_phase_function(text: str, message: str) -> None:
@@ -142,7 +142,7 @@ def test_a_medium_with_a_phase_function_has_its_mean_cosine() -> None:
     assert medium.anisotropy == 0.4
     assert medium == tl.Medium(scattering=1.0, anisotropy=0.4)
     assert dataclasses.replace(medium, ior=1.3).phase_function == phase
-    with pytest.raises(tl.InputError, match="give one of the two"):
+    with pytest.raises(tl.InputError, match="give only one of the two"):
         tl.Medium(scattering=1.0, anisotropy=0.3, phase=phase)
 
 

@@ -174,9 +174,9 @@ def test_a_toml_file_names_photographs(tmp_path: Path) -> None:
     for wrong, message in (
         (text.replace("white", "whit"), "number 1; 'whit' is not known"),
         (text.replace("patches", "#"), "'patches' is missing"),
-        (text.replace('"2,2,20,20"', "2"), "a value is no text"),
-        (text.replace("=1mm", "=0mm"), "not positive"),
-        ("[[", "no TOML"),
+        (text.replace('"2,2,20,20"', "2"), "a value is not a text"),
+        (text.replace("=1mm", "=0mm"), "the length must be positive"),
+        ("[[", r"the file is not valid TOML \("),
         ("white = 1", r"no table \[\[photograph\]\]"),
     ):
         (tmp_path / "steps.toml").write_text(wrong)
@@ -187,13 +187,18 @@ def test_a_toml_file_names_photographs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("white", "patches", "exposure", "message"),
     [
-        (WHITE, [((0, 9, SIDE, SIDE), 0.001)], 0.8, "outside of the picture of 144 x 24 pixels"),
-        (WHITE, [((-1, 0, SIDE, SIDE), 0.001)], 0.8, "outside of the picture"),
-        (WHITE, [((0, 0, 3, 9), 0.001)], 0.8, "3 x 9 pixels; give one of at least 4 x 4"),
+        (WHITE, [((0, 9, SIDE, SIDE), 0.001)], 0.8, "the rectangle lies outside the picture of 144 x 24 pixels"),
+        (WHITE, [((-1, 0, SIDE, SIDE), 0.001)], 0.8, "the rectangle lies outside the picture of"),
+        (WHITE, [((0, 0, 3, 9), 0.001)], 0.8, "3 x 9 pixels; use a rectangle of at least 4 x 4 pixels"),
         (PATCHES[1][0], PATCHES, 0.8, "patch 24,0,24,24 of steps.png; red .* is above the white's"),
-        (WHITE, PATCHES, 1.1, "white of steps.png; 100 % of its pixels are saturated; expose it shorter"),
-        (WHITE, PATCHES, 0.0, "white of steps.png; it is black"),
-        (WHITE, [(PATCHES[0][0], 0.0)], 0.8, "thickness 0.0 m; give a length above 0"),
+        (
+            WHITE,
+            PATCHES,
+            1.1,
+            "white of steps.png; 100 % of the pixels of the white rectangle are saturated; use a shorter exposure",
+        ),
+        (WHITE, PATCHES, 0.0, "white of steps.png; the white rectangle is black"),
+        (WHITE, [(PATCHES[0][0], 0.0)], 0.8, r"the thickness is 0\.0 m; give a length above 0"),
         (WHITE, [], 0.8, "no patches"),
         (WHITE, PATCHES[4:], 0.005, "fit of red; every patch is too dark or saturated"),
     ],
@@ -202,7 +207,7 @@ def test_bad_input_is_told(tmp_path: Path, white: object, patches: object, expos
     Image.fromarray(encoded(photograph(None, exposure))).save(tmp_path / "steps.png")
     with pytest.raises(tl.InputError, match=message):
         fit_photographs([Photograph(tmp_path / "steps.png", white, patches)])  # type: ignore[arg-type]
-    with pytest.raises(tl.InputError, match="there are none"):
+    with pytest.raises(tl.InputError, match="no photograph is given"):
         fit_photographs([])
 
 
@@ -211,10 +216,10 @@ def test_bad_input_is_told(tmp_path: Path, white: object, patches: object, expos
     [
         ("1,2,3,4", "no thickness"),
         ("1,2,3=2mm", "not four whole numbers"),
-        ("1,-2,3,4=2mm", "in no picture"),
-        ("1,2,0,4=2mm", "in no picture"),
-        (f"1,2,{10**30},4=2mm,3mm", "in no picture"),
-        ("1,2,3,4=2mm,", "length ''; not a number"),
+        ("1,-2,3,4=2mm", "the rectangle lies outside the picture"),
+        ("1,2,0,4=2mm", "the rectangle lies outside the picture"),
+        (f"1,2,{10**30},4=2mm,3mm", "the rectangle lies outside the picture"),
+        ("1,2,3,4=2mm,", "length ''; the text is not a number"),
     ],
 )
 def test_a_patch_that_is_none_is_told(text: str, message: str) -> None:

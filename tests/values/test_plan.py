@@ -236,7 +236,7 @@ def test_a_backdrop_is_a_pass_before_all_others(objects: list[tl.Object], method
 
 
 def test_a_backdrop_takes_the_place_of_opaque_objects() -> None:
-    with pytest.raises(tl.InputError, match=r"^a backdrop; the scene has opaque objects of its own: 'torus'"):
+    with pytest.raises(tl.InputError, match=r"^a backdrop; the scene itself has opaque objects: 'torus'"):
         plan_over_backdrop(scene(body(), body(None, TORUS)))
 
 

@@ -166,11 +166,11 @@ def test_what_bends_light_stops_it_on_its_straight_way() -> None:
         (
             scene(lights=()),
             {},
-            "caustics; the scene has no lights; add a tl.PointLight, tl.SpotLight or tl.DirectionalLight",
+            "caustics; the scene has no lights that can emit photons; add a tl.PointLight, tl.SpotLight or",
         ),
         (scene(body(tl.Medium(1.0)), body(None, 3.0)), {}, "caustics; no interface of 'box' bends or mirrors light"),
         (scene(body()), {}, "caustics; no opaque object receives the light, and no other body scatters it"),
-        (scene(), {"method": tl.PathTraced()}, "leave out one of the two"),
+        (scene(), {"method": tl.PathTraced()}, "omit one of the two"),
         (scene(), {"method": tl.ThinLayer()}, "it treats every face as a sheet, which refracts no light"),
         (
             scene(body(density=tl.LinearDensity(1, 0.0, 1.0)), body(None, 3.0)),
@@ -180,7 +180,7 @@ def test_what_bends_light_stops_it_on_its_straight_way() -> None:
         (
             scene(body(sheet_thickness=1e-3, surface=tl.Surface(roughness=0.5)), body(None, 3.0)),
             {},
-            "'box': a sheet that is rough; give it an inside",
+            "'box': a sheet that is rough; use a closed body instead of the sheet, or a sheet without roughness",
         ),
     ],
 )
@@ -191,9 +191,13 @@ def test_scenes_that_no_photon_could_light_are_refused(one: tl.Scene, options: A
 
 @pytest.mark.parametrize("photons", [-1, 10**12, 1e6, True, "many"])
 def test_numbers_of_photons_that_make_no_sense_are_refused(photons: Any) -> None:
-    with pytest.raises(tl.InputError, match=r"Caustics photons .*; not a whole number in 0 to 1073741824"):
+    with pytest.raises(
+        tl.InputError, match=r"Caustics photons .*; the value must be a whole number in 0 to 1073741824"
+    ):
         tl.Caustics(photons)
-    with pytest.raises(tl.InputError, match=r"caustics 7; not tl.Caustics; give for example tl.Caustics"):
+    with pytest.raises(
+        tl.InputError, match=r"caustics 7; the value must be tl\.Caustics; give for example tl.Caustics"
+    ):
         plan(scene(), caustics=7)  # type: ignore[arg-type]
     with pytest.raises(tl.InputError, match="Caustics seed -1"):
         tl.Caustics(seed=-1)

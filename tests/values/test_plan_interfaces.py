@@ -57,7 +57,7 @@ def test_one_interface_saves_a_draw_and_says_what_it_costs(method: Any) -> None:
     assert front.cost < both.cost
     assert ONE_INTERFACE in front.unmodelled
     assert tuple(note for note in front.unmodelled if note != ONE_INTERFACE) == both.unmodelled
-    assert "not modelled: FrontInterface: bends once, where a ray enters; leaves without bending" in str(front)
+    assert "not modelled: FrontInterface: rays refract only where they enter a body" in str(front)
     assert front.summary()["interfaces"] == "FrontInterface()"
 
 
@@ -152,7 +152,7 @@ def test_sheets_have_one_interface_and_bend_no_ray(objects: list[tl.Object], met
     assert chosen.interfaces == SCREEN
     assert chosen == plan(scene(*objects), method, interfaces=SCREEN)
     found = {step.name: step for step in chosen.passes}
-    assert found["interfaces"].reason.endswith("normal and place of the sheet that a ray meets first")
+    assert found["interfaces"].reason.endswith("normal and position of the first sheet on each ray")
     assert found["interfaces"].geometry_passes == 1
     assert (
         found["surfaces"].reason == "interfaces mirror the environment (ior above 1); rays go straight through sheets"
@@ -194,7 +194,8 @@ def test_depth_and_forks_are_whole_numbers_in_range(what: str, least: int, most:
     assert tl.TracedInterfaces() == tl.TracedInterfaces(depth=8, forks=2)
     for wrong in (least - 1, most + 1, 2.0, True, None, "3", np.nan):
         message = (
-            f"TracedInterfaces {what} {wrong!r}; not a whole number in {least} to {most}; give for example {example}"
+            f"TracedInterfaces {what} {wrong!r}; the value must be a whole number in {least} to {most}; "
+            f"use a value such as {example}"
         )
         with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
             tl.TracedInterfaces(**{what: wrong})  # type: ignore[arg-type]
@@ -298,7 +299,7 @@ def test_bodies_that_a_picture_cuts_do_not_matter_as_sheets_or_without_interface
 
 def test_nothing_is_traced_before_a_backdrop() -> None:
     asked = scene(body(DIAMOND))
-    with pytest.raises(tl.InputError, match=r"have no mesh that a ray could meet; use ScreenInterfaces\(\)$"):
+    with pytest.raises(tl.InputError, match=r"have no mesh that a ray could meet; use ScreenInterfaces\(\) instead$"):
         plan_over_backdrop(asked, interfaces=TRACED)
     assert plan_over_backdrop(asked).interfaces == SCREEN
     assert plan_over_backdrop(asked, interfaces=FRONT).interfaces == FRONT

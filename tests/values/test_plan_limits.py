@@ -40,7 +40,7 @@ def test_an_effect_that_no_pass_renders_is_told(objects: list[tl.Object], effect
     cut_off = (
         "rays that cross more than 24 interfaces, or that follow the weaker of the reflected and the refracted ray more"
     )
-    first_interval = "refraction and reflection beyond the first interval"
+    first_interval = "refraction and reflection after the first body"
     traced = first_interval if method == tl.ThinLayer() else cut_off  # sheets bend no ray
     for interfaces, bent in ((None, traced), (tl.ScreenInterfaces(), first_interval)):
         found = plan(scene(*objects), method, interfaces=interfaces, scattering=tl.SingleScattering())
@@ -85,8 +85,8 @@ def test_an_open_body_is_marked_and_falls_back_to_a_sheet(method: Any, passes: l
         "marked invalid"
     )
     assert found.limits[0] == (
-        "'open box': 3 open edges (first: vertices (0, 1), (0, 3), (1, 3)): close it, or declare it a sheet "
-        "(sheet_thickness=..., --method thin-layer)"
+        "'open box': 3 open edges (first: vertices (0, 1), (0, 3), (1, 3)): close the mesh, or declare it a thin-walled "
+        "sheet (sheet_thickness=..., --method thin-layer)"
     )
     assert not found.exact
 
@@ -145,6 +145,6 @@ def test_without_shader_storage_what_scatters_is_marked(method: tl.SignedDepth |
     assert "unlit" not in names(here)
     assert names(there)[-2:] == ["unlit", "transmittance"]
     assert there.passes[-2].objects == (1,)
-    assert any("marked invalid: to render their light needs OpenGL 4.3" in limit for limit in there.limits)
+    assert any("marked as invalid: their light can be rendered only by OpenGL 4.3" in limit for limit in there.limits)
     for other in (scene(body(dye), body(wax)), scene(body(dye), lights=[light])):
         assert "unlit" not in names(plan(other, method, NO_STORAGE, scattering=once))

@@ -19,7 +19,7 @@ def test_marching_goes_through_the_lists() -> None:
     assert names(found) == ["fragment_lists", "transmittance"]
     assert "32 steps through each interval" in found.passes[0].reason
     assert found.cost < plan(scene(body(FIRE), body(WINE, x=0.5)), tl.RayMarched(steps=64)).cost
-    with pytest.raises(tl.InputError, match="shaders hold 16 Gauss-Legendre points; use fewer steps"):
+    with pytest.raises(tl.InputError, match="shaders support at most 16 Gauss-Legendre points; use fewer steps"):
         plan(scene(body()), tl.RayMarched(steps=17, quadrature="gauss"))
     with pytest.raises(tl.InputError, match="RayMarched; this OpenGL has no shader storage"):
         plan(scene(body()), tl.RayMarched(), NO_STORAGE)
@@ -62,13 +62,15 @@ def test_where_the_density_varies_rays_march(density: Any, steps: int) -> None:
 )
 def test_no_other_method_goes_through_a_density(method: Any) -> None:
     cloud = scene(body(density=tl.LinearDensity(0, 0, 1)), body(x=3))
-    with pytest.raises(tl.InputError, match=f"{type(method).__name__}; 'box': the density varies, .*; use RayMarched"):
+    with pytest.raises(
+        tl.InputError, match=f"{type(method).__name__}; 'box': the density varies, .*; use the method RayMarched"
+    ):
         plan(cloud, method)
 
 
 def test_a_density_without_shader_storage_or_without_opengl() -> None:
     cloud = scene(body(density=tl.DensityGrid(np.ones((2, 2, 2)))))
-    with pytest.raises(tl.InputError, match="rendering 'box' with a density that varies; this OpenGL has no shader st"):
+    with pytest.raises(tl.InputError, match="rendering 'box' with a varying density; this OpenGL has no shader st"):
         plan(cloud, None, NO_STORAGE)
     assert plan(cloud, None, Capabilities(opengl=False)).exact
 

@@ -34,11 +34,11 @@ FACES = len(TORUS.faces)
 #: Passes before the last; * is the ordered pass, ! a refusal with these words. A column for each of `COLUMNS`, and one
 #: for the methods that find ordered intervals.
 FALLBACKS = "thin_layer_fallback signed_depth_fallback"
-DIFFER, ORDER, SHEET = "! different media", "! leave the choice to the planner", "! declared a sheet"
+DIFFER, ORDER, SHEET = "! different media", "! leave the choice to the planner", "! declared as a thin-walled sheet"
 PASSES = {
     "convex": ("signed_depth", "signed_depth", "back_face_depth", "thin_layer", "*"),
     "concave": ("signed_depth", "signed_depth", "back_face_depth", "thin_layer", "*"),
-    "sheets": ("thin_layer", "thin_layer", DIFFER, "thin_layer", "! use ThinLayer"),
+    "sheets": ("thin_layer", "thin_layer", DIFFER, "thin_layer", "! use the method ThinLayer"),
     "body and sheet": ("signed_depth thin_layer", "signed_depth thin_layer", SHEET, "thin_layer", "thin_layer *"),
     "open": (
         "signed_depth thin_layer_fallback",
@@ -147,7 +147,8 @@ def test_without_shader_storage_bodies_are_peeled(kind: str) -> None:
 @pytest.mark.parametrize("method", [tl.FragmentLists(), tl.KBuffer()])
 def test_methods_that_need_shader_storage_are_refused_without(method: Any) -> None:
     message = (
-        f"{type(method).__name__}; this OpenGL has no shader storage buffers, which came with 4.3; use DepthPeeling"
+        f"{type(method).__name__}; this OpenGL has no shader storage buffers, which need version 4.3; "
+        "use the method DepthPeeling"
     )
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
         plan(scene(body()), method, NO_STORAGE)
@@ -183,7 +184,7 @@ def test_a_limit_of_layers_is_told_exactly_where_there_may_be_more(
 ) -> None:
     assert plan(scene(*objects), kind(layers)).limits == ()
     assert plan(scene(*objects), kind(layers - 1)).limits == (
-        f"pixels with more than {layers - 1} surfaces are marked invalid",
+        f"pixels whose rays cross more than {layers - 1} surfaces are marked as invalid",
     )
     assert plan(scene(*objects), tl.FragmentLists()).limits == ()
 
@@ -192,13 +193,14 @@ def test_the_faces_of_an_open_body_count_too() -> None:
     # A box without a face is not known to be convex: 11 faces.
     assert len(plan(scene(body(mesh=OPEN)), tl.KBuffer(11)).limits) == 1
     assert (
-        plan(scene(body(mesh=OPEN)), tl.KBuffer(10)).limits[1] == "pixels with more than 10 surfaces are marked invalid"
+        plan(scene(body(mesh=OPEN)), tl.KBuffer(10)).limits[1]
+        == "pixels whose rays cross more than 10 surfaces are marked as invalid"
     )
 
 
 def test_peeling_that_the_planner_picks_tells_its_limit() -> None:
     assert plan(scene(body(mesh=TORUS), overlap="union"), None, NO_STORAGE).limits == (
-        "pixels with more than 64 surfaces are marked invalid",
+        "pixels whose rays cross more than 64 surfaces are marked as invalid",
     )
     assert plan(scene(body(), body(WINE), overlap="union"), None, NO_STORAGE).exact
 

@@ -118,7 +118,7 @@ def test_frosted_and_matched_bodies_leave_no_light_out() -> None:
             "a sheet that is rough",
         ),
         ([body(tl.Medium(), sheet_thickness=0.1, surface=Surface(opacity=0.5))], {}, "partly transparent layers"),
-        ([body()], {"ambient": (1, 1, 1)}, "PathTraced with ambient radiance; .* leave ambient out"),
+        ([body()], {"ambient": (1, 1, 1)}, "PathTraced with ambient radiance; .* omit the ambient radiance"),
     ],
 )
 def test_what_paths_cannot_follow_is_refused(objects: list[tl.Object], options: dict[str, Any], message: str) -> None:
@@ -127,11 +127,11 @@ def test_what_paths_cannot_follow_is_refused(objects: list[tl.Object], options: 
 
 
 def test_what_paths_take_the_place_of_cannot_be_asked_for() -> None:
-    with pytest.raises(tl.InputError, match=r"interfaces=TracedInterfaces\(.*; random paths replace interfaces"):
+    with pytest.raises(tl.InputError, match=r"interfaces=TracedInterfaces\(.*; path tracing replaces interfaces"):
         plan(scene(), METHOD, interfaces=tl.TracedInterfaces())
-    with pytest.raises(tl.InputError, match=r"scattering=Diffusion\(.*; random paths replace scattering"):
+    with pytest.raises(tl.InputError, match=r"scattering=Diffusion\(.*; path tracing replaces scattering"):
         plan(scene(), METHOD, scattering=tl.Diffusion())
-    with pytest.raises(tl.InputError, match=r"before a backdrop; .* no mesh that a path could meet"):
+    with pytest.raises(tl.InputError, match=r"in front of a backdrop; .* no mesh that a path could meet"):
         plan_over_backdrop(scene(), METHOD)
     with pytest.raises(tl.InputError, match=r"works on the CPU; use tl\.reference\.path_trace\(scene, size, paths\)"):
         plan(scene(), METHOD, tl.Capabilities(opengl=False))
@@ -139,7 +139,10 @@ def test_what_paths_take_the_place_of_cannot_be_asked_for() -> None:
 
 @pytest.mark.parametrize("paths", [1, 0, -3, (1 << 20) + 1, 2.0, True, "8", None])
 def test_paths_are_counted_in_whole_numbers(paths: Any) -> None:
-    with pytest.raises(tl.InputError, match=r"PathTraced paths .* not a whole number in 2 to 1048576; give"):
+    with pytest.raises(
+        tl.InputError,
+        match=r"PathTraced paths .* the value must be a whole number in 2 to 1048576; use a value such as",
+    ):
         tl.PathTraced(paths)
 
 
@@ -162,7 +165,7 @@ def test_embree_finds_hits_where_opengl_draws_on_processors_and_nothing_scatters
 
 
 def test_hits_that_are_no_choice_are_refused() -> None:
-    with pytest.raises(tl.InputError, match="PathTraced hits 'optix'; not a known one"):
+    with pytest.raises(tl.InputError, match="PathTraced hits 'optix'; no ray caster has this name"):
         tl.PathTraced(hits="optix")
     with pytest.raises(tl.InputError, match="no compute shaders"):
         plan(scene(body(CLEAR)), replace(METHOD, hits="embree"), tl.Capabilities(shader_storage=False))

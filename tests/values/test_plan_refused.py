@@ -14,13 +14,18 @@ from translucent.planning.plan import plan
 
 @pytest.mark.parametrize("method", ["RayMarched", "signed-depth", tl.ThinLayer, 3])
 def test_what_is_no_method_is_refused(method: Any) -> None:
-    with pytest.raises(tl.InputError, match=r"^method .*; not a thickness method; give for example tl.SignedDepth\(\)"):
+    with pytest.raises(
+        tl.InputError, match=r"^method .*; the value must be a thickness method; give for example tl.SignedDepth\(\)"
+    ):
         plan(scene(body()), method)
 
 
 @pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.BackFaceDepth(), tl.ThinLayer(), *ORDERED])
 def test_a_scene_of_opaque_objects_is_refused(method: Any) -> None:
-    message = "rendering 'box', 'torus'; nothing there has a medium; give an object one: medium=tl.Medium(...)"
+    message = (
+        "rendering 'box', 'torus'; none of these objects has a medium; "
+        "give at least one object a medium: medium=tl.Medium(...)"
+    )
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
         plan(scene(body(None), body(None, TORUS)), method)
 
@@ -61,16 +66,21 @@ def test_sheets_of_several_media_that_emit_are_refused(method: Any) -> None:
             [body(), body(WINE)],
             {},
             tl.BackFaceDepth(),
-            "BackFaceDepth; bodies with different media; use SignedDepth, which tells them apart",
+            "BackFaceDepth; the bodies have different media; use SignedDepth, which supports several media",
         ),
         (
             [body(), sheet(mesh=TORUS)],
             {},
             tl.BackFaceDepth(),
-            "BackFaceDepth; 'torus' declared a sheet; use SignedDepth or ThinLayer",
+            "BackFaceDepth; 'torus' declared as a thin-walled sheet; use SignedDepth or ThinLayer",
         ),
         *(
-            ([sheet()], {}, method, f"{type(method).__name__}; all bodies are declared sheets, which have no inside; u")
+            (
+                [sheet()],
+                {},
+                method,
+                f"{type(method).__name__}; all bodies are declared as thin-walled sheets, which have no inside; u",
+            )
             for method in ORDERED
         ),
     ],

@@ -289,7 +289,7 @@ def test_the_list_is_the_callers_own() -> None:
 
 @pytest.mark.parametrize("name", ["unobtainium", "", "&"])
 def test_an_unknown_name_without_a_like_gives_some(name: str) -> None:
-    message = f"preset {name!r}; not a known preset; use one of marble, skim_milk, merlot, honey, jade and 65 more"
+    message = f"preset {name!r}; no preset has this name; use one of marble, skim_milk, merlot, honey, jade and 65 more"
     with pytest.raises(tl.InputError, match=re.escape(message)):
         tl.preset(name)
 
@@ -305,7 +305,9 @@ def test_an_unknown_name_without_a_like_gives_some(name: str) -> None:
     ],
 )
 def test_an_unknown_name_gives_what_it_may_mean(name: str, guess: str) -> None:
-    with pytest.raises(tl.InputError, match=re.escape(f"preset {name!r}; not a known preset; did you mean {guess}")):
+    with pytest.raises(
+        tl.InputError, match=re.escape(f"preset {name!r}; no preset has this name; did you mean {guess}")
+    ):
         tl.preset(name)
 
 

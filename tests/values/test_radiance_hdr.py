@@ -166,5 +166,5 @@ def test_an_environment_is_read_from_it(tmp_path: Path) -> None:
 
 
 def test_no_file_is_said_to_be_missing(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match="no such file; check the path"):
+    with pytest.raises(tl.InputError, match="no file has this path; check the path"):
         read_radiance(tmp_path / "none.hdr")

@@ -67,7 +67,7 @@ def test_bodies_in_which_light_cannot_diffuse_are_layers(what: tl.Object, why: s
         assert (found.treated(Treatment.DIFFUSION), found.treated(Treatment.LAYER)) == ((), (0,))
         (note,) = (note for note in found.unmodelled if note.kind is NoteKind.LAYER_INSTEAD)
         assert str(note).startswith(f"diffusion in {what.mesh.name!r}: {why}")
-        assert str(note).endswith("; shown as layers")
+        assert str(note).endswith("; these bodies are rendered as flat layers")
         assert found.says(NoteKind.SPREAD_INSIDE)
         assert not found.says(NoteKind.DIFFUSED_LIGHT)
 
@@ -195,12 +195,13 @@ def test_what_is_no_choice_of_scattering_is_refused(asked: Any) -> None:
 @pytest.mark.parametrize(
     ("resolution", "message"),
     [
-        (4, "Diffusion resolution 4; not a whole number in 8 to 128; give for example 32"),
-        (8.5, "Diffusion resolution 8.5; not a whole number in 8 to 128; give for example 32"),
+        (4, "Diffusion resolution 4; the value must be a whole number in 8 to 128; use a value such as 32"),
+        (8.5, "Diffusion resolution 8.5; the value must be a whole number in 8 to 128; use a value such as 32"),
         (
             512,
-            "Diffusion resolution 512; a body would have 3.4e+07 cells and take about 134 GB; give at most 128; 32 is "
-            "enough where scattering dominates",
+            "Diffusion resolution 512; at this resolution, a body would have 3.4e+07 cells "
+            "and take about 134 GB of memory; "
+            "use at most 128; 32 is enough for media that mainly scatter",
         ),
     ],
 )
@@ -211,7 +212,7 @@ def test_resolutions_out_of_reach_are_refused(resolution: Any, message: str) -> 
 
 def test_layers_of_varying_density_are_refused() -> None:
     cloud = body(tl.Medium(scattering=5.0, ior=1.4), density=VARYING)
-    message = "ScatteringLayer(); 'box': its density varies; use SingleScattering()"
+    message = "ScatteringLayer(); 'box': its density varies; use SingleScattering() instead"
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
         plan(scene(cloud), scattering=tl.ScatteringLayer())
     # Beside another body, which can be a layer, it is what it is.

@@ -38,11 +38,11 @@ def test_a_color_at_a_distance_is_that_of_a_solid() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: tl.showcase(BOX, "#ace5c9"), "a color without a distance; give the metres after which"),
+        (lambda: tl.showcase(BOX, "#ace5c9"), "a color needs a distance; give the metres after which"),
         (lambda: tl.showcase(BOX, "waxx"), "did you mean wax"),
         (lambda: tl.showcase(BOX, tl.preset("wax"), distance=0.25), "a Preset, and no color"),
         (lambda: tl.Object(BOX, tl.Medium(), material="wax"), "a medium is given, too"),
-        (lambda: tl.Object(BOX, material="salmon pink"), "not a known preset"),
+        (lambda: tl.Object(BOX, material="salmon pink"), "no preset has this name"),
     ],
 )
 def test_what_is_no_material_is_refused(make: Callable[[], object], message: str) -> None:

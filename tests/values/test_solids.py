@@ -431,7 +431,7 @@ def test_rotation_about_z_changes_no_solid_of_revolution(point, angle, turn) -> 
     ],
 )
 def test_impossible_measures_are_refused(make: Callable[[], Solid]) -> None:
-    with pytest.raises(InputError, match="do not make a solid"):
+    with pytest.raises(InputError, match="these dimensions do not describe a solid"):
         make()
 
 
@@ -440,7 +440,7 @@ def test_directions_must_be_unit_and_resolution_enough() -> None:
         Sphere().chord([0, 0, 0], [0, 0, 2])
     with pytest.raises(InputError, match="unit length"):
         Sphere().chord([0, 0, 0], [0, 0, np.nan])
-    with pytest.raises(InputError, match="give 3 or more"):
+    with pytest.raises(InputError, match="use 3 points and 3 segments, or more"):
         Frustum().tessellate(2)
-    with pytest.raises(InputError, match="give 3 or more"):
+    with pytest.raises(InputError, match="use 3 points and 3 segments, or more"):
         revolve([[1.0, 0.0]], 8)

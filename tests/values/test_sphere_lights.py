@@ -65,12 +65,12 @@ def test_a_sphere_moves_with_its_scene() -> None:
 @pytest.mark.parametrize(
     ("radius", "message"),
     [
-        (0.0, "light with radius 0.0; not above 0 and up to"),
-        (-1.0, "light with radius -1.0; not above 0"),
-        (np.nan, "light with radius nan; not above 0"),
-        (1e30, "light with radius 1e+30; not above 0 and up to"),
-        ("wide", "light with radius 'wide'; not above 0"),
-        (True, "light with radius True; not above 0"),
+        (0.0, "light with radius 0.0; the radius must be above 0 and at most"),
+        (-1.0, "light with radius -1.0; the radius must be above 0 and at most"),
+        (np.nan, "light with radius nan; the radius must be above 0 and at most"),
+        (1e30, "light with radius 1e+30; the radius must be above 0 and at most"),
+        ("wide", "light with radius 'wide'; the radius must be above 0 and at most"),
+        (True, "light with radius True; the radius must be above 0 and at most"),
     ],
 )
 def test_radii_that_are_none(radius: Any, message: str) -> None:

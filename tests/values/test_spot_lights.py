@@ -111,17 +111,35 @@ def test_a_spot_holds_a_unit_direction_and_read_only_arrays() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: tl.SpotLight((0, 0), DOWN, 1), "light position (0, 0); not three finite numbers"),
-        (lambda: tl.SpotLight((0, 0, 0), (0, 0, 0), 1), "light direction; its length is 0"),
-        (lambda: tl.SpotLight((0, 0, 0), "down", 1), "light direction 'down'; not three finite numbers"),
-        (lambda: tl.SpotLight((0, 0, 0), DOWN, -1), "light intensity (-1.0, -1.0, -1.0); not in 0 to 1e+18"),
-        (lambda: tl.SpotLight((0, 0, 0), DOWN, 1, -1), "light with inner_cone -1; not 0 to 90; give the half angle"),
-        (lambda: tl.SpotLight((0, 0, 0), DOWN, 1, 0, 91), "light with outer_cone 91; not 0 to 90"),
-        (lambda: tl.SpotLight((0, 0, 0), DOWN, 1, 0, math.nan), "light with outer_cone nan; not 0 to 90"),
-        (lambda: tl.SpotLight((0, 0, 0), DOWN, 1, "narrow"), "light with inner_cone 'narrow'; not 0 to 90"),  # type: ignore[arg-type]
+        (lambda: tl.SpotLight((0, 0), DOWN, 1), "light position (0, 0); the value must be three finite numbers"),
+        (lambda: tl.SpotLight((0, 0, 0), (0, 0, 0), 1), "light direction; the direction has the length 0"),
+        (lambda: tl.SpotLight((0, 0, 0), "down", 1), "light direction 'down'; the value must be three finite numbers"),
+        (
+            lambda: tl.SpotLight((0, 0, 0), DOWN, -1),
+            "light intensity (-1.0, -1.0, -1.0); the value must lie in 0 to 1e+18",
+        ),
+        (
+            lambda: tl.SpotLight((0, 0, 0), DOWN, 1, -1),
+            "light with inner_cone -1; the angle must lie in 0 to 90; give the half angle",
+        ),
+        (lambda: tl.SpotLight((0, 0, 0), DOWN, 1, 0, 91), "light with outer_cone 91; the angle must lie in 0 to 90"),
+        (
+            lambda: tl.SpotLight((0, 0, 0), DOWN, 1, 0, math.nan),
+            "light with outer_cone nan; the angle must lie in 0 to 90",
+        ),
+        (
+            lambda: tl.SpotLight((0, 0, 0), DOWN, 1, "narrow"),
+            "light with inner_cone 'narrow'; the angle must lie in 0 to 90",
+        ),  # type: ignore[arg-type]
         (lambda: tl.SpotLight((0, 0, 0), DOWN, 1, 30, 30), "light with inner_cone 30 and outer_cone 30 degrees; the"),
-        (lambda: tl.SpotLight((0, 0, 0), DOWN, 1, 50), "inner_cone 50 and outer_cone 45 degrees; the inner is not be"),
-        (lambda: tl.SpotLight((0, 0, 0), DOWN, 1, 0, 1e-4), "outer_cone 0.0001 degrees; the inner is not below the o"),
+        (
+            lambda: tl.SpotLight((0, 0, 0), DOWN, 1, 50),
+            "inner_cone 50 and outer_cone 45 degrees; the inner cone must be smaller than the outer cone, and the",
+        ),
+        (
+            lambda: tl.SpotLight((0, 0, 0), DOWN, 1, 0, 1e-4),
+            "outer_cone 0.0001 degrees; the inner cone must be smaller than the outer cone, and the outer cone at",
+        ),
     ],
 )
 def test_there_is_no_such_spot(make: Callable[[], object], message: str) -> None:

@@ -44,7 +44,7 @@ def placed(scale=1.0, turn=0.0, move=(0.0, 0.0, 0.0), mesh=BOX, **more):
 def test_stages_have_names():
     assert DEFAULT_STAGE in STAGES
     assert stage_named(NO_STAGE) is None
-    with pytest.raises(tl.InputError, match=r"stage 'studoi'; no such stage; did you mean studio\?"):
+    with pytest.raises(tl.InputError, match=r"stage 'studoi'; no stage has this name; did you mean studio\?"):
         stage_named("studoi")
 
 
@@ -187,16 +187,16 @@ def test_a_page_is_white_where_nothing_shadows_it(name):
 
 def test_light_has_to_fall_evenly_on_a_shadow_catcher():
     ball = tl.Object(Sphere().tessellate(8), shadow_catcher=True)
-    with pytest.raises(tl.InputError, match="it is not flat"):
+    with pytest.raises(tl.InputError, match="the mesh of the shadow catcher is not flat"):
         page_radiance(tl.Scene([ball], CAMERA))
     flat = tl.Object(tl.Mesh([[0, 0, 0], [0, 0, 1], [1, 0, 0]], [[0, 1, 2]]), shadow_catcher=True)
     scene = tl.Scene([flat], CAMERA)
     assert page_radiance(scene) == 1
-    with pytest.raises(tl.InputError, match="a light falls unevenly on it"):
+    with pytest.raises(tl.InputError, match="a light illuminates the shadow catcher unevenly"):
         page_radiance(dataclasses.replace(scene, lights=[tl.PointLight((0, 1, 0), 1.0)]))
     with pytest.raises(tl.InputError, match="no light of one of the colors"):
         page_radiance(dataclasses.replace(scene, environment=tl.Environment.constant((1, 1, 0))))
-    with pytest.raises(tl.InputError, match="a medium fills it"):
+    with pytest.raises(tl.InputError, match="a medium fills the object, but a shadow catcher must be opaque"):
         tl.Object(BOX, GLASS, shadow_catcher=True)
 
 
@@ -225,7 +225,7 @@ def test_several_bodies_are_framed_for_a_stage():
 
 
 def test_a_scene_on_a_stage_gets_no_second_one() -> None:
-    with pytest.raises(tl.InputError, match="it has a ground that catches shadows; make it without one"):
+    with pytest.raises(tl.InputError, match="the scene already has a ground that catches shadows; make it without one"):
         tl.staged(showcase(BOX, GLASS, SIZE), "night")
 
 

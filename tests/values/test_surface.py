@@ -16,19 +16,25 @@ PICTURE = np.arange(24, dtype=np.float64).reshape(2, 4, 3) / 24
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"roughness": 1.01}, "surface roughness 1.01; not in 0 to 1"),
-        ({"roughness": float("nan")}, "surface roughness nan; not in 0 to 1"),
-        ({"metallic": -0.1}, "surface metallic -0.1; not in 0 to 1"),
-        ({"ior": 0.9}, "surface ior 0.9; not in 1 to 100"),
-        ({"alpha_cutoff": 2}, "surface alpha_cutoff 2; not in 0 to 1"),
-        ({"dispersion": 11}, "surface dispersion 11; not in 0 to 10"),
-        ({"iridescence_thickness": 400}, "surface iridescence_thickness 400; not in 0 to 0.0001"),  # nm
-        ({"iridescence_ior": 0.9}, "surface iridescence_ior 0.9; not in 1 to 100"),
-        ({"clearcoat": 1.5}, "surface clearcoat 1.5; not in 0 to 1"),
+        ({"roughness": 1.01}, "surface roughness 1.01; the value must lie in 0 to 1"),
+        ({"roughness": float("nan")}, "surface roughness nan; the value must lie in 0 to 1"),
+        ({"metallic": -0.1}, "surface metallic -0.1; the value must lie in 0 to 1"),
+        ({"ior": 0.9}, "surface ior 0.9; the value must lie in 1 to 100"),
+        ({"alpha_cutoff": 2}, "surface alpha_cutoff 2; the value must lie in 0 to 1"),
+        ({"dispersion": 11}, "surface dispersion 11; the value must lie in 0 to 10"),
+        (
+            {"iridescence_thickness": 400},
+            r"surface iridescence_thickness 400; the value must lie in 0 to 0\.0001",
+        ),  # nm
+        ({"iridescence_ior": 0.9}, "surface iridescence_ior 0.9; the value must lie in 1 to 100"),
+        ({"clearcoat": 1.5}, "surface clearcoat 1.5; the value must lie in 0 to 1"),
         ({"color": (1, 2, 0)}, r"surface color \(1, 2, 0\); not three numbers in 0 to 1"),
         ({"emissive": (-1, 0, 0)}, r"surface emissive \(-1, 0, 0\); not three numbers in 0 to 1e\+18"),
         ({"emissive": "glow"}, "'glow'"),
-        ({"emissive_texture": PICTURE}, "surface emissive_texture; of type ndarray; use tl.Texture"),
+        (
+            {"emissive_texture": PICTURE},
+            r"surface emissive_texture; a texture cannot have the type ndarray; use a tl\.Texture",
+        ),
     ],
 )
 def test_a_surface_out_of_range_is_refused(fields: dict[str, Any], message: str) -> None:
@@ -45,20 +51,25 @@ def test_the_color_of_an_opaque_object_is_that_of_its_surface() -> None:
 
 def test_textures_need_coordinates() -> None:
     bare = tl.Mesh(SQUARE.vertices, SQUARE.faces)
-    with pytest.raises(tl.InputError, match="textures, and the mesh no texture coordinates; unwrap it"):
+    with pytest.raises(
+        tl.InputError, match="the surface has textures, but the mesh has no texture coordinates; unwrap the mesh"
+    ):
         tl.Object(bare, surface=tl.Surface(emissive_texture=tl.Texture(PICTURE)))
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((PICTURE[..., :2],), r"pixels of shape \(2, 4, 2\)"),
-        ((PICTURE * 2,), "numbers are not in 0 to 1"),
-        ((PICTURE * np.nan,), "24 numbers are not in 0 to 1"),
-        (("red",), "its pixels are not numbers"),
+        ((PICTURE[..., :2],), r"the pixels have the shape \(2, 4, 2\)"),
+        ((PICTURE * 2,), "numbers of the pixels are outside 0 to 1"),
+        ((PICTURE * np.nan,), "24 numbers of the pixels are outside 0 to 1"),
+        (("red",), "the pixels are not numbers"),
         ((PICTURE, (1, 2, 3)), "texture scale"),
-        ((PICTURE, (1, 1), (0, 0), float("inf")), "texture rotation inf; not finite"),
-        ((PICTURE, (1, 1), (0, 0), 0.0, ("repeat", "mirror")), "texture wrap .* not two of repeat and clamp"),
+        ((PICTURE, (1, 1), (0, 0), float("inf")), "texture rotation inf; the rotation must be finite"),
+        (
+            (PICTURE, (1, 1), (0, 0), 0.0, ("repeat", "mirror")),
+            "texture wrap .* the value must be two of the words repeat and clamp",
+        ),
     ],
 )
 def test_a_texture_that_is_none_is_refused(arguments: tuple[Any, ...], message: str) -> None:

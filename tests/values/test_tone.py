@@ -80,5 +80,7 @@ def test_agx_fades_bright_colors_to_white() -> None:
 
 
 def test_an_unknown_curve_is_refused() -> None:
-    with pytest.raises(tl.InputError, match="tone 'filmic'; not a known tone curve; use one of none, neutral, agx"):
+    with pytest.raises(
+        tl.InputError, match="tone 'filmic'; no tone curve has this name; use one of none, neutral, agx"
+    ):
         tone_curve("filmic")

@@ -77,5 +77,7 @@ def test_an_orthographic_camera_stays() -> None:
 
 @pytest.mark.parametrize("count", [1, 0, -3, 2.5, None])
 def test_a_count_that_is_none_is_refused(count: object) -> None:
-    with pytest.raises(tl.InputError, match=r"turntable of .* pictures; not a whole number above 1"):
+    with pytest.raises(
+        tl.InputError, match=r"turntable of .* pictures; the number of pictures must be a whole number above 1"
+    ):
         next(turntable(scene(), count))  # type: ignore[arg-type]

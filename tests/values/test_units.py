@@ -21,7 +21,9 @@ def test_a_unit_in_metres(unit: str, metres: float) -> None:
 
 @pytest.mark.parametrize("unit", ["parsec", "", "M", "m m"])
 def test_an_unknown_unit_names_the_known_ones(unit: str) -> None:
-    with pytest.raises(InputError, match=re.escape(f"unit {unit!r}; not a known unit of length; use one of um, mm")):
+    with pytest.raises(
+        InputError, match=re.escape(f"unit {unit!r}; no unit of length has this name; use one of um, mm")
+    ):
         metres_per_unit(unit)
     assert unit not in METRES_PER_UNIT
 
@@ -51,20 +53,20 @@ def test_a_bare_number_takes_the_default_unit_and_a_written_unit_wins() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "length ''; not a number with a unit"),
+        ("", "length ''; the text is not a number with a unit"),
         ("cm", "not a number with a unit"),
         ("abc", "not a number with a unit"),
         ("1,5cm", "not a number with a unit"),
         ("1cm2", "not a number with a unit"),
         ("0x10", "not a number with a unit"),
-        ("0", "length '0'; not positive and finite"),
-        ("-1cm", "not positive and finite"),
-        ("nan", "not positive and finite"),
-        ("inf", "not positive and finite"),
-        ("-inf cm", "not positive and finite"),
-        ("1e400", "not positive and finite"),
-        ("1e-330", "not positive and finite"),
-        ("3 furlong", "unit 'furlong'; not a known unit"),
+        ("0", "length '0'; the length must be positive and finite"),
+        ("-1cm", "the length must be positive and finite"),
+        ("nan", "the length must be positive and finite"),
+        ("inf", "the length must be positive and finite"),
+        ("-inf cm", "the length must be positive and finite"),
+        ("1e400", "the length must be positive and finite"),
+        ("1e-330", "the length must be positive and finite"),
+        ("3 furlong", "unit 'furlong'; no unit of length has this name"),
     ],
 )
 def test_what_is_no_length_is_refused(text: str, message: str) -> None:

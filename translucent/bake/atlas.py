@@ -100,7 +100,7 @@ def _new_uv(mesh: Mesh, size: int) -> tuple[Mesh, Integers]:
     mesh.require_finite()
     one, two, three = mesh.vertices[mesh.faces].transpose(1, 0, 2)
     if not np.cross(two - one, three - one).any():
-        raise InputError(f"mesh {mesh.name!r}", "no face has an area", "export the mesh again")
+        raise InputError(f"mesh {mesh.name!r}", "no face of the mesh has an area", "export the mesh again")
     unit = ((mesh.vertices - mesh.center) / (0.5 * mesh.diagonal)).astype(np.float32)
     gap = max(1, min(CHART_GAP, round(GAP_SHARE * size)))
     atlas, options = xatlas.Atlas(), xatlas.PackOptions()
@@ -124,13 +124,13 @@ def _check(mesh: Mesh, uv: Array) -> None:
         face = int(span.max(axis=1).argmax())
         raise InputError(
             f"mesh {mesh.name!r}",
-            f"face {face} covers {span.max():.3g} tiles in UV: a texture repeats on it",
+            f"face {face} covers {span.max():.3g} tiles in UV space, so the map repeats on this face",
             ANEW,
         )
     a, b = two - one, three - one
     with np.errstate(under="ignore"):
         if not (a[:, 0] * b[:, 1] != a[:, 1] * b[:, 0]).any():
-            raise InputError(f"mesh {mesh.name!r}", "no face has an area in UV", ANEW)
+            raise InputError(f"mesh {mesh.name!r}", "no face of the mesh has an area in UV space", ANEW)
 
 
 def _tiles(uv: Array) -> tuple[Integers, npt.NDArray[np.bool_]]:
@@ -149,7 +149,9 @@ def _doubts(
     listed = ", ".join(map(str, tiles))
     if tile is not None:
         if tile not in tiles:
-            raise InputError(f"UDIM tile {tile}", f"mesh {mesh.name!r} has faces in {listed}", "ask for one of these")
+            raise InputError(
+                f"UDIM tile {tile}", f"mesh {mesh.name!r} has faces in {listed}", "choose one of these tiles"
+            )
         return ()
     if len(tiles) > 1 and 0 not in tiles and not crossing.any():
         text = f"the texture coordinates use the UDIM tiles {listed}, which one map lays over one another"

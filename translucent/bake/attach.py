@@ -68,7 +68,7 @@ def attach(
     parts = None if is_scene(mesh) else foreign_parts(mesh)
     if parts is None or held is None:
         do = "give a trimesh.Trimesh or a pyvista.PolyData, for example scene.geometry['name']"
-        raise InputError(f"attach to {brief(mesh)}", "it holds no arrays for the vertices of one mesh", do)
+        raise InputError(f"attach to {brief(mesh)}", "the result holds no values for the vertices of a single mesh", do)
     points, used = parts[0][0] * unit_of(mesh, unit)[0], np.unique(parts[0][1]).astype(np.int64)
     if isinstance(result, Frame):
         values = _of_frame(points, used, result, quantity, foreign_name(mesh))
@@ -96,12 +96,20 @@ def _places(points: Array, used: Integers, mesh: Mesh) -> tuple[Integers, int]:
 
 def _strange(name: str, missing: int, count: int, what: str) -> InputError:
     found = f"{missing} of its {count} vertices are not those of {what}"
-    return InputError(f"attach to {name!r}", found, "attach to the unchanged mesh, and give its unit=")
+    return InputError(
+        f"attach to {name!r}",
+        found,
+        ("attach to the same mesh that was baked or rendered, and state its unit with unit="),
+    )
 
 
 def _of_frame(points: Array, used: Integers, frame: Frame, quantity: str, name: str) -> Array:
     if frame.scene is None:
-        raise InputError("attach a frame", "it holds no scene", "attach one that renderer.render(scene, size) returned")
+        raise InputError(
+            "attach a frame",
+            "the frame holds no scene, so pixels cannot be assigned to vertices",
+            "attach a frame that renderer.render(scene, size) returned",
+        )
     strangers: dict[str, int] = {}
     for item in frame.scene.objects:
         at, missing = _places(points, used, item.mesh)

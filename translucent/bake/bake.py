@@ -123,9 +123,17 @@ def bake_thickness(
 
 def _check_high(high: Mesh | None, cage: Mesh | None, high_distance: float | None) -> None:
     if high is None and (cage is not None or high_distance is not None):
-        raise InputError("a cage or a ray distance", "no high mesh", "give high=, or leave them out")
+        raise InputError(
+            "a cage or a ray distance is set",
+            "no detailed mesh (high) is given",
+            "give the detailed mesh with high=, or omit cage and ray distance",
+        )
     if cage is not None and high_distance is not None:
-        raise InputError("a cage and a ray distance", "both say where the high mesh is", "give one of them")
+        raise InputError(
+            "both a cage and a ray distance are set",
+            "each of them determines where rays search for the detailed mesh",
+            "give only one of the two",
+        )
 
 
 def _strips(mesh: Mesh, unwrapped: Unwrapped, settings: BakeSettings, high: Mesh | None, cage: Mesh | None) -> Strips:
@@ -185,7 +193,9 @@ def bake_vertex_thickness(
     """
     started = time.perf_counter()
     if wrong := sorted(set(_OF_MAPS) & set(given)):
-        raise InputError("thickness per vertex", f"{wrong[0]} is of maps", "leave it out")
+        raise InputError(
+            "thickness is baked per vertex", f"{wrong[0]} applies only to thickness maps", "omit this setting"
+        )
     settings = dataclasses.replace(settings_from(settings, "mode", given), **_OF_MAPS)
     threads = check_threads(threads)
     surface = PreparedMesh.of(mesh)
@@ -244,7 +254,11 @@ def check_threads(threads: Any) -> int:
     if threads is None:
         return processors()
     if not (hasattr(threads, "__index__") and threads >= 1):
-        raise InputError(f"threads {threads!r}", "not a whole number above 0", "leave it out to use all processors")
+        raise InputError(
+            f"threads {threads!r}",
+            "the number of threads must be a whole number above 0",
+            "omit the setting to use all processors",
+        )
     return int(threads)
 
 

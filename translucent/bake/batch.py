@@ -167,9 +167,13 @@ def bake_many(
         other = outputs.setdefault(str(job.get("output")).casefold(), job)
         if other is not job:
             both = f"{other.get('model')!r} and {job.get('model')!r}"
-            raise InputError(f"output {job.get('output')!r}", f"it is the output of {both}", "rename one of them")
+            raise InputError(
+                f"output {job.get('output')!r}",
+                f"this file would also be the output of {both}",
+                "give each output a different name",
+            )
     if workers is not None and workers < 1:
-        raise InputError(f"{workers} processes", "below 1", "give 1 or more")
+        raise InputError(f"{workers} worker processes", "the number must be at least 1", "give 1 or more")
     for job in given:
         check_job(job)
     started = time.perf_counter()
@@ -448,12 +452,20 @@ def bake_tiles(job: Job, progress: Progress | None = None) -> tuple[Record, Resu
     """
     check_job({**job, "output": _tile_path(job, 1001)})
     if job.get("settings", {}).get("tile") is not None:
-        raise InputError(f"output {job['output']!r}", "--tile is given, too", "give one of the two")
+        raise InputError(
+            f"output {job['output']!r}",
+            "--tile bakes one tile, but <UDIM> in the name bakes all tiles",
+            "use only one of the two",
+        )
     parts = _tiled_parts(job)
     tiles = sorted({tile for mesh, _, _ in parts for tile in tiles_of(mesh)} - {0})
     if not tiles:
         found = "its texture coordinates are in no tile from 1001 on"
-        raise InputError(f"output {job['output']!r}", found, "leave out <UDIM>, or unwrap the model into tiles")
+        raise InputError(
+            f"output {job['output']!r}",
+            found,
+            ("the model has no UDIM tiles: remove <UDIM> from the name, or unwrap the model into tiles"),
+        )
     results: Results = {}
     rays = 0
     for number, tile in enumerate(tiles):
@@ -490,7 +502,9 @@ def _tiled_parts(job: Job) -> list[tuple[Mesh, Medium | None, Mesh | None]]:
         mesh = load_mesh(job["model"], unit=unit, allow_outside=outside)
         if mesh.uv is None:
             raise InputError(
-                f"output {job['output']!r}", f"{mesh.name!r} has no texture coordinates", "leave out <UDIM>"
+                f"output {job['output']!r}",
+                f"mesh {mesh.name!r} has no texture coordinates, so it has no UDIM tiles",
+                "remove <UDIM> from the name",
             )
         return [(mesh, None, None)]
     builder = GlbBuilder(read_gltf(job["model"], outside))

@@ -232,7 +232,11 @@ def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | Non
         If the mesh has no uv.
     """
     if mesh.uv is None:
-        raise InputError(f"mesh {mesh.name!r}", "it has no uv", "bake a map first; its mesh has them")
+        raise InputError(
+            f"mesh {mesh.name!r}",
+            "the mesh has no texture coordinates",
+            "bake a map first, and check the mesh of the bake, which has texture coordinates",
+        )
     visible = first_hits(mesh, camera, size, body)
     found = np.full((len(visible.hit), 2), np.nan)
     found[visible.hit] = blend(mesh.uv[mesh.faces[visible.face]], visible.weights)
@@ -306,7 +310,7 @@ def require_uv_of(corners: Corners, mesh: Mesh, path: Path) -> None:
     positions, uv = corners
     requested = f"check of the map of {mesh.name!r}"
     if uv is None:
-        raise RenderError(requested, f"{str(path)!r} has no texture coordinates", "bake it again with --unwrap")
+        raise RenderError(requested, f"{str(path)!r} has no texture coordinates", "bake the map again with --unwrap")
     assert mesh.uv is not None
     with np.errstate(under="ignore"):
         known = cKDTree(np.column_stack([(positions - mesh.center) / mesh.diagonal, uv]))
@@ -316,7 +320,9 @@ def require_uv_of(corners: Corners, mesh: Mesh, path: Path) -> None:
     others = float(np.mean(distance > SAME))
     if others > MOST_OTHERS:
         found = f"{others:.0%} of its vertices have other texture coordinates in {str(path)!r}"
-        raise RenderError(requested, found, "the map does not belong to that file; bake it again with --unwrap")
+        raise RenderError(
+            requested, found, "the thickness map was not baked for this file; bake it again with --unwrap"
+        )
 
 
 def own_corners(file: GltfFile, part: Record, metres: float, material: GltfMaterial | None = None) -> Corners:
@@ -397,7 +403,11 @@ def check_output(job: Job, record: Record, results: Results) -> Checks:
     inside_file = path.suffix.lower() == ".glb"
     found = (_check_glb if inside_file else _check_maps)(job, record, results, medium)
     if not any(found.values()):
-        raise InputError(f"check of {str(path)!r}", "no visible surface has a map", "give a model with an inside")
+        raise InputError(
+            f"check of {str(path)!r}",
+            "no visible surface of the model has a thickness map",
+            "check a model whose material lets light in",
+        )
     return found
 
 

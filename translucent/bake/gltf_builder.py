@@ -133,7 +133,9 @@ class GlbBuilder:
         """Declare an extension that the file uses."""
         used = self.tree.setdefault("extensionsUsed", [])
         if not isinstance(used, list):
-            raise InputError(f"glTF {str(self._path)!r}", f"extensionsUsed is {used!r}, not a list", "mend the file")
+            raise InputError(
+                f"glTF {str(self._path)!r}", f"extensionsUsed is {used!r}, not a list", "correct the glTF file"
+            )
         if name not in used:
             used.append(name)
 
@@ -265,7 +267,9 @@ def mesh_file(mesh: Mesh) -> GltfFile:
     """
     vertex, faces, normals = _split_at_edges(mesh)
     if np.abs(mesh.vertices).max() > np.finfo(np.float32).max:
-        raise InputError(f"mesh {mesh.name!r}", "coordinates beyond float32, which glTF has", "scale the mesh")
+        raise InputError(
+            f"mesh {mesh.name!r}", "some coordinates are too large for the float32 numbers of glTF", "scale the mesh"
+        )
     tree: Json = {
         "asset": {"version": "2.0", "generator": "translucent"},
         "scene": 0,

@@ -375,13 +375,19 @@ def add_uv(builder: GlbBuilder, key: PrimitiveKey, size: int) -> int:
     accessors, name = Accessors(file), primitive_name(file, key)
     requested = f"new UVs for {name!r} of {str(file.path)!r}"
     if primitive.get("mode", 4) != 4:
-        raise InputError(requested, "it is a strip or fan", "export it as a list of triangles, or with UVs")
+        raise InputError(
+            requested,
+            "the primitive is a triangle strip or fan",
+            "export the primitive as a list of triangles, or with UVs",
+        )
     if COMPRESSIONS[0] in primitive.get("extensions", {}):
-        raise InputError(requested, "its vertices are compressed", "export it without compression")
+        raise InputError(
+            requested, "the vertices of the primitive are compressed", "export the file without mesh compression"
+        )
     positions = accessors.vectors(primitive["attributes"].get("POSITION"), "VEC3")
     corners = accessors.indices(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
     if len(corners) % 3 or corners.max(initial=0) >= len(positions):
-        raise InputError(requested, "its indices make no triangles", "export the file again")
+        raise InputError(requested, "the indices of the primitive do not form triangles", "export the file again")
     made = unwrap(Mesh(positions, corners.reshape(-1, 3).astype(np.int32), name=name), size, None)
     assert made.mesh.uv is not None
     for holder in [primitive["attributes"], *primitive.get("targets", [])]:

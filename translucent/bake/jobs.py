@@ -98,12 +98,16 @@ _OF_MAPS, _TEXELS = ("tile", "high", "cage", "high_distance"), ("size", "supersa
 def check_job(job: Job) -> None:
     """Raise `InputError` or `RenderError` if a job is found invalid before any work is done."""
     if unknown := sorted(set(job) - KEYS):
-        raise InputError(f"bake job with {unknown[0]!r}", "not a known key", f"use {', '.join(sorted(KEYS))}")
+        raise InputError(
+            f"bake job with {unknown[0]!r}", "a bake job has no such key", f"use {', '.join(sorted(KEYS))}"
+        )
     if missing := [key for key in ("model", "output") if not isinstance(job.get(key), str)]:
-        raise InputError("bake job", f"no {missing[0]}", "give a path as text")
+        raise InputError("bake job", f"the job has no key {missing[0]}", "add this key with a path as text")
     metres_per_unit(job.get("unit", "m"))
     if not 0 <= (fraction := job.get("max_escaped", 0)) <= 1:
-        raise InputError(f"max_escaped {fraction!r}", "not in 0..1", "give a fraction of the rays, for example 0.05")
+        raise InputError(
+            f"max_escaped {fraction!r}", "the value must lie in 0..1", "give a fraction of the rays, for example 0.05"
+        )
     suffixes = VERTEX_SUFFIXES if job.get("vertices") else MAP_SUFFIXES
     output = Path(job["output"])
     storing = _storing(job)
@@ -111,11 +115,21 @@ def check_job(job: Job) -> None:
     settings = job.get("settings", {})
     of_maps = [key for key in (*_OF_MAPS, "normalize", "invert", "resume") if job.get(key) or settings.get(key)]
     if job.get("vertices") and of_maps:
-        raise InputError("thickness per vertex", f"{of_maps[0]} is of maps", "leave one of the two out")
+        raise InputError(
+            "thickness is baked per vertex", f"{of_maps[0]} applies only to thickness maps", "omit one of the two"
+        )
     if suffix == ".glb" and settings.get("tile") is not None:
-        raise InputError(f"tile {settings['tile']!r}", "glTF has no tiles", "write another file, or leave it out")
+        raise InputError(
+            f"tile {settings['tile']!r}",
+            "a glTF file cannot hold UDIM tiles",
+            "choose another output format, or omit the tile",
+        )
     if suffix == ".glb" and settings.get("mode") == "local" and not job.get("vertices"):
-        raise InputError(f"output {str(output)!r}", "mode 'local' has no unit", "write another file, or bake lengths")
+        raise InputError(
+            f"output {str(output)!r}",
+            "mode 'local' bakes a fraction, which glTF cannot store as a thickness",
+            "choose another output format, or another mode",
+        )
     _settings(job, 1.0)
 
 
@@ -142,7 +156,11 @@ def _fraction(key: str, text: str) -> float:
     except ValueError:
         fraction = float("nan")
     if not 0 < fraction < float("inf"):
-        raise InputError(f"{key} {text!r}", "not a share such as '10%'", "give one, or a number of metres")
+        raise InputError(
+            f"{key} {text!r}",
+            "the value is not a percentage such as '10%'",
+            "give a percentage of the diagonal, or a number of metres",
+        )
     return fraction
 
 
@@ -258,7 +276,11 @@ def _bake_gltf(job: Job, about: Record, progress: Progress | None) -> tuple[Reco
     new = bool(job.get("unwrap"))
     targets = find_targets(builder, metres, size=size, needs_uv=not vertices, new_uv=new, plain_uv=not inside)
     if job.get("high") is not None and len(targets) > 1:
-        raise InputError(f"high mesh {job['high']!r}", f"{len(targets)} objects get thickness", "bake them one by one")
+        raise InputError(
+            f"high mesh {job['high']!r}",
+            (f"{len(targets)} objects of the model get a thickness map, but a detailed mesh belongs to one object"),
+            "bake these objects one by one",
+        )
     if lost := left_out(builder.file(), targets):
         about = {**about, "left_out": lost}
     if not inside:

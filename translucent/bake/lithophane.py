@@ -141,7 +141,7 @@ def lithophane(
     if not (0 < least < largest < np.inf and 0 < pitch <= width / 2 < np.inf):
         thin, thick, wide_text, every = (f"{1e3 * metres:.6g} mm" for metres in (least, largest, width, pitch))
         found = f"{thin} to {thick} thick, {wide_text} wide, points every {every}"
-        raise InputError("lithophane", found, "give a least thickness, a larger one, and a width of several points")
+        raise InputError("lithophane", found, "give a smallest thickness, a larger one, and a width of several points")
     linear = read_picture(picture).linear if isinstance(picture, str | Path) else np.asarray(picture, dtype=np.float64)
     if linear.ndim != 3 or linear.shape[2] != 3 or not (linear.size and np.isfinite(linear).all()):
         found = f"a picture of shape {linear.shape}, or not of finite numbers"
@@ -150,7 +150,11 @@ def lithophane(
     columns = round(width / pitch) + 1
     rows = max(round((columns - 1) * high / wide), 1) + 1
     if rows * columns > MOST_POINTS:
-        raise InputError("lithophane", f"{columns} x {rows} points", f"at most {MOST_POINTS}: give a larger pitch")
+        raise InputError(
+            "lithophane",
+            f"{columns} x {rows} points are too many",
+            f"use a larger --pitch: at most {MOST_POINTS} points are allowed",
+        )
     passed, tabled = _passed(medium, least, largest)
     contrast = float(passed[0] / passed[-1])
     # Both scales end at 1: the picture's white, and the plate where it is thinnest.
@@ -168,7 +172,7 @@ def _passed(medium: Medium, least: float, largest: float) -> tuple[Array, Array]
     if medium.scatters:
         do = "give a filament's --td, or the color of a sample held before a light at its thickness"
         raise InputError(
-            "lithophane", "the medium scatters, so more light arrives than the straight path lets through", do
+            "lithophane", ("the medium scatters, so more light passes the plate than absorption alone predicts"), do
         )
     tabled = np.linspace(least, largest, _TABLED)
     with np.errstate(under="ignore"):
@@ -179,7 +183,7 @@ def _passed(medium: Medium, least: float, largest: float) -> tuple[Array, Array]
             for fraction, d in zip(passed[[0, -1]], (least, largest), strict=True)
         )
         found = ", ".join(ends)
-        raise InputError("lithophane", found, "change the thickness, or take a lighter or a darker medium")
+        raise InputError("lithophane", found, "change the thickness, or choose a more or less absorbing medium")
     return passed, tabled
 
 

@@ -103,14 +103,16 @@ class PreparedMesh:
         # All faces of a mesh without a negative volume cannot look inwards, and to examine it takes longer.
         if one_volume(mesh.vertices, mesh.faces) < 0 and mesh.diagnosis.inverted:
             raise InputError(
-                f"mesh {mesh.name!r}", "all its faces look inwards", "turn it (tl.load_mesh does), or export it again"
+                f"mesh {mesh.name!r}",
+                "all faces of the mesh point inwards",
+                "flip the faces (tl.load_mesh does so automatically), or export the mesh again",
             )
         corners = ((mesh.vertices - mesh.center) / (0.5 * mesh.diagonal)).take(mesh.faces, axis=0)
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         twice_area = np.sqrt(_dot(cross, cross))
         faces = np.flatnonzero(twice_area > NO_AREA)
         if not faces.size:
-            raise InputError(f"mesh {mesh.name!r}", "no face has an area", "give a triangle mesh")
+            raise InputError(f"mesh {mesh.name!r}", "no face of the mesh has an area", "give a triangle mesh")
         corners, normals = corners[faces], cross[faces] / twice_area[faces, None]
         offset = _dot(normals, (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0)
         with_area = Mesh(mesh.vertices, mesh.faces[faces], name=mesh.name)

@@ -74,7 +74,11 @@ class Encoding:
         largest = float(np.max(values, initial=0.0))
         if largest == 0:
             if normalize or invert:
-                raise InputError("values as fractions of the largest", "it is 0", "leave --normalize and --invert out")
+                raise InputError(
+                    "thickness as a fraction of its largest value",
+                    "the largest thickness is 0",
+                    "omit --normalize and --invert",
+                )
             largest = 1.0  # what does not matter where all are 0, and yet must not divide by 0
         scale = largest / (levels or 1)
         return cls(-scale, largest, levels, unit) if invert else cls(scale, 0.0, levels, unit)

@@ -101,7 +101,11 @@ def read_scatter_exr(path: Path) -> tuple[Floats, Mask, Record]:
     require_file(path, requested)
     header, channels = read_exr(path, requested)
     if missing := [name for name in (*_CHANNELS, "coverage.Y") if name not in channels]:
-        raise InputError(requested, f"it has no channel {missing[0]}", "give a file of translucent bake --mode scatter")
+        raise InputError(
+            requested,
+            f"the file has no channel {missing[0]}",
+            "give a file that `translucent bake --mode scatter` wrote",
+        )
     values = np.stack([channels[name] for name in _CHANNELS], axis=-1).astype(np.float32)
     meaning: Record = json.loads(header.get("scatter", "{}"))
     return values.reshape(*values.shape[:2], COUNT, 3), channels["coverage.Y"] > 0, meaning

@@ -170,7 +170,9 @@ def _bake_gltf(job: ScatterJob, about: Record) -> tuple[Record, dict[PrimitiveKe
     )
     if job.makes_map and len(targets) > 1:
         raise InputError(
-            f"output {str(job.output)!r}", f"{len(targets)} bodies in the model", "write a .glb, which holds them all"
+            f"output {str(job.output)!r}",
+            f"the model has {len(targets)} bodies, but this format holds only one",
+            "write a .glb, which holds all bodies",
         )
     if lost := left_out(builder.file(), targets):
         about = {**about, "left_out": lost}

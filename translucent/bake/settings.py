@@ -124,20 +124,30 @@ class BakeSettings:
         _check_count("seed", self.seed, 0, 2**63 - 1, "give a whole number, for example 0")
         if not (_is_number(self.spread) and 0 < self.spread <= 180):
             raise InputError(
-                f"spread {self.spread!r}", "not in 0 < spread <= 180 degrees", "give the full angle of the cone"
+                f"spread {self.spread!r}",
+                "the angle must satisfy 0 < spread <= 180 degrees",
+                "give the full angle of the cone",
             )
         for name in ("max_distance", "tolerance", "high_distance"):
             value = getattr(self, name)
             if value is not None and not (_is_number(value) and 0 < value < math.inf):
-                raise InputError(f"{name} {value!r}", "not positive and finite", "give metres above 0, or leave it out")
+                raise InputError(
+                    f"{name} {value!r}",
+                    "the value must be positive and finite",
+                    "give metres above 0, or omit the setting",
+                )
         if self.tile is not None and not (_is_whole(self.tile) and 1001 <= self.tile <= 9999):
-            raise InputError(f"tile {self.tile!r}", "not a UDIM tile", "give 1001 to 9999, or leave it out")
+            raise InputError(
+                f"tile {self.tile!r}",
+                "this number is not a UDIM tile",
+                "give a tile number from 1001 to 9999, or omit the tile",
+            )
         if self.mode == "transmittance" and self.medium is None:
             do = "give one, for example tl.Medium.from_color('#7b1e3a', 0.01), or --color '#7b1e3a' --distance 1cm"
-            raise InputError("mode 'transmittance'", "no medium", do)
+            raise InputError("mode 'transmittance'", "this mode needs a medium", do)
         if self.mode == "transmittance" and self.medium is not None and not (self.medium.extinction > 0).any():
             found = "a medium that takes no light away"
-            raise InputError("mode 'transmittance'", found, "give one with absorption or scattering")
+            raise InputError("mode 'transmittance'", found, "the medium must absorb or scatter light")
 
     @property
     def unit(self) -> str:
@@ -254,7 +264,7 @@ def job_for(name: str, job: dict[str, Any]) -> dict[str, Any]:
         do = f"write {Path(program.name).suffix}, or give a folder"
         raise InputError(f"output {str(output)!r}", f"{name} reads {Path(program.name).suffix}", do)
     if other := [key for key in ("normalize", "invert", "vertices") if job.get(key)]:
-        raise InputError(f"--for {name}", f"--{other[0]} is given, too", "leave out one of the two")
+        raise InputError(f"--for {name}", f"--{other[0]} and --for exclude each other", "omit one of the two")
     return {**job, "output": str(output), **program.storing}
 
 

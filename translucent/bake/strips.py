@@ -99,7 +99,7 @@ class Projection:
                     f"cage {cage.name!r}",
                     f"{len(cage.vertices)} vertices and {len(cage.faces)} faces, but mesh {given.name!r} has "
                     f"{len(given.vertices)} and {len(given.faces)}",
-                    "make the cage by moving the mesh's vertices outwards",
+                    "make the cage by moving the vertices of the mesh outwards",
                 )
             corners = cage.vertices[unwrapped.vertex][unwrapped.mesh.faces[low.faces]]
         return cls(low, high, corners, SEARCH * given.diagonal if distance is None else distance)
@@ -300,11 +300,15 @@ class Checkpoint:
         requested = f"checkpoint {str(self._path)!r}"
         found = read_arrays(self._path, requested, ("key", *self._ARRAYS), "remove it")
         if str(found.pop("key")) != self._key:
-            raise InputError(requested, "it is of another mesh or other settings", "remove it, or bake as before")
+            raise InputError(
+                requested,
+                "the file holds an unfinished bake of another mesh, or with other settings",
+                "delete the file, or bake with the same mesh and settings as before",
+            )
         for name, array in found.items():
             own = getattr(canvas, name)
             if (array.shape, array.dtype) != (own.shape, own.dtype):
-                raise InputError(requested, f"{name} of shape {array.shape}, not {own.shape}", "remove it")
+                raise InputError(requested, f"{name} of shape {array.shape}, not {own.shape}", "delete the file")
             setattr(canvas, name, array)
 
     def keep(self, canvas: Canvas) -> None:

@@ -268,7 +268,9 @@ def check_map_output(
     if not os.access(path.parent, os.W_OK):
         raise RenderError(requested, f"the folder {str(path.parent)!r} is read-only", "choose another folder")
     if suffix == ".glb" and (normalize or invert):
-        raise InputError(requested, "glTF stores t / max and the max", "leave --normalize and --invert out")
+        raise InputError(
+            requested, "glTF always stores fractions of the largest thickness", "omit --normalize and --invert"
+        )
     if suffix == ".exr":
         require_package("OpenEXR", requested, f"write {' or '.join(others)}" if others else "")
     return suffix
@@ -458,7 +460,11 @@ def write_maps(
     records: list[Record] = []
     for key, result in results.items():
         if result.settings.unit != "m":
-            raise InputError(f"output {str(path)!r}", f"mode {result.settings.mode!r} has no unit", "bake lengths")
+            raise InputError(
+                f"output {str(path)!r}",
+                f"values of mode {result.settings.mode!r} have no unit of length",
+                "use a mode that bakes lengths",
+            )
         encoding = Encoding.of(result.values, GLTF_LEVELS)
         one = {"place": list(key), **result.record(encoding)}
         if result.values.max() > 0:
@@ -473,7 +479,9 @@ def write_maps(
             one["warnings"] = ["no thickness: its material is left as it is"]
         records.append(one)
     if not any("material" in one for one in records):
-        raise InputError(f"output {str(path)!r}", "the thickness is 0 everywhere", "give a model with an inside")
+        raise InputError(
+            f"output {str(path)!r}", "the thickness is 0 at all points", "bake a closed mesh, which has an inside"
+        )
     write_gltf(builder.file(), path)
     return write_record(path, {**(about or {}), **shared(records), "maps": records})
 
@@ -553,7 +561,9 @@ def load_thickness_map(path: str | Path) -> Array:
     except TranslucentError:
         raise
     except Exception as error:  # each of the readers raises its own kinds
-        raise InputError(requested, f"it cannot be read ({type(error).__name__}: {error})", "bake it again") from error
+        raise InputError(
+            requested, f"it cannot be read ({type(error).__name__}: {error})", "bake the map again"
+        ) from error
 
 
 def _read_exr(path: Path, requested: str) -> tuple[Any, ...]:
@@ -565,9 +575,15 @@ def _read_png(path: Path, requested: str) -> tuple[Any, ...]:
     with open_picture(read_bytes(path, requested), requested, ("PNG",), per_pixel=16) as image:
         text, stored = getattr(image, "text", {}), np.array(image)
     if f"{PNG_PREFIX}scale" not in text:
-        raise InputError(requested, "it does not say its scale", "keep the metadata when copying the image")
+        raise InputError(
+            requested,
+            "the image does not contain its scale from stored values to metres",
+            "when you copy the image, keep its metadata",
+        )
     if stored.ndim != 2 or stored.max(initial=0) > PNG_LEVELS:
-        raise InputError(requested, "it is not 16-bit gray", "give the file as it was baked")
+        raise InputError(
+            requested, "the image is not a 16-bit gray image", "give the file as the bake wrote it, without conversion"
+        )
     return text[f"{PNG_PREFIX}scale"], text[f"{PNG_PREFIX}offset"], stored
 
 

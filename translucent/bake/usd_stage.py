@@ -82,7 +82,7 @@ def write_usd(scene: Scene, path: str | Path, thickness: Sequence[VertexThicknes
     for baked in thickness:
         if not any(item.mesh is baked.mesh for item in scene.objects):
             do = "bake the meshes of the scene: bake_vertex_thickness(scene.objects[0].mesh)"
-            raise InputError(f"thickness of {baked.mesh.name!r}", "no object of the scene has this mesh", do)
+            raise InputError(f"thickness of {baked.mesh.name!r}", "the scene has no object with this mesh", do)
     for items, found in _left_out(scene):
         warnings.warn(f"{object_names(items)}: {found}, which are not written", TranslucentWarning, stacklevel=3)
     usd, geom, tf = _pxr("Usd", "UsdGeom", "Tf")
@@ -152,7 +152,9 @@ def _add_mesh(stage: Any, path: str, item: Object, thickness: Floats | None) -> 
     geom, gf, sdf, vt = _pxr("UsdGeom", "Gf", "Sdf", "Vt")
     mesh, found = item.mesh, geom.Mesh.Define(stage, path)
     if not np.abs(mesh.bounds).max() < np.finfo(np.float32).max:
-        raise InputError(f"mesh {mesh.name!r}", "coordinates beyond float32, which USD has", "scale the mesh")
+        raise InputError(
+            f"mesh {mesh.name!r}", "some coordinates are too large for the float32 numbers of USD", "scale the mesh"
+        )
     with np.errstate(under="ignore"):
         points = mesh.vertices.astype(np.float32)
     # USD multiplies rows by matrices.

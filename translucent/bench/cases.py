@@ -474,8 +474,10 @@ def _solid(title: str, scene: Scene, _size: Size) -> Scene:
         wrong = "; ".join(f"{body.mesh.name!r} {body.mesh.diagnosis}" for body in scene.bodies)
         raise InputError(
             f"measuring {title!r}",
-            f"no method can treat it as solid: {1.0 - look.valid[covered].mean():.0%} of its pixels are invalid; "
-            f"{wrong}",
-            "close it, or declare it a thin sheet in a .glb file",
+            (
+                f"no method can render it as solid: {1.0 - look.valid[covered].mean():.0%} of its "
+                f"pixels are invalid; {wrong}"
+            ),
+            "close it, or declare it thin-walled in a .glb file",
         )
     return scene

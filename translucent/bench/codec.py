@@ -104,25 +104,33 @@ def decode(kind: type[T], text: str, name: str, file_format: str, version: int) 
         found = json_value(text)
     except ValueError as error:
         raise InputError(
-            f"reading {name}", f"it is cut off or no JSON ({error})", "give a report.json that was written completely"
+            f"reading {name}",
+            f"the file is cut off, or is not JSON ({error})",
+            "give a report.json file that was written completely",
         ) from None
     if not isinstance(found, dict) or found.get("format") != file_format:
-        raise InputError(f"reading {name}", "it is JSON, but no report", "give the report.json of 'translucent report'")
+        raise InputError(
+            f"reading {name}",
+            "the file is JSON, but not a report",
+            "give the report.json that 'translucent report' wrote",
+        )
     if found.get("version") != version:
         raise InputError(
             f"reading {name}",
-            f"it is of version {found.get('version')!r}; this program reads {version}",
-            "make the report again",
+            f"the file has version {found.get('version')!r}, but this program reads version {version}",
+            "run the report again",
         )
     try:
         return _Strict().structure(found, kind)
     except BaseValidationError as error:
         said, _, where = transform_error(error, "", _said)[0].rpartition(" @ ")
         raise InputError(
-            f"reading {name}", f"{where.lstrip('.') or 'the report'} {said}", "make the report again"
+            f"reading {name}", f"{where.lstrip('.') or 'the report'} {said}", "run the report again"
         ) from None
     except _TooManyError:
-        raise InputError(f"reading {name}", f"more than {_MOST} wrong values", "make the report again") from None
+        raise InputError(
+            f"reading {name}", f"more than {_MOST} values in the file are wrong", "run the report again"
+        ) from None
 
 
 class _TooManyError(BaseException):

@@ -519,7 +519,7 @@ def check_names(names: Iterable[str]) -> None:
             close = difflib.get_close_matches(_slug(name), sorted(known), n=1)
             families = sorted({_slug(one.family) for one in CONTENDERS})
             do = f"did you mean {close[0]}?" if close else f"use some of {', '.join(families)}"
-            raise InputError(f"method {name!r}", "not one that is measured", do)
+            raise InputError(f"method {name!r}", "the report does not measure this method", do)
 
 
 def _slug(name: str) -> str:

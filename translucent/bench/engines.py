@@ -138,7 +138,9 @@ def visible_points(renderer: Renderer, scene: Scene, size: tuple[int, int]) -> V
         If there are more bodies, or objects without a medium.
     """
     if len(scene.objects) != 1 or (medium := scene.objects[0].medium) is None:
-        raise InputError("what engines show", f"{len(scene.objects)} objects", "give a scene of one body")
+        raise InputError(
+            "approximations of engines", f"the scene has {len(scene.objects)} objects", "use a scene with one body"
+        )
     body = scene.objects[0]
     dark = replace(body, medium=Medium(medium.extinction, 0.0, medium.emission, ior=medium.ior))
     with warnings.catch_warnings():

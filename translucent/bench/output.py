@@ -116,8 +116,8 @@ def checked_folder(folder: Path) -> Iterator[None]:
         except OSError as error:
             raise RenderError(
                 f"output {str(folder)!r}",
-                f"it is no folder that can be written to ({error.strerror or error})",
-                "check its permissions",
+                f"the folder is not writable ({error.strerror or error})",
+                "check the permissions of the folder",
             ) from error
         yield
 

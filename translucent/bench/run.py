@@ -177,7 +177,9 @@ def opened(backend: str | None, size: Size, effort: Effort) -> Iterator[BenchCon
     with ExitStack() as stack:
         renderer = stack.enter_context(Renderer(backend))
         if renderer.provenance["backend"] == "cpu":
-            raise RenderError("measuring", "there is no OpenGL here", "see 'translucent doctor'")
+            raise RenderError(
+                "measuring", "no OpenGL is available on this machine", "run 'translucent doctor' to find out why"
+            )
         try:
             cpu = stack.enter_context(Renderer("cpu"))
         except RenderError:  # Embree cannot be loaded

@@ -477,7 +477,11 @@ def map_camera(scene: Scene) -> Camera:
     """Camera of the one map of a scene with one light; raises `RenderError` if there are more."""
     cameras = ShadowOccluders(scene.lights[0], scene, [support_of(item) for item in scene.objects]).cameras()
     if len(cameras) != 1:
-        raise RenderError("a map of shadows", f"its light has {len(cameras)}", "move it away from what it lights")
+        raise RenderError(
+            "shadow map of one light",
+            f"this light needs {len(cameras)} shadow maps",
+            "move the light away from the objects that it illuminates",
+        )
     return cameras[0]
 
 

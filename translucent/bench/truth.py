@@ -123,7 +123,7 @@ class CaseTruth:
         # All but the light that media scatter.
         frame, _ = reference.path_trace(scene, size, paths=2, max_events=0)
         if not np.array_equal(frame.coverage, found.mask):
-            raise InputError("truth of a scene", "it covers other pixels", "run tools/scattering_truth.py")
+            raise InputError("truth of a scene", "the stored truth has other pixels", "run tools/scattering_truth.py")
         halves = frame.radiance.copy(), frame.radiance.copy()
         for half, radiance in zip(halves, found.halves, strict=True):
             half[found.mask] = radiance
@@ -347,13 +347,15 @@ def stored_truth(name: str, scene: Scene) -> StoredTruth:
     """
     file = files("translucent.bench").joinpath(truth_file(name))
     if not file.is_file():
-        raise InputError(f"truth of {name!r}", "none is stored", "run tools/scattering_truth.py")
+        raise InputError(
+            f"truth of {name!r}", "no true picture of this scene is stored", "run tools/scattering_truth.py"
+        )
     truth = StoredTruth.from_bytes(file.read_bytes())
     now = scene_parameters(scene)
     if now.shape != truth.parameters.shape or not np.allclose(now, truth.parameters, SAME, SAME_ZERO):
         raise InputError(
             f"truth of {name!r}",
-            "the scene has changed since its truth was path traced",
+            "the scene has changed since its true picture was path traced",
             "run tools/scattering_truth.py",
         )
     return truth

@@ -260,7 +260,11 @@ def _blender(engine: str, samples: int, title: str, settings: str, features: fro
                     if line.startswith("@"):
                         found: dict[str, Any] = json.loads(line[1:])
                         return found
-                raise RenderError(f"Blender's {engine}", f"it ended with {process.wait()}", "run its script by hand")
+                raise RenderError(
+                    f"Blender's {engine}",
+                    f"Blender ended with exit code {process.wait()}",
+                    "run the script of this adapter by hand to see the error",
+                )
 
             def draw(scene: BenchmarkScene, folder: Path) -> Rendered:
                 assert process.stdin is not None
@@ -269,7 +273,7 @@ def _blender(engine: str, samples: int, title: str, settings: str, features: fro
                 process.stdin.flush()
                 told = answer()
                 if "error" in told:
-                    raise RenderError(f"Blender's {engine}", told["error"], "see its script")
+                    raise RenderError(f"Blender's {engine}", told["error"], "read the script of this adapter")
                 _, channels = read_exr(picture, "the picture")
                 return Rendered(np.stack([channels[name] for name in "RGB"], axis=-1), told["seconds"])
 
@@ -314,7 +318,7 @@ def _gvxr() -> Adapter:
         try:
             gvxr: Any = importlib.import_module("gvxrPython3").gvxr
         except ImportError as error:
-            raise RenderError("adapter 'gvxr'", f"it cannot be loaded ({error})", "install that library") from error
+            raise RenderError("adapter 'gvxr'", f"it cannot be loaded ({error})", "install this library") from error
         gvxr.createOpenGLContext()
 
         def draw(scene: BenchmarkScene, _: Path) -> Rendered:

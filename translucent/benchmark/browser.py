@@ -108,7 +108,7 @@ class WebSession:
             told = self._page.evaluate("(order) => window.drawScene(order)", {"home": _HOME + "scene/", "size": width})
         except Exception as error:
             said = "; ".join([*self._errors[:2], str(error).splitlines()[0]])
-            raise RenderError("a browser", said, "see its script in benchmark/peers") from error
+            raise RenderError("a browser", said, "read its script in benchmark/peers") from error
         values = np.frombuffer(base64.b64decode(told["pixels"]), np.float32)
         side = round((values.size / 3) ** 0.5)
         fine = values.reshape(side, side, 3)
@@ -133,7 +133,9 @@ def open_page(renderer: WebRenderer) -> Iterator[WebSession]:
         try:
             page.wait_for_function("window.drawScene !== undefined", timeout=60_000)
         except Exception as error:
-            raise RenderError("a browser", "; ".join(errors[:3]) or str(error), "check its packages") from error
+            raise RenderError(
+                "a browser", "; ".join(errors[:3]) or str(error), "check the packages of the browser"
+            ) from error
         session.device = str(page.evaluate("window.deviceName ? window.deviceName() : ''"))
         yield session
         browser.close()

@@ -160,13 +160,19 @@ def read_results(folder: Path) -> Results:
         If it is no folder, or its results.json is not one.
     """
     if not folder.is_dir():
-        raise InputError(f"results {str(folder)!r}", "not a folder", "give the folder with the pictures")
+        raise InputError(
+            f"results {str(folder)!r}", "this path is not a folder", "give the folder that contains the pictures"
+        )
     path = folder / _RESULTS
     found: Any = {}
     if path.is_file():
         found = json_value(read_text(path, f"results {str(path)!r}", MAX_TEXT, do="give a results.json"))
         if not isinstance(found, dict) or found.get("format") != FORMAT:
-            raise InputError(f"results {str(path)!r}", f"its format is not {FORMAT!r}", "score its pictures anew")
+            raise InputError(
+                f"results {str(path)!r}",
+                f"the format of this results.json is not {FORMAT!r}",
+                "score the pictures again",
+            )
     texts = {
         key: _text(found.get(key, ""))
         for key in ("name", "version", "settings", "machine", "device", "date", "toolkit")
@@ -198,7 +204,11 @@ def _time(value: Any) -> float | None:
 
 def _scene_result(told: Any, path: Path) -> SceneResult:
     if not isinstance(told, dict):
-        raise InputError(f"results {str(path)!r}", "a scene that is no object", "see the docs for what it holds")
+        raise InputError(
+            f"results {str(path)!r}",
+            "an entry of a scene is not a JSON object",
+            "the documentation describes the contents of this file",
+        )
     texts = {key: _text(told.get(key, "")) for key in ("lacking", "failure")}
     score = told.get("score")
     return SceneResult(
@@ -252,7 +262,7 @@ def read_picture(folder: Path, scene: BenchmarkScene) -> Array:
         _, channels = read_exr(path, asked)
         missing = [name for name in "RGB" if name not in channels]
         if missing:
-            raise InputError(asked, f"it has channels {', '.join(channels)}", "name its channels R, G and B")
+            raise InputError(asked, f"it has channels {', '.join(channels)}", "name the channels R, G and B")
         array = np.stack([channels[name] for name in "RGB"], axis=-1)
     else:
         array = _npy(path, asked)
@@ -281,11 +291,13 @@ def _fitted(array: Array, scene: BenchmarkScene, asked: str) -> Array:
     width, height = scene.size
     if array.ndim != 3 or array.shape[-1] < 3 or array.dtype.kind != "f":
         found = f"an array of shape {array.shape} of {array.dtype}"
-        raise InputError(asked, found, "save linear float radiance, height x width x 3")
+        raise InputError(asked, found, "save linear radiance as floats, in an array of height x width x 3")
     times = array.shape[0] // height
     if times < 1 or array.shape[:2] != (times * height, times * width):
         found = f"{array.shape[1]} x {array.shape[0]} pixels"
-        raise InputError(asked, found, f"render {width} x {height}, or a whole multiple; do not crop or scale it")
+        raise InputError(
+            asked, found, (f"render {width} x {height} pixels, or a whole multiple; do not crop or scale the picture")
+        )
     blocks = array[..., :3].astype(np.float64).reshape(height, times, width, times, 3)
     return np.asarray(blocks.mean(axis=(1, 3)))
 
@@ -375,15 +387,21 @@ def unpacked(path: Path, folder: Path) -> Path:
         with zipfile.ZipFile(path) as archive:
             entries = [one for one in archive.infolist() if _is_ours(one.filename)]
             if sum(one.file_size for one in entries) > LARGEST_ARCHIVE or any(o.file_size > LARGEST for o in entries):
-                raise InputError(asked, "it holds more than pictures of the benchmark need", "pack it anew")
+                raise InputError(
+                    asked,
+                    "the file contains more data than the benchmark needs",
+                    "pack the folder with the pictures again",
+                )
             if not entries:
-                raise InputError(asked, "it has neither results.json nor pictures", "give what `run` wrote")
+                raise InputError(
+                    asked, "the file contains neither results.json nor pictures", "give the file that `run` wrote"
+                )
             make_folder(folder)
             for one in entries:
                 (folder / one.filename).write_bytes(archive.read(one))
     except (zipfile.BadZipFile, OSError, RuntimeError, NotImplementedError) as error:
         raise InputError(
-            asked, f"not a .zip that can be read ({error})", "give a folder or a .zip of results"
+            asked, f"the file is not a readable .zip ({error})", "give a folder or a .zip file of results"
         ) from error
     return folder
 
@@ -401,7 +419,11 @@ def result_folders(places: Sequence[Path], unpack_into: Path) -> list[Path]:
                 [one for one in sorted(place.iterdir()) if one.is_dir() and _has_results(one)] if place.is_dir() else []
             )
             if not inner:
-                raise InputError(f"results {str(place)!r}", "no results there", "give what `run` or `score` wrote")
+                raise InputError(
+                    f"results {str(place)!r}",
+                    "the folder or file contains no results",
+                    "give a folder or file that `run` or `score` wrote",
+                )
             found += inner
     return found
 

@@ -493,4 +493,4 @@ def scene_named(name: str) -> BenchmarkScene:
             return scene
     close = difflib.get_close_matches(name, scene_names(), n=1)
     do = f"did you mean {close[0]}?" if close else "see `translucent benchmark list`"
-    raise InputError(f"scene {name!r}", "not one of the benchmark's", do)
+    raise InputError(f"scene {name!r}", "the benchmark has no scene of this name", do)

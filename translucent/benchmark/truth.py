@@ -108,11 +108,11 @@ def stored_truth_of(scene: BenchmarkScene) -> TruthPicture:
     """
     path = truth_path(scene.name)
     if not path.is_file():
-        raise InputError(f"truth of {scene.name!r}", "none is stored", DO)
+        raise InputError(f"truth of {scene.name!r}", "no true picture of this scene is stored", DO)
     truth = TruthPicture.read(path)
     now = scene_parameters(scene.make())
     if now.shape != truth.parameters.shape or not np.allclose(now, truth.parameters, SAME, SAME_ZERO):
-        raise InputError(f"truth of {scene.name!r}", "the scene has changed since it was rendered", DO)
+        raise InputError(f"truth of {scene.name!r}", "the scene has changed since its true picture was rendered", DO)
     return truth
 
 

@@ -94,65 +94,92 @@ class BakeOptions:
 
     output: Path | None = option(
         names=("-o", "--output"),
-        help="A .exr, .png, .npy, .npz, .glb or .ply file; name.<UDIM>.png bakes all tiles.",
+        help="Output file: .exr, .png, .npy, .npz, .glb or .ply. A name with <UDIM> bakes all tiles.",
     )
     mode: str = option(
         "cone",
         type=click.Choice(MODES),
-        help="Definition of thickness; or scatter, which bakes the light that leaves a body after scattering.",
+        help="Definition of thickness. The mode scatter bakes scattered light instead of thickness.",
     )
     size: int = option(
-        1024, metavar="N", help=f"Texels along each side of the map; default with --mode scatter: {SIZE}."
+        1024, metavar="N", help=(f"Number of texels along each side of the map; default with --mode scatter: {SIZE}.")
     )
     resolution: int = option(
-        32, metavar="N", help="With --mode scatter: resolution, 8 to 128; a body gets about N^3 / 4 cells."
+        32,
+        metavar="N",
+        help=("With --mode scatter: resolution of the diffusion grid, 8 to 128; a body gets about N^3 / 4 cells."),
     )
-    rays: int = option(64, metavar="N", help="Rays per point of the surface.")
-    spread: float = option(180.0, metavar="DEG", help="Full angle of the cone of rays.")
+    rays: int = option(64, metavar="N", help="Number of rays for each point of the surface.")
+    spread: float = option(180.0, metavar="DEG", help="Full angle of the cone of rays around the inward normal.")
     weighting: str = option(
-        "cosine", type=click.Choice(["cosine", "uniform"]), help="Weights of the directions in the cone."
+        "cosine", type=click.Choice(["cosine", "uniform"]), help="Weighting of the ray directions in the cone."
     )
     gaps: str = option(
         "first-exit",
         type=click.Choice(["first-exit", "total"]),
-        help="Length of a ray that leaves and enters again: up to its first exit, or the sum of its parts inside.",
+        help=(
+            "If a ray leaves the mesh and enters it again: measure up to the first exit, or the sum of "
+            "all parts inside."
+        ),
     )
     max_distance: str | None = _length("No ray goes farther. Default: no limit.")
-    ignore_back_faces: bool = option(False, help="Rays end only at faces through which they leave the body.")
-    supersample: int = option(1, metavar="N", help="Average N x N points per texel.")
-    padding: int = option(16, metavar="N", help="Texels by which the map continues around each chart of the UVs.")
-    seed: int = option(0, metavar="N", help="Seed of the ray directions.")
+    ignore_back_faces: bool = option(False, help="Let rays end only at faces through which they leave the body.")
+    supersample: int = option(1, metavar="N", help="Average thickness over N x N points in each texel.")
+    padding: int = option(16, metavar="N", help="Number of texels that continue the map around each UV chart.")
+    seed: int = option(0, metavar="N", help="Seed of the random ray directions.")
     tolerance: str | None = _length("Cast more rays at points whose standard error is larger.")
-    tile: int | None = option(metavar="N", help="Bake this UDIM tile, such as 1001. Default: UVs repeat.")
+    tile: int | None = option(metavar="N", help="Bake only this UDIM tile, such as 1001. Default: the map repeats.")
     high: str | None = option(metavar="MESH", help="Detailed mesh whose thickness is baked onto the coarser MODEL.")
     cage: str | None = option(
         metavar="MESH",
-        help="With --high: a copy of MODEL, moved outwards, from which rays search for the detailed mesh.",
+        help=(
+            "With --high: a copy of MODEL with vertices moved outwards. Rays start on this cage and "
+            "search for the detailed mesh."
+        ),
     )
     high_distance: str | None = _length("With --high: largest distance between its surface and that of MODEL.")
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
     medium: AnyMediumOptions = group(AnyMediumOptions)
-    unwrap: bool = option(False, help="Make new UVs, even if MODEL has some.")
+    unwrap: bool = option(False, help="Make new UVs, even if MODEL already has UVs.")
     vertices: bool = option(False, help="Bake thickness per vertex, into a .ply, .glb or .npy file.")
     normalize: bool = option(False, help="Store fractions of the largest value instead of metres.")
-    invert: bool = option(False, help="Store 1 - t / max, the translucency that some engines expect.")
-    max_escaped: str | None = option(
-        metavar="%", help="With --out-dir: share of rays without an exit above which a map is suspect. [5%]"
+    invert: bool = option(
+        False, help=("Store 1 - t / max for each thickness t, the translucency that some engines expect.")
     )
-    resume: bool = option(False, help="Store finished parts next to the output, and continue from them.")
-    check: bool = option(False, help="Compare a picture by the map with an exact one; write OUTPUT.check.png.")
+    max_escaped: str | None = option(
+        metavar="%",
+        help=(
+            "With --out-dir: a map is reported as suspect if more than this percentage of "
+            "its rays never leave the mesh. [5%]"
+        ),
+    )
+    resume: bool = option(
+        False, help=("Store finished parts of the bake next to the output, and continue from these parts.")
+    )
+    check: bool = option(
+        False,
+        help=(
+            "Compare a picture that uses the map with a picture of the true thickness, and "
+            "write both to OUTPUT.check.png."
+        ),
+    )
     program: str | None = option(
         names=("--for",),
         type=NamesOf("translucent.bake.settings", "PROGRAMS"),
-        help="Name and encode the map as this program expects it, and print what to set there; -o may be a folder.",
+        help=(
+            "Name and encode the map for this program, and print the settings that this program needs; "
+            "-o may be a folder."
+        ),
     )
     out_dir: Path | None = option(help="Bake each MODEL into this folder.")
     usd: Path | None = option(
         metavar="FILE",
-        help="Instead of -o: a .usda or .usdc stage with meshes, OpenPBR materials, and thickness per vertex.",
+        help=("Instead of -o: write a .usda or .usdc file with meshes, OpenPBR materials, and thickness per vertex."),
     )
     format: str = option("exr", type=click.Choice(FORMATS), help="Format of the files in --out-dir.")
-    jobs: int | None = option(metavar="N", help="With --out-dir: number of processes. Default: one per processor.")
+    jobs: int | None = option(
+        metavar="N", help="With --out-dir: number of worker processes. Default: one per processor."
+    )
     dask: str | None = option(
         metavar="ADDRESS",
         help="With --out-dir: bake on the workers of the Dask scheduler at this address, such as tcp://farm:8786.",
@@ -179,31 +206,47 @@ def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
     output, out_dir, named = given.output, given.out_dir, _named()
     if given.mode == SCATTER:
         if other := [name for name in named if name not in _TAKEN_BY_SCATTER]:
-            raise InputError(_option(other[0]), f"--mode {SCATTER} has no use for it", "leave it out")
+            raise InputError(_option(other[0]), f"--mode {SCATTER} does not use this option", "omit the option")
         if output is None or len(models) != 1:
             found = f"{len(models)} models" if output else "no -o"
-            raise InputError(f"--mode {SCATTER}", found, "give one MODEL and -o")
+            raise InputError(f"--mode {SCATTER}", found, "bake one MODEL into one output: -o FILE")
         return _bake_scatter(_read_scatter_job(models[0], output, given), given, as_json)
     if other := [name for name in named if name in _SCATTER_ALONE]:
-        raise InputError(_option(other[0]), "thickness has no use for it", f"add --mode {SCATTER}, or leave it out")
+        raise InputError(
+            _option(other[0]),
+            "this option does not apply to a bake of thickness",
+            f"add --mode {SCATTER}, or omit the option",
+        )
     if given.usd is not None:
         if other := [name for name in named if name in _REFUSED_BY_USD]:
-            raise InputError(f"--usd {given.usd}", f"{_option(other[0])} is given, too", "leave one of the two out")
+            raise InputError(
+                f"--usd {given.usd}", f"{_option(other[0])} cannot be combined with --usd", "omit one of the two"
+            )
         if len(models) != 1:
-            raise InputError(f"--usd {given.usd}", f"{len(models)} models", "give one MODEL")
+            raise InputError(
+                f"--usd {given.usd}", f"--usd bakes one model, but {len(models)} models are given", "give one MODEL"
+            )
         return _bake_usd(models[0], given.usd, given, as_json)
     if (output is None) == (out_dir is None):
         found = "neither is given" if output is None else "both are given"
-        raise InputError("-o FILE or --out-dir FOLDER", found, "give one of the two, or --usd FILE")
+        raise InputError("-o FILE or --out-dir FOLDER", found, "one of these two options is required, or --usd FILE")
     if out_dir is not None:
         if given.check:
-            raise InputError("--check", "it looks at one model", "give one MODEL and -o")
+            raise InputError("--check", "--check works with one model", "give one MODEL, and one output with -o")
         return _bake_many(models, out_dir, given, as_json)
     if len(models) > 1 or output is None:
-        raise InputError(f"-o {output}", f"{len(models)} models", "give --out-dir instead, or one model")
+        raise InputError(
+            f"-o {output}",
+            f"-o names one output, but {len(models)} models are given",
+            "use --out-dir, or give one model",
+        )
     for name in ("jobs", "dask", "max_escaped"):
         if (value := getattr(given, name)) is not None:
-            raise InputError(f"{_option(name)} {value}", "it is for many models", "add --out-dir, or leave it out")
+            raise InputError(
+                f"{_option(name)} {value}",
+                "this option works only with several models",
+                "add --out-dir, or omit the option",
+            )
     return _bake_one(_read_job(models[0], output, given, file_unit(models[0], given.file)), given, as_json)
 
 
@@ -228,7 +271,11 @@ def _read_job(model: str, output: Path, given: BakeOptions, unit: str) -> Job:
     if given.high is None:
         for name in ("cage", "high_distance"):
             if (value := getattr(given, name)) is not None:
-                raise InputError(f"{_option(name)} {value}", "no --high", "add --high MESH, or leave it out")
+                raise InputError(
+                    f"{_option(name)} {value}",
+                    "this option works only with --high",
+                    "add --high MESH, or omit the option",
+                )
     settings = {name: getattr(given, name) for name in _SETTINGS}
     settings |= {
         name: _read_length(name, text, unit) for name in _LENGTHS if (text := getattr(given, name)) is not None
@@ -262,7 +309,7 @@ def _read_fraction(name: str, text: str) -> float:
     except ValueError:
         fraction = -1.0
     if not 0 <= fraction <= 1:
-        raise InputError(f"{_option(name)} {text!r}", "not a share", "write for example 5%")
+        raise InputError(f"{_option(name)} {text!r}", "the value is not a percentage", "write for example 5%")
     return fraction
 
 
@@ -283,10 +330,14 @@ def _read_scatter_job(model: str, output: Path, given: BakeOptions) -> ScatterJo
 
     if (medium := given.medium.read()) is None:
         raise InputError(
-            f"--mode {SCATTER}", "no medium", "add --preset wax, or --scattering-color '#f2e0b8' --mean-free-path 2mm"
+            f"--mode {SCATTER}",
+            "scattered light needs a medium",
+            "add --preset wax, or --scattering-color '#f2e0b8' --mean-free-path 2mm",
         )
     if given.vertices and output.suffix.lower() != ".glb":
-        raise InputError("--vertices", f"suffix {output.suffix!r}", "write a .glb, which has them anyway")
+        raise InputError(
+            "--vertices", f"suffix {output.suffix!r}", "write a .glb, which also stores thickness at its vertices"
+        )
     file = mesh_file(model, given.file.unit)
     refuse_overwriting(output, file)
     return ScatterJob(
@@ -309,12 +360,14 @@ def _bake_one(job: Job, given: BakeOptions, as_json: bool) -> None:
     from translucent.bake.settings import job_for, recipe_for
 
     if given.check and given.vertices:
-        raise InputError("--check", "it looks at maps", "leave --vertices out")
+        raise InputError(
+            "--check", "--check works only with thickness maps, not with thickness per vertex", "omit --vertices"
+        )
     if given.check and given.mode == "local":
-        raise InputError("--check", "mode 'local' is no length", "choose another mode")
+        raise InputError("--check", "mode 'local' does not bake a length", "choose another mode")
     tiled = is_tiled(job["output"])
     if given.check and tiled:
-        raise InputError("--check", f"{job['output']} has tiles", "check one of them: --tile 1001")
+        raise InputError("--check", f"the output {job['output']} has several tiles", "check a single tile: --tile 1001")
     if given.program is not None:
         job = job_for(given.program, job)
     with _progress(Path(job["model"]).name) as progress:
@@ -485,9 +538,13 @@ def _bake_many(models: tuple[str, ...], out_dir: Path, given: BakeOptions, as_js
 
     if given.jobs is not None and given.dask is not None:
         do = "its workers are as many as they are; leave one out"
-        raise InputError(f"--jobs {given.jobs}", "--dask is given, too", do)
+        raise InputError(f"--jobs {given.jobs}", "--dask already chooses the workers", do)
     if given.dask is not None and given.resume:
-        raise InputError("--resume", "--dask is given, too", "a job is done again from its start; leave --resume out")
+        raise InputError(
+            "--resume",
+            "--resume and --dask exclude each other",
+            "an interrupted Dask job starts again from the beginning; omit --resume",
+        )
     requested, absent = [], []
     for model in models:
         output = out_dir / f"{Path(model).stem}.{given.format}"
@@ -560,15 +617,20 @@ async def _knock(distributed: ModuleType, address: str) -> None:
 class LithophaneOptions:
     """Options of ``translucent lithophane``."""
 
-    output: Path = option(names=("-o", "--output"), required=True, help="A .stl file, in millimetres.")
+    output: Path = option(names=("-o", "--output"), required=True, help="Output file: an .stl mesh in millimetres.")
     td: str | None = option(
-        metavar="D", help="Transmission distance of the filament, after which 10 % of light is left: 4mm."
+        metavar="D",
+        help=(
+            "Transmission distance of the filament: the thickness after which 10 % of the light is left, such as 4mm."
+        ),
     )
     medium: MediumOptions = group(MediumOptions)
-    thickness: str = option("0.6mm..3mm", metavar="A..B", help="Least and largest thickness.")
+    thickness: str = option("0.6mm..3mm", metavar="A..B", help="Smallest and largest thickness of the plate.")
     width: str = option("100mm", metavar="W", help="Width of the plate.")
-    pitch: str = option("0.25mm", metavar="P", help="Distance of the relief's points.")
-    check: bool = option(False, help="Write OUTPUT.check.png: the requested picture, and the rendered relief.")
+    pitch: str = option("0.25mm", metavar="P", help="Distance between neighboring points of the relief.")
+    check: bool = option(
+        False, help=("Write OUTPUT.check.png, which compares the requested picture with the rendered relief.")
+    )
     overwrite: bool = overwrite_option()
 
 
@@ -589,11 +651,15 @@ def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
     output, td = given.output, given.td
     least, dots, largest = given.thickness.partition("..")
     if not dots:
-        raise InputError(f"--thickness {given.thickness}", "one length", "write for example 0.6mm..3mm")
+        raise InputError(
+            f"--thickness {given.thickness}", "this option needs two lengths", "write for example 0.6mm..3mm"
+        )
     medium = given.medium.read(shows_scattering=True)
     if (medium is None) == (td is None):
         found = "no medium" if td is None else "--color or --preset is given, too"
-        raise InputError("lithophane", found, "give --td, --color with --distance, or --preset")
+        raise InputError(
+            "lithophane", found, "choose the material with --td, with --color and --distance, or with --preset"
+        )
     if td is not None:
         medium = medium_of_td(parse_length(td, "mm"))
     assert medium is not None

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 _FOLDER = click.Path(path_type=Path)
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 _DEBUG = click.option("--debug", is_flag=True, hidden=True)
-_ONLY = click.option("--only", metavar="SCENE,...", help="Only these scenes, or groups such as scattering.")
+_ONLY = click.option(
+    "--only", metavar="SCENE,...", help="Run only these scenes, or groups of scenes such as scattering."
+)
 
 
 @click.group(
@@ -83,7 +85,14 @@ def export(folder: Path, only: str | None, debug: bool) -> None:
 
 @benchmark.command(epilog="Example: translucent benchmark run ours mitsuba-64 -o results")
 @click.argument("names", metavar="ADAPTER...", nargs=-1, required=True)
-@click.option("-o", "--output", type=_FOLDER, required=True, metavar="DIR", help="A folder in it for each renderer.")
+@click.option(
+    "-o",
+    "--output",
+    type=_FOLDER,
+    required=True,
+    metavar="DIR",
+    help="Output folder, with a subfolder for each renderer.",
+)
 @_ONLY
 @_JSON
 @_DEBUG
@@ -123,14 +132,14 @@ def run(names: tuple[str, ...], output: Path, only: str | None, as_json: bool, d
 
 @benchmark.command(epilog='Example: translucent benchmark score my-pictures --name "My renderer" --version 1.2')
 @click.argument("folder", type=_FOLDER)
-@click.option("--name", help="Name of the renderer. Default: that in results.json, or the name of the folder.")
+@click.option("--name", help=("Name of the renderer. Default: the name in results.json, or the name of the folder."))
 @click.option("--version", help="Version of the renderer.")
 @click.option("--settings", help="Settings of the renderer, such as samples.")
 @click.option("--device", help="Device that rendered the pictures, such as a graphics card.")
 @click.option(
     "--elsewhere",
     is_flag=True,
-    help="The pictures were rendered on another machine, so the floor of time is not measured.",
+    help=("State that the pictures were rendered on another machine, so that no reference time is measured."),
 )
 @_JSON
 @_DEBUG
@@ -162,7 +171,9 @@ def score(
     )
     if not found.scenes:
         raise InputError(
-            f"pictures in {str(folder)!r}", "none with the name of a scene", "see translucent benchmark list"
+            f"pictures in {str(folder)!r}",
+            "no file in the folder has the name of a scene",
+            "run 'translucent benchmark list' to see the names",
         )
     if not elsewhere:
         found = dataclasses.replace(found, machine=found.machine or this_machine())
@@ -184,13 +195,17 @@ def score(
     failed = [f"{key}: {one.failure}" for key, one in found.scenes.items() if one.failure]
     if failed:
         raise RenderError(
-            f"score {str(folder)!r}", f"{len(failed)} pictures could not be scored: {failed[0]}", "see above"
+            f"score {str(folder)!r}",
+            f"{len(failed)} pictures could not be scored: {failed[0]}",
+            "the messages above name the reasons",
         )
 
 
 @benchmark.command(epilog="Example: translucent benchmark page results -o benchmark.html")
 @click.argument("places", metavar="RESULTS...", type=_FOLDER, nargs=-1, required=True)
-@click.option("-o", "--output", type=_FOLDER, required=True, metavar="FILE", help="The .html file.")
+@click.option(
+    "-o", "--output", type=_FOLDER, required=True, metavar="FILE", help="Output file, such as benchmark.html."
+)
 @_DEBUG
 def page(places: tuple[Path, ...], output: Path, debug: bool) -> None:
     """Write one self-contained page about results: folders of them, or .zip files."""
@@ -207,7 +222,14 @@ def page(places: tuple[Path, ...], output: Path, debug: bool) -> None:
 
 @benchmark.command(epilog="Example: translucent benchmark merge mine theirs.zip -o all")
 @click.argument("places", metavar="RESULTS...", type=_FOLDER, nargs=-1, required=True)
-@click.option("-o", "--output", type=_FOLDER, required=True, metavar="DIR", help="A folder in it for each renderer.")
+@click.option(
+    "-o",
+    "--output",
+    type=_FOLDER,
+    required=True,
+    metavar="DIR",
+    help="Output folder, with a subfolder for each renderer.",
+)
 @_JSON
 @_DEBUG
 def merge(places: tuple[Path, ...], output: Path, as_json: bool, debug: bool) -> None:

@@ -46,7 +46,7 @@ def echo(text: str, *, err: bool = False, nl: bool = True, color: bool | None = 
         if err:
             raise
         found = f"it cannot be written ({error.strerror})"
-        raise RenderError("standard output", found, "check the disk, and where it is redirected to") from error
+        raise RenderError("standard output", found, "check the disk, and the target of the redirection") from error
 
 
 def advise(text: str) -> None:

@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class _ExplainedChoices(ChoiceOptions):
-    method: str | None = option(metavar="NAME", help="Explain this method instead of the planner's choice.")
+    method: str | None = option(
+        metavar="NAME", help="Explain the plan for this method, instead of the planner's choice."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,54 +55,70 @@ MOST_THIN_SHARE = 0.5
 class ExtinctionOptions:
     """Options of ``translucent extinction``."""
 
-    unit: str = option("m", help="Unit of distances without one, and of MODEL.")
-    unit_out: str = option("m", metavar="U", help="Also print the extinction per this unit.")
+    unit: str = option("m", help=("Unit of distances that are given without a unit, and of the coordinates of MODEL."))
+    unit_out: str = option("m", metavar="U", help="Also print the extinction per this unit of length.")
     clamp: bool | None = clamp_option()
     target: str | None = option(
         names=("--as",),
         type=NamesOf("translucent.materials", "TARGETS"),
-        help="Print the material for an engine, ready to paste.",
+        help="Print the material in the format of this engine.",
     )
     ior: float | None = option(
-        metavar="N", help="With --as and --fit PHOTO: index of refraction. Default: that of the medium, or 1."
+        metavar="N", help=("With --as and --fit PHOTO: index of refraction. Default: the index of the medium, or 1.")
     )
     roughness: float | None = option(
         type=click.FloatRange(0.0, 1.0),
         metavar="R",
-        help="With --as: roughness of the surface, 0 (polished) to 1. Default: that of --preset or --from, or 0.",
+        help=(
+            "With --as: roughness of the surface, from 0 (polished) to 1. Default: the roughness of "
+            "--preset or --from, or 0."
+        ),
     )
     batch: Path | None = option(metavar="FILE", help="Convert a table with rows name,color,distance.")
     output: Path | None = option(names=("-o", "--output"), help="Output of --batch: a .json or .csv file.")
     fit: tuple[Path, ...] = option(
         (),
         metavar="FILE",
-        help="Fit a medium to a .csv with rows distance,color[,weight]; or to a photograph of plates before a light, "
-        "with "
-        "--white and --patch (repeat for more exposures); or to a .toml that lists such photographs.",
+        help=(
+            "Fit a medium to one of: a .csv file with rows distance,color[,weight]; a photograph of "
+            "plates in front of a light, with --white and --patch (repeat --fit for more exposures); a "
+            ".toml file that lists such photographs."
+        ),
     )
-    white: str | None = option(metavar="X,Y,W,H", help="With --fit PHOTO: a rectangle of bare light, in pixels.")
+    white: str | None = option(
+        metavar="X,Y,W,H",
+        help=("With --fit PHOTO: a rectangle of the photograph that shows only the light, in pixels."),
+    )
     patch: tuple[str, ...] = option(
         (),
         metavar="X,Y,W,H=D",
-        help="With --fit PHOTO: a rectangle and the thickness of its plate; of equal steps, X,Y,W,H=1mm,2mm,4mm; of a "
-        "wedge, X,Y,W,H=1mm..8mm. May be repeated.",
+        help=(
+            "With --fit PHOTO: a rectangle of the photograph, and the thickness of the plate in this "
+            "rectangle; for equally wide steps, X,Y,W,H=1mm,2mm,4mm; for a wedge, X,Y,W,H=1mm..8mm. May "
+            "be repeated."
+        ),
     )
-    preset: str | None = option(metavar="NAME", help="A named medium instead of a color at a distance.")
+    preset: str | None = option(metavar="NAME", help="Use a named medium instead of a color at a distance.")
     source: str | None = option(
         names=("--from",),
         metavar="FILE",
-        help="Read the medium from a .mtlx or .usda file, or from the output of --as.",
+        help="Read the medium from a .mtlx or .usda file, or from a file that --as printed.",
     )
-    td: str | None = option(metavar="D", help="Transmission distance of a filament for 3D printers instead: 4mm, or 4.")
+    td: str | None = option(
+        metavar="D",
+        help=("Use the transmission distance of a filament for 3D printing instead of a color: 4mm, or 4 (in mm)."),
+    )
     td_transmittance: float | None = option(
         metavar="T",
-        help="Fraction of light that is left after --td, and after the printed TD. Default: 0.1, T = 10^(-d/TD).",
+        help=("Fraction of light that is left after the transmission distance. Default: 0.1, T = 10^(-d/TD)."),
     )
     model: str | None = option(
-        names=("--on",), metavar="MODEL", help="Print colors on this model, a file or a mesh of the toolkit; see above."
+        names=("--on",),
+        metavar="MODEL",
+        help=("Print the colors of the medium on this model, which is a file or a built-in mesh; see above."),
     )
     eye: str | None = option(
-        metavar="X,Y,Z", help="With --on: position of the eye, in metres. Default: that of render."
+        metavar="X,Y,Z", help=("With --on: position of the eye, in metres. Default: the same camera as in render.")
     )
     overwrite: bool = overwrite_option()
     allow_outside: bool = outside_option()
@@ -183,25 +199,45 @@ def _check_usage(given: ExtinctionOptions, color: str | None, as_json: bool) -> 
     ):
         both = [name for name, value in rivals.items() if value is not None]
         if len(both) > 1:
-            raise InputError(f"{both[1]} with {both[0]}", "they ask for different results", "give one of them")
+            raise InputError(
+                f"{both[1]} and {both[0]} exclude each other",
+                "each of the two options computes a different result",
+                "use only one of the two",
+            )
     of_photographs = bool(given.fit) and not _is_table(given.fit)
     for name, value in (("--ior", None if of_photographs else given.ior), ("--roughness", given.roughness)):
         if value is not None and given.target is None:
-            raise InputError(f"{name} {value:g}", "only a material for an engine has it", "add --as, or leave it out")
+            raise InputError(
+                f"{name} {value:g}",
+                "this option applies only to a material for an engine",
+                "add --as, or omit the option",
+            )
     if given.output is not None and given.batch is None:
-        raise InputError(f"-o {given.output}", "only --batch writes a file", "leave it out")
+        raise InputError(f"-o {given.output}", "only --batch writes an output file", "omit -o")
     if given.eye is not None and given.model is None:
-        raise InputError(f"--eye {given.eye}", "only --on looks at a model", "leave it out")
+        raise InputError(f"--eye {given.eye}", "only --on uses a view of a model", "omit --eye")
     if given.batch is not None and given.td_transmittance is not None:
-        raise InputError(f"--td-transmittance {given.td_transmittance:g}", "--batch prints no TD", "leave it out")
+        raise InputError(
+            f"--td-transmittance {given.td_transmittance:g}",
+            "--batch does not print a transmission distance",
+            "omit --td-transmittance",
+        )
     if given.batch is not None and given.target is not None:
-        raise InputError(f"--as {given.target}", "it takes one color, not --batch", "leave one of them out")
+        raise InputError(
+            f"--as {given.target}", "--as converts a single color, but --batch converts many", "omit one of the two"
+        )
     if not given.fit and (given.white is not None or given.patch):
         raise InputError(
-            "--white" if given.white is not None else "--patch", "only --fit PHOTO takes it", "add --fit PHOTO"
+            "--white" if given.white is not None else "--patch",
+            "these options apply only to --fit PHOTO",
+            "add --fit PHOTO",
         )
     if given.fit and given.clamp:
-        raise InputError("--clamp", "an invented sample would falsify --fit", "leave out rows with a channel of 0")
+        raise InputError(
+            "--clamp",
+            ("--clamp would replace measured zeros by invented values, which would falsify the fit"),
+            "remove the table rows that have a channel of 0",
+        )
 
 
 def _distance_hint(color: str) -> str:
@@ -273,11 +309,17 @@ def _fitted(given: ExtinctionOptions) -> tuple[Medium, float, dict[str, Any], st
     described = _is_table(fits) or fits[0].suffix.lower() == ".toml"
     if described and len(fits) > 1:
         raise InputError(
-            f"--fit {fits[1]}", f"--fit {fits[0]} is given, too", "give one table or .toml, or photographs"
+            f"--fit {fits[1]}",
+            f"--fit {fits[0]} is given, too, and only photographs can be combined",
+            "give one table, one .toml file, or several photographs",
         )
     if described and photographed:
         requested = "--white" if given.white is not None else "--patch"
-        raise InputError(requested, "only a photograph takes it", "leave it out, or write it into the .toml")
+        raise InputError(
+            requested,
+            "this option applies only to a photograph",
+            "omit the option, or write its value into the .toml file",
+        )
     return _fitted_to_table(given) if _is_table(fits) else _fitted_to_photographs(given)
 
 
@@ -322,7 +364,7 @@ def _fitted_to_photographs(given: ExtinctionOptions) -> tuple[Medium, float, dic
         if given.white is None or not given.patch:
             missing = "--white" if given.white is None else "--patch"
             do = "say where in it the bare light is, --white X,Y,W,H, and the steps, --patch X,Y,W,H=1mm,2mm,4mm"
-            raise InputError(f"--fit {given.fit[0]}", f"{missing} is missing", do)
+            raise InputError(f"--fit {given.fit[0]}", f"this fit also needs {missing}", do)
         listed = [patch for text in given.patch for patch in parse_patches(text, given.unit)]
         shots = [Photograph(one, parse_rectangle(given.white), listed) for one in given.fit]
     fit = fit_photographs(shots, given.ior)

@@ -90,20 +90,28 @@ def _texture_text(entry: GltfMaterial) -> str:
 class ApplyOptions:
     """Options of ``translucent material apply``."""
 
-    output: Path = option(names=("-o", "--output"), required=True, help="A .glb or .gltf file.")
+    output: Path = option(names=("-o", "--output"), required=True, help="Output file: .glb or .gltf.")
     medium: MediumOptions = group(MediumOptions)
     object: str | None = option(
         metavar="NAME",
-        help="Change only the objects of this name. Default: all translucent objects; if there are none, all.",
+        help=(
+            "Change only the objects of this name. Default: all translucent objects; if the file has none, all objects."
+        ),
     )
     thickness: str | None = option(
-        metavar="T", help="Thickness, in the units of the mesh, as in glTF. Default: the smallest side."
+        metavar="T",
+        help=(
+            "Thickness of the volume, in the units of the mesh, as in glTF. Default: the shortest side of the object."
+        ),
     )
     draft_extensions: str | None = option(
         is_flag=False,
         flag_value="scatter",
         type=click.Choice(["scatter", "volume-scatter"]),
-        help="Also write scattering, in a draft extension: KHR_materials_scatter or KHR_materials_volume_scatter.",
+        help=(
+            "Also write scattering, as one of two draft extensions: KHR_materials_scatter or "
+            "KHR_materials_volume_scatter."
+        ),
     )
     overwrite: bool = overwrite_option()
     allow_outside: bool = outside_option()
@@ -145,10 +153,13 @@ def apply(model: str, given: ApplyOptions, as_json: bool) -> None:
 class CheckOptions:
     """Options of ``translucent material check``."""
 
-    fix: bool = option(False, help="Bake wrong thicknesses anew into OUTPUT, and check OUTPUT.")
+    fix: bool = option(
+        False,
+        help=("Bake thickness for the materials in which it is wrong, write the file to OUTPUT, and check OUTPUT."),
+    )
     output: Path | None = option(names=("-o", "--output"), help="Output of --fix: a .glb file.")
-    size: int = option(512, metavar="N", help="With --fix: texels along each side of a map.")
-    rays: int = option(64, metavar="N", help="With --fix: rays from each texel.")
+    size: int = option(512, metavar="N", help="With --fix: number of texels along each side of a map.")
+    rays: int = option(64, metavar="N", help="With --fix: number of rays from each texel.")
     overwrite: bool = overwrite_option()
     allow_outside: bool = outside_option()
 
@@ -171,7 +182,7 @@ def check(model: str, given: CheckOptions, as_json: bool) -> None:
     output, outside = given.output, given.allow_outside
     if given.fix != (output is not None):
         requested, missing = ("--fix", "-o OUTPUT is missing") if given.fix else (f"-o {output}", "--fix is missing")
-        raise InputError(requested, missing, "give both, or neither")
+        raise InputError(requested, missing, "these options belong together: give both, or neither")
     found = left = check_materials(model, allow_outside=outside)
     if output is not None:
         refuse_overwriting(output, model)

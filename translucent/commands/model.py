@@ -140,7 +140,9 @@ def read_scene(model: str, requested: SceneRequest) -> Scene:
     options, (stage, turn) = requested.camera, _turned(requested.stage)
     if options.camera is not None and options.defining:
         raise InputError(
-            f"--camera {options.camera}", f"{', '.join(options.defining)} given, too", "give one or the other"
+            f"--camera {options.camera}",
+            f"--camera cannot be combined with {', '.join(options.defining)}",
+            "use one or the other",
         )
     composed = is_composed(model)
     read = _composed_scene if composed else _file_scene if is_scene_file(model) else _mesh_scene
@@ -168,7 +170,9 @@ def read_scene(model: str, requested: SceneRequest) -> Scene:
             scene = dataclasses.replace(scene, camera=camera)
         scene = staged(scene, chosen, requested.environment, turn, requested.ground)
     elif requested.ground is not None:
-        raise InputError(f"--ground {requested.ground}", "there is no stage", "add --stage studio, or leave it out")
+        raise InputError(
+            f"--ground {requested.ground}", "the scene has no stage", "add --stage studio, or omit --ground"
+        )
     count = requested.environment_shadows
     return scene if count is None else dataclasses.replace(scene, environment_shadows=count)
 
@@ -199,7 +203,7 @@ def _turned(stage: str | None) -> tuple[str | None, float]:
     try:
         turn = float(degrees) if comma else 0.0
     except ValueError:
-        raise InputError(f"--stage {stage!r}", f"{degrees!r} is no number of degrees", f"write {name},90") from None
+        raise InputError(f"--stage {stage!r}", f"{degrees!r} is not a number of degrees", f"write {name},90") from None
     return (name if comma else stage), turn
 
 
@@ -208,10 +212,12 @@ def _mesh_scene(model: str, requested: SceneRequest, stage: str | None) -> tuple
     from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, stage_named
 
     if (camera := requested.camera.camera) is not None:
-        raise InputError(f"--camera {camera}", f"{model} is no glTF file and has no cameras", "use --eye")
+        raise InputError(
+            f"--camera {camera}", f"{model} is not a glTF file, so it has no cameras", "use --eye to place the camera"
+        )
     for option, value in (("--variant", requested.variant), ("--time", requested.time)):
         if value is not None:
-            raise InputError(f"{option} {value}", f"{model} is no glTF file", "leave it out")
+            raise InputError(f"{option} {value}", f"{model} is not a glTF file", "omit the option")
     chosen = stage_named(stage or (DEFAULT_STAGE if requested.environment is None else NO_STAGE))
     mesh = read_mesh(model, requested.file)
     filling = requested.medium or default_medium(mesh, chosen)
@@ -256,7 +262,7 @@ def _composed_scene(model: str, requested: SceneRequest, stage: str | None) -> t
         ("--time", requested.time),
     ):
         if value is not None:
-            raise InputError(f"{option} {value}", f"{model} is no glTF file", "leave it out")
+            raise InputError(f"{option} {value}", f"{model} is not a glTF file", "omit the option")
     medium, file = requested.medium, requested.file
     scene: Scene = load_composed(
         model,
@@ -291,7 +297,7 @@ def require_translucent(model: str, scene: Scene) -> None:
         raise InputError(
             f"rendering {model!r}",
             f"its {count} object{' is' if count == 1 else 's are'} opaque: no material has KHR_materials_transmission",
-            "add --preset NAME, or --color C and --distance D, to give all of them a medium",
+            "add --preset NAME, or --color C and --distance D, to give a medium to all objects",
         )
 
 
@@ -342,14 +348,16 @@ def mesh_file(model: str, unit: str | None) -> str:
     if is_own(model):
         if unit not in (None, "m"):
             raise InputError(
-                f"--unit {unit}", f"{model} comes with the toolkit, in metres", "leave --unit out, or give --height"
+                f"--unit {unit}",
+                f"{model} is a built-in mesh, whose coordinates are in metres",
+                "omit --unit, or set the size by --height",
             )
         return str(mesh_path(model))
     if not os.path.lexists(model) and not os.path.dirname(model) and not Path(model).suffix:
         raise InputError(
             f"mesh {model!r}",
-            "no file and no mesh of the toolkit",
-            f"give a path, or one of {', '.join(sorted(mesh_names()))}",
+            "no file and no built-in mesh has this name",
+            f"give the path of a file, or one of {', '.join(sorted(mesh_names()))}",
         )
     return model
 
@@ -362,12 +370,12 @@ def _defined_camera(scene: Scene, options: CameraOptions, size: tuple[int, int],
     up, fov = read_vector("--up", options.up or DEFAULT_UP), DEFAULT_FOV if options.fov is None else options.fov
     if options.eye is None:
         if options.target is not None:
-            raise InputError("--target", "--eye is missing", "give both, or neither")
+            raise InputError("--target", "--target works only together with --eye", "give both options, or neither")
         view = options.direction, options.fit
         return framing(scene.objects, size, fov, up, None, *view) if stage is None else scene.camera
     for name, value in (("--orbit", options.orbit), ("--fit", options.fit)):
         if value is not None:
-            raise InputError(f"{name} {value}", "--eye is given, too", "give one or the other")
+            raise InputError(f"{name} {value}", "this option cannot be combined with --eye", "use one or the other")
     target = scene.bounds.mean(axis=0) if options.target is None else read_vector("--target", options.target)
     return Camera.look_at(read_vector("--eye", options.eye), target, up, fov_y=fov)
 
@@ -379,7 +387,7 @@ def read_vector(option: str, text: str) -> list[float]:
     except ValueError:
         values = []
     if len(values) != 3:
-        raise InputError(f"{option} {text!r}", "not three numbers", f"write for example {option} 0,1.5,4")
+        raise InputError(f"{option} {text!r}", "the value is not three numbers", f"write for example {option} 0,1.5,4")
     return values
 
 
@@ -464,11 +472,11 @@ def read_objects(names: Sequence[str]) -> list[NamedMedium]:
     found: list[NamedMedium] = []
     for name, options in zip(names, click.get_current_context().meta[_GROUPS], strict=True):
         if name in [one.name for one in found]:
-            raise InputError(f"{_OBJECT} {name!r}", "it is named twice", "give it one medium")
+            raise InputError(f"{_OBJECT} {name!r}", "the object is named twice", "give the object one medium")
         given = collected(_ObjectOptions, _of_one_object.make_context("render", options).params)
         if (medium := given.read()) is None:
             do = "add --preset NAME, or --color C and --distance D, behind it"
-            raise InputError(f"{_OBJECT} {name!r}", "no medium is named for it", do)
+            raise InputError(f"{_OBJECT} {name!r}", "no medium is given for this object", do)
         found.append(
             NamedMedium(name, given.changed(medium), given.surface_roughness(given.roughness), given.keeps_ior)
         )

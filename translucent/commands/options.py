@@ -140,7 +140,9 @@ def with_options(kind: type, verb: Verb) -> Verb:
 
 def common_options(verb: Verb) -> Verb:
     """Options of every verb."""
-    verb = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")(verb)
+    verb = click.option("--debug", is_flag=True, expose_value=False, help="Show the Python traceback of an error.")(
+        verb
+    )
     return click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")(verb)
 
 
@@ -238,8 +240,10 @@ def clamp_option() -> Any:
 class MediumOptions:
     """Options that choose a medium by what it transmits."""
 
-    color: str | None = option(metavar="C", help="Transmitted color: '#7b1e3a', salmon, 'linear(.18,.62,.35)'.")
-    distance: str | None = option(metavar="D", help="Distance at which light has the color: 2cm, 0.8in.")
+    color: str | None = option(
+        metavar="C", help="Color that the medium transmits: '#7b1e3a', salmon, 'linear(.18,.62,.35)'."
+    )
+    distance: str | None = option(metavar="D", help="Distance after which light has the color of --color: 2cm, 0.8in.")
     preset: str | None = option(metavar="NAME", help="A named medium, such as merlot.")
     clamp: bool | None = clamp_option()
 
@@ -253,7 +257,7 @@ class MediumOptions:
         if self.preset is not None:
             if color is not None or distance is not None:
                 requested, found = f"--preset {self.preset}", "--color or --distance is given, too"
-                raise InputError(requested, found, "give one or the other")
+                raise InputError(requested, found, "use one or the other")
             chosen = preset(self.preset)
             if chosen.warning and not shows_scattering:
                 echo(f"warning: {chosen.warning}", err=True)
@@ -285,11 +289,18 @@ class AnyMediumOptions(MediumOptions):
 
     scattering_color: str | None = option(
         metavar="C",
-        help=f"Diffuse color of a thick body that scatters, with --mean-free-path; its index of refraction is "
-        f"{SCATTERING_IOR:g}. For wax: --scattering-color '#f2e0b8' --mean-free-path 2mm.",
+        help=(
+            "With --mean-free-path: color of a thick body that scatters light. The index of refraction "
+            f"of this body is {SCATTERING_IOR:g}. For wax: --scattering-color '#f2e0b8' --mean-free-path "
+            "2mm."
+        ),
     )
     mean_free_path: str | None = option(
-        metavar="L", help="With --scattering-color: mean distance after which light is scattered or absorbed, as 0.5mm."
+        metavar="L",
+        help=(
+            "With --scattering-color: mean distance that light travels before it is "
+            "scattered or absorbed, such as 0.5mm."
+        ),
     )
 
     def read(self, *, shows_scattering: bool = True) -> Medium | None:
@@ -305,7 +316,11 @@ class AnyMediumOptions(MediumOptions):
             given, missing = missing, given
         others = {"--color": self.color, "--distance": self.distance, "--preset": self.preset}
         if other := [name for name, value in others.items() if value is not None]:
-            raise InputError(given, f"{other[0]} is given, too", "give one medium: by what it transmits or scatters")
+            raise InputError(
+                given,
+                f"{other[0]} is given, too, and both options define a medium",
+                "give a single medium: either by its transmitted color or by its scattering color",
+            )
         if color is None or length is None:
             do = "give both: the color of a body with no end says nothing about how far light gets in it"
             raise InputError(given, f"{missing} is missing", do)
@@ -319,15 +334,17 @@ class BodyOptions(AnyMediumOptions):
     ior: float | None = option(
         type=click.FloatRange(1.0, 100.0),
         metavar="N",
-        help="Index of refraction; at 1, light enters without refraction, as in fog. Default: that of the preset or "
-        "the "
-        f"file, {SCATTERING_IOR:g} with --scattering-color, else 1.5 (glass).",
+        help=(
+            "Index of refraction. At 1, light enters without refraction, as in fog. Default: the index "
+            f"of the preset or the file, {SCATTERING_IOR:g} with --scattering-color, otherwise 1.5 "
+            "(glass)."
+        ),
     )
 
     dilute: float | None = option(
         type=click.FloatRange(0.0, 1e12, min_open=True),
         metavar="F",
-        help="Divide the coefficients of the medium by F: 5 makes the medium five times as clear.",
+        help="Divide the coefficients of the medium by F. With F = 5, light travels five times as far.",
     )
 
     def read(self, *, shows_scattering: bool = True) -> Medium | None:
@@ -373,7 +390,10 @@ def outside_option() -> Any:
     """Field for reading what a model links to."""
     return option(
         False,
-        help="Also read files that MODEL links to outside its folder. Only for models that you trust.",
+        help=(
+            "Also read files outside the folder of MODEL, if MODEL links to them. Use this only for "
+            "models that you trust."
+        ),
     )
 
 
@@ -381,12 +401,17 @@ def outside_option() -> Any:
 class FileOptions:
     """Options for how the file of a model is read."""
 
-    unit: str | None = option(metavar="U", help="Unit of the file's coordinates: mm, cm, in, ... or 25mm. Default: m.")
-    height: str | None = option(metavar="L", help="Scale the model to this height, along +Y: 12cm.")
+    unit: str | None = option(
+        metavar="U", help="Unit of the coordinates in the file: mm, cm, in, ... or 25mm. Default: m."
+    )
+    height: str | None = option(metavar="L", help="Scale the model to this height along the +Y axis: 12cm.")
     longest: str | None = option(metavar="L", help="Scale the model so that its longest side has this length: 12cm.")
     allow_outside: bool = outside_option()
     draft_extensions: bool = option(
-        False, help="Read the draft extensions KHR_materials_scatter and KHR_materials_volume_scatter of a glTF MODEL."
+        False,
+        help=(
+            "Read the draft extensions KHR_materials_scatter and KHR_materials_volume_scatter, if MODEL is a glTF file."
+        ),
     )
 
     @property
@@ -404,7 +429,7 @@ class FileOptions:
         stated = [name for name, value in given.items() if value is not None]
         if len(stated) > 1:
             requested = f"--{stated[0]} {given[stated[0]]}"
-            raise InputError(requested, f"--{stated[1]} is given, too", "give one of them: each scales the model")
+            raise InputError(requested, f"--{stated[1]} is given, too", "both options scale the model: use one of them")
         return {name: parse_length(value) for name, value in given.items() if name != "unit" and value is not None}
 
 
@@ -412,21 +437,34 @@ class FileOptions:
 class CameraOptions:
     """Options that choose a camera."""
 
-    camera: int | None = option(metavar="N", help="Camera of a glTF file, counted from 0. Default: 0, if it has any.")
-    eye: str | None = option(
-        metavar="X,Y,Z", help="Position of the camera in metres. Default: the whole model in view."
+    camera: int | None = option(
+        metavar="N", help=("Number of a camera in the glTF file, counted from 0. Default: 0, if the file has a camera.")
     )
-    target: str | None = option(metavar="X,Y,Z", help="What the camera looks at. Default: the model's center.")
+    eye: str | None = option(
+        metavar="X,Y,Z",
+        help=("Position of the camera in metres. Default: a position from which the whole model is visible."),
+    )
+    target: str | None = option(
+        metavar="X,Y,Z", help="Point that the camera looks at. Default: the center of the model."
+    )
     up: str | None = option(metavar="X,Y,Z", help=f"Direction that points up in the picture. Default: {DEFAULT_UP}.")
-    fov: float | None = option(metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
+    fov: float | None = option(
+        metavar="DEG", help=f"Vertical field of view of the camera in degrees. Default: {DEFAULT_FOV:g}."
+    )
     orbit: str | None = option(
         metavar="YAW,PITCH",
-        help="View the model from these angles: degrees about +Y (0: front, 90: +X), and degrees upwards: 30,15.",
+        help=(
+            "View the model from these angles in degrees: the first turns around the +Y axis (0: front, "
+            "90: +X), the second goes upwards: 30,15."
+        ),
     )
     fit: float | None = option(
         type=click.FloatRange(0.0, 1.0, min_open=True),
         metavar="F",
-        help="Let the model fill this fraction of the picture, along the side that it fills more: 0.8.",
+        help=(
+            "Move the camera so that the model covers this fraction of the picture's width or height, "
+            "whichever is larger: 0.8."
+        ),
     )
 
     @property
@@ -445,7 +483,9 @@ class CameraOptions:
         try:
             yaw, pitch = (float(part) for part in self.orbit.split(","))
         except ValueError:
-            raise InputError(f"--orbit {self.orbit!r}", "not two numbers", "write for example --orbit 30,15") from None
+            raise InputError(
+                f"--orbit {self.orbit!r}", "the value is not two numbers", "write for example --orbit 30,15"
+            ) from None
         if not (abs(yaw) <= 1e6 and abs(pitch) < 90.0):
             found = "a pitch beyond -90 to 90" if abs(yaw) <= 1e6 else "not finite"
             raise InputError(f"--orbit {self.orbit}", found, "give degrees, such as 30,15")
@@ -494,21 +534,28 @@ class LookOptions:
 
     environment: str | None = option(
         metavar="E",
-        help="Environment that lights the model and shows in reflections: light-table, studio, checkerboard, a "
-        "color, or "
-        "a .hdr, .exr or .png of all directions; studio,90 turns it by 90 degrees. Default: by stage, else "
-        "light-table.",
+        help=(
+            "Environment that illuminates the model and appears in reflections: light-table, studio, "
+            "checkerboard, a color, or a panorama file (.hdr, .exr or .png). studio,90 rotates the "
+            "environment by 90 degrees. Default: the environment of the stage, otherwise light-table."
+        ),
     )
     background: str | None = option(
-        metavar="E", help="Environment that is visible behind the model and through it; values as of --environment."
+        metavar="E",
+        help=("Environment that is visible behind and through the model. Accepts the same values as --environment."),
     )
     exposure: float = option(
-        0.0, metavar="STOPS", show_default=False, help="Exposure of a .png: positive numbers make it brighter."
+        0.0,
+        metavar="STOPS",
+        show_default=False,
+        help="Exposure of a .png picture in stops: positive numbers make the picture brighter.",
     )
     tone: str | None = option(
         type=NamesOf("translucent.formulas.tone", "TONES"),
-        help="Tone curve of a .png: none (clamped), neutral (Khronos PBR) or agx. Default: neutral on a stage, else "
-        "none.",
+        help=(
+            "Tone curve of a .png picture: none (values above 1 are clipped), neutral (Khronos PBR) or "
+            "agx. Default: neutral on a stage, otherwise none."
+        ),
     )
     roughness: float | None = roughness_option()
 
@@ -532,7 +579,9 @@ def _environment(text: str) -> Environment:
         try:
             name, rotation = head, float(tail)
         except ValueError:
-            raise InputError(f"environment {text!r}", f"rotation {tail!r}", "give degrees, as in studio,90") from None
+            raise InputError(
+                f"environment {text!r}", f"{tail!r} is not a rotation in degrees", "write the rotation as in studio,90"
+            ) from None
     return named_environment(name, rotation)
 
 
@@ -555,63 +604,82 @@ class ChoiceOptions:
     method: str | None = option(metavar="NAME", help=_method_words)
     paths: int | None = option(
         metavar="N",
-        help="With --method path-traced: random paths per pixel. Default: 64. Four times as many halve the noise.",
+        help=(
+            "With --method path-traced: number of random paths per pixel. Default: 64. Four times as "
+            "many paths halve the noise."
+        ),
     )
     interfaces: str | None = option(
         type=NamesOf("translucent.planning.interfaces", "INTERFACES"),
-        help="Where light is reflected and refracted. traced: at all interfaces, by rays through the meshes. screen: "
-        "where light enters bodies and where it leaves them, in screen space (quicker). front: only where light enters "
-        "(quickest). Default: traced for solid bodies, if rays can be traced; the plan states the choice.",
+        help=(
+            "How interfaces reflect and refract light. traced: ray tracing through the meshes. screen: "
+            "refraction in screen space, where rays enter and leave bodies (quicker). front: refraction "
+            "only where rays enter (quickest). Default: traced for solid bodies, if ray tracing is "
+            "possible; the plan states the choice."
+        ),
     )
     interface_depth: int | None = option(
-        metavar="N", help="With --interfaces traced: interfaces that a ray may hit, 1 to 64. Default: 24."
+        metavar="N",
+        help=("With --interfaces traced: largest number of interfaces that a ray may cross, 1 to 64. Default: 24."),
     )
     interface_forks: int | None = option(
         metavar="N",
-        help="With --interfaces traced: how often both the reflected and the refracted ray are followed. Default: 2.",
+        help=(
+            "With --interfaces traced: how many times a ray may split into a reflected and a refracted ray. Default: 2."
+        ),
     )
     interface_hits: str | None = option(
         type=NamesOf("translucent.planning.methods.base", "HITS"),
-        help="With --interfaces traced: ray caster that finds the surfaces that rays hit, Embree or shaders (gl). "
-        "Default: "
-        "Embree if OpenGL is a software rasterizer.",
+        help=(
+            "With --interfaces traced: ray caster that finds the hits of rays, Embree (embree) or "
+            "shaders (gl). Default: Embree if OpenGL is a software rasterizer."
+        ),
     )
     scattering: str | None = option(
         type=NamesOf("translucent.planning.scattering", "SCATTERINGS"),
-        help="How to render light that media scatter many times. diffusion: light spreads in the body (wax, milk, "
-        "jade). "
-        "layer: light leaves where it entered, as from a flat layer (quicker if lights or media change all the time). "
-        "single: only light that is scattered once is rendered (smoke, clear drinks). Default: diffusion in closed "
-        "bodies with an interface, layer in sheets and open meshes, single where there is no interface or little "
-        "scatters.",
+        help=(
+            "Model of multiple scattering. diffusion: light spreads in the body (wax, milk, jade). "
+            "layer: light leaves where it entered, as from a flat layer (quicker if lights or media "
+            "change often). single: only single scattering is rendered (smoke, clear drinks). Default: "
+            "diffusion for closed bodies with an interface, layer for sheets and open meshes, single "
+            "for bodies without an interface or with little scattering."
+        ),
     )
     diffusion_resolution: int | None = option(
         metavar="N",
-        help="With --scattering diffusion: resolution, 8 to 128; a body gets about N^3 / 4 cells. Default: 32.",
+        help=(
+            "With --scattering diffusion: resolution of the grid, 8 to 128. A body gets about N^3 / 4 "
+            "cells. Default: 32."
+        ),
     )
     caustics: int | None = option(
         is_flag=False,
         flag_value=1_000_000,
         metavar="[N]",
-        help="Render caustics: N photons carry light of point, spot and directional lights through interfaces onto "
-        "opaque objects and into fog, wax and milk. Default: some photons if a clear body gathers light on an opaque "
-        "object, and they take less than a third of the time. 0: none; without N: a million; at most 2^30. Four "
-        "times as "
-        "many photons halve the noise.",
+        help=(
+            "Render caustics with N photons, which carry the light of point, spot, sphere and "
+            "directional lights through interfaces onto opaque objects and into fog, wax and milk. "
+            "Default: caustics are added if a clear body focuses light on an opaque object, and if "
+            "photons take less than a third of the render time. 0: no caustics. Without N: a million "
+            "photons. Largest N: 2^30. Four times as many photons halve the noise."
+        ),
     )
     shadow_size: int | None = option(
         metavar="N",
-        help="Texels along a side of each light's shadow map, 64 to 8192. Default: 1024. More texels make edges "
-        "sharper.",
+        help=(
+            "Number of texels along a side of each light's shadow map, 64 to 8192. Default: 1024. More "
+            "texels make shadow edges sharper."
+        ),
     )
     environment_shadows: int | None = option(
         metavar="N",
-        help="Number of directions of the environment that throw shadows onto opaque objects, 0 to 256. Default: 128 "
-        "on a stage, "
-        "else none.",
+        help=(
+            "Number of directions from which the environment casts shadows onto opaque objects, 0 to "
+            "256. Default: 128 on a stage, otherwise none."
+        ),
     )
     thickness: str | None = option(
-        metavar="D", help="Thickness of the sheets of --method thin-layer, such as 0.3mm. Default: 1mm."
+        metavar="D", help="With --method thin-layer: thickness of the sheets, such as 0.3mm. Default: 1mm."
     )
 
     flags: Flags = group(Flags)
@@ -639,13 +707,13 @@ class ChoiceOptions:
         if self.paths is not None:
             if method is None or not method.follows_paths:
                 names = " or ".join(name for name, known in METHODS.items() if known.follows_paths)
-                raise InputError("--paths", f"only --method {names} takes it", f"add --method {names}")
+                raise InputError("--paths", f"this option applies only to --method {names}", f"add --method {names}")
             method = method.with_paths(self.paths)
         if self.thickness is None:
             return method
         if method is None or not method.makes_sheets:
             names = " or ".join(name for name, known in METHODS.items() if known.makes_sheets)
-            raise InputError("--thickness", f"only --method {names} takes it", f"add --method {names}")
+            raise InputError("--thickness", f"this option applies only to --method {names}", f"add --method {names}")
         return method.with_thickness(parse_length(self.thickness))
 
     def _interfaces(self) -> InterfaceMode | None:
@@ -659,7 +727,7 @@ class ChoiceOptions:
         given = {key: value for key, value in stated.items() if value is not None}
         if given and self.interfaces != TracedInterfaces.name:
             requested = f"--interface-{next(iter(given))}"
-            raise InputError(requested, "only --interfaces traced takes it", "add --interfaces traced")
+            raise InputError(requested, "this option applies only to --interfaces traced", "add --interfaces traced")
         if self.interfaces == TracedInterfaces.name:
             return TracedInterfaces(**{"depth": USUAL_DEPTH, **given})
         return None if self.interfaces is None else INTERFACES[self.interfaces]()
@@ -672,7 +740,7 @@ class ChoiceOptions:
             return None if name is None else SCATTERINGS[name]()
         if name != Diffusion.name:
             do = "add --scattering diffusion"
-            raise InputError("--diffusion-resolution", "only --scattering diffusion takes it", do)
+            raise InputError("--diffusion-resolution", "this option applies only to --scattering diffusion", do)
         return Diffusion(resolution)
 
 
@@ -683,7 +751,9 @@ def read_size(text: str) -> tuple[int, int]:
     try:
         width, height = (int(part) for part in text.lower().split("x"))
     except ValueError:
-        raise InputError(f"--size {text!r}", "not WxH", "write for example --size 1280x720") from None
+        raise InputError(
+            f"--size {text!r}", "the size must be WIDTHxHEIGHT", "write for example --size 1280x720"
+        ) from None
     return check_size((width, height))
 
 
@@ -694,7 +764,9 @@ def triple_text(values: Any) -> str:
 
 def verbose_option() -> Any:
     """Field for saying how a picture was made."""
-    return option(False, names=("-v", "--verbose"), help="Also print the media, and the plan with its reasons.")
+    return option(
+        False, names=("-v", "--verbose"), help="Also print the media of the scene, and the plan with its reasons."
+    )
 
 
 def overwrite_option() -> Any:
@@ -704,7 +776,7 @@ def overwrite_option() -> Any:
         context.meta[_OVERWRITE] = given
         return given
 
-    return option(False, callback=note, help="Allow the output to replace a file that the command reads.")
+    return option(False, callback=note, help="Allow the output to replace one of the files that the command reads.")
 
 
 def refuse_overwriting(output: Path, *inputs: str | Path | None) -> None:
@@ -727,8 +799,8 @@ def refuse_overwriting(output: Path, *inputs: str | Path | None) -> None:
             if same_file(file, output):
                 raise InputError(
                     f"output {str(output)!r}",
-                    f"it is read, as {str(file)!r}",
-                    "choose another name, or add --overwrite to replace it",
+                    f"the command reads this file, as {str(file)!r}",
+                    "choose another name for the output, or add --overwrite to replace the file",
                 )
 
 

@@ -21,8 +21,12 @@ _LISTED = ("name", "kind", "group", "regime", "colors", "diffuse_color", "source
 
 
 @click.group(invoke_without_command=True, epilog="Example: translucent presets --search wine")
-@click.option("--group", metavar="G", help="List only one group, such as 'stone and resin', or a part of its name.")
-@click.option("--search", metavar="WORDS", help="List only presets whose name, note or source has these words.")
+@click.option(
+    "--group",
+    metavar="G",
+    help=("List only the presets of this group, such as 'stone and resin', or a part of its name."),
+)
+@click.option("--search", metavar="WORDS", help="List only presets with these words in their name, note or source.")
 @common_options
 @click.pass_context
 def presets(context: click.Context, group: str | None, search: str | None, as_json: bool) -> None:
@@ -56,13 +60,15 @@ def _listed(group: str | None, search: str | None) -> list[Preset]:
         groups = grouped(found)
         chosen = [one for key, members in groups.items() if group.lower() in key for one in members]
         if not chosen:
-            raise InputError(f"--group {group!r}", "no group is called so", f"use one of {', '.join(groups)}")
+            raise InputError(f"--group {group!r}", "no group has this name", f"use one of {', '.join(groups)}")
         found = {one.name: one for one in chosen}
     if search is not None and not re.search(r"[^\W_]", search):
-        raise InputError(f"--search {search!r}", "no letters or digits", "give words, such as wine")
+        raise InputError(f"--search {search!r}", "the search text has no letters or digits", "give words, such as wine")
     if search is not None and not (found := matching(found, search)):
         which = "no preset" if group is None else f"no preset of --group {group!r}"
-        raise InputError(f"--search {search!r}", f"{which} has these words", "use fewer, or see 'translucent presets'")
+        raise InputError(
+            f"--search {search!r}", f"{which} has all of these words", "use fewer words, or run 'translucent presets'"
+        )
     return list(found.values())
 
 

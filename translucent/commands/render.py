@@ -101,55 +101,69 @@ class RenderOptions:
     """Options of ``translucent render``."""
 
     output: Path = option(
-        names=("-o", "--output"), required=True, help="A .png, .exr or .npz file; see --turntable and --as."
+        names=("-o", "--output"),
+        required=True,
+        help="Output file: .png, .exr or .npz; for other outputs see --turntable and --as.",
     )
     system: str | None = option(
         names=("--as",),
         type=click.Choice(["mitsuba"]),
-        help="Write the scene for another renderer in place of a picture: an .xml file for Mitsuba 3, with --samples "
-        "paths of each pixel, and by default no stage.",
+        help=(
+            "Instead of a picture, write a scene file for another renderer: an .xml file for Mitsuba 3. "
+            "Mitsuba then traces --samples paths per pixel. By default, the file has no stage."
+        ),
     )
     medium: BodyOptions = group(BodyOptions)
     object_names: tuple[str, ...] = option(
         (),
         names=("--object",),
         metavar="NAME",
-        help="Give the next medium (--preset P, or --color C --distance D) only to the object of this name; may be "
-        "repeated.",
+        help=(
+            "Give the next medium (--preset P, or --color C --distance D) only to the object of this "
+            "name. May be repeated."
+        ),
     )
     variant: str | None = option(
-        metavar="NAME", help="Materials of this variant of a glTF file (KHR_materials_variants)."
+        metavar="NAME", help="Use the materials of this variant of a glTF file (KHR_materials_variants)."
     )
     time: float | None = option(
         metavar="S",
-        help="Show the animations of a glTF file after S seconds. Default: nodes, skins and morph targets as stored.",
+        help=(
+            "Show a glTF file S seconds after the start of its animations. Default: the pose that the "
+            "file stores for nodes, skins and morph targets."
+        ),
     )
     file: FileOptions = group(FileOptions)
-    size: str = option("1280x720", metavar="WxH", help="Size of the picture in pixels.")
+    size: str = option("1280x720", metavar="WxH", help="Size of the picture in pixels, such as 1280x720.")
     camera: CameraOptions = group(CameraOptions)
     stage: str | None = stage_option()
     ground: str | None = ground_option()
     look: LookOptions = group(LookOptions)
     choices: ChoiceOptions = group(ChoiceOptions)
-    samples: int = option(16, metavar="N", help="Samples per pixel, for smooth edges.")
+    samples: int = option(16, metavar="N", help="Number of samples per pixel. More samples make edges smoother.")
     denoise: bool = option(
         False,
-        help="Remove the noise of rough surfaces and random paths, by Open Image Denoise, whose error is unknown. 4 "
-        "denoised samples of frosted glass look like 64.",
+        help=(
+            "Remove the noise of rough surfaces and random paths with Open Image Denoise. The error of "
+            "a denoised picture is unknown. 4 denoised samples of frosted glass look like 64 samples."
+        ),
     )
     opaque_with: str | None = option(
-        type=click.Choice(["pyrender"]), help="Let another renderer draw the opaque objects of a glTF file."
+        type=click.Choice(["pyrender"]), help="Draw the opaque objects of a glTF file with another renderer."
     )
     transparent: bool = option(
         False,
-        help="Make the background transparent, by an alpha channel. The ground of a stage then shows only shadows.",
+        help=("Make the background transparent, with an alpha channel. The ground of a stage then shows only shadows."),
     )
     turntable: int | None = option(
         type=click.IntRange(2, 3600),
         metavar="N",
-        help="Write N pictures from all around, as a .webp, .gif, .mp4, or a folder of numbered .png files.",
+        help=(
+            "Write N pictures of the model from all sides, as a .webp, .gif or .mp4, or as a folder of "
+            "numbered .png files."
+        ),
     )
-    fps: float | None = option(metavar="N", help=f"Pictures per second of a --turntable. Default: {FPS:g}.")
+    fps: float | None = option(metavar="N", help=f"Number of pictures per second of a --turntable. Default: {FPS:g}.")
     aov: Path | None = option(
         type=click.Path(path_type=Path, file_okay=False),
         metavar="DIR",
@@ -158,7 +172,10 @@ class RenderOptions:
     overwrite: bool = overwrite_option()
     verbose: bool = verbose_option()
     backend: str | None = option(
-        metavar="B", help="egl, window, osmesa or cpu. Default: one that works on this machine."
+        metavar="B",
+        help=(
+            "Renderer: egl, window and osmesa use OpenGL, cpu does not. Default: the first that works on this machine."
+        ),
     )
 
 
@@ -285,10 +302,10 @@ def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pict
         }
         if wrong := [name for name, value in chosen.items() if value is not None]:
             found = f"--as {given.system}: paths of another renderer choose nothing of that kind"
-            raise InputError(wrong[0], found, "leave out one of the two")
+            raise InputError(wrong[0], found, "these two options exclude each other: omit one of them")
         return
     if given.transparent and given.opaque_with is None and given.output.suffix.lower() == ".mp4":
-        raise InputError("--transparent", "a film, which holds no alpha", "leave out one of the two")
+        raise InputError("--transparent", "a film format cannot store a transparent background", "omit one of the two")
     if given.opaque_with is None:
         return
     interfaces = request.interfaces
@@ -305,7 +322,7 @@ def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pict
     }
     for requested, (clash, why) in clashes.items():
         if clash:
-            raise InputError(requested, f"--opaque-with, {why}", "leave out one of the two")
+            raise InputError(requested, f"--opaque-with, {why}", "omit one of the two")
 
 
 class Pictures:
@@ -337,20 +354,26 @@ class Pictures:
         self._check_size()
         if self.denoise and self.tiled:
             found = f"{self.size[0]}x{self.size[1]} pixels, which are written in tiles: seams would show"
-            raise InputError("--denoise", found, "give a smaller size, or leave it out")
+            raise InputError("--denoise", found, "choose a smaller picture size, or omit --denoise")
         if self.aov is not None and self.tiled:
             found = f"{self.size[0]}x{self.size[1]} pixels, which are written in tiles"
-            raise InputError(f"--aov {str(self.aov)!r}", found, "write an .exr, which holds these quantities")
+            raise InputError(f"--aov {str(self.aov)!r}", found, "write an .exr, which also stores these quantities")
         if self.aov is not None:
             require_folder(self.aov, f"--aov {str(self.aov)!r}")
         if self.turntable is None:
             if self.fps is not None:
-                raise InputError(f"--fps {self.fps:g}", "only --turntable takes it", "add --turntable, or leave it out")
+                raise InputError(
+                    f"--fps {self.fps:g}", "this option applies only to --turntable", "add --turntable, or omit --fps"
+                )
             check_output(self.output)
             return
         check_animation(self.output, self._rate)
         if self.aov is not None:
-            raise InputError(f"--turntable {self.turntable}", "--aov is given, too", "render one picture for it")
+            raise InputError(
+                f"--turntable {self.turntable}",
+                "--aov writes the quantities of a single picture",
+                "render a single picture to get these quantities",
+            )
 
     def _check_size(self) -> None:
         """Raise if nobody could wait for pictures of this size, or memory could not hold them."""
@@ -360,7 +383,7 @@ class Pictures:
         requested, pixels = f"--size {width}x{height}", width * height
         if pixels > MOST_PIXELS:
             found = f"{pixels / 1e6:.0f} million pixels, and {MOST_PIXELS / 1e6:.0f} million are the most"
-            raise InputError(requested, found, "give a smaller size, at most about 32768x32768")
+            raise InputError(requested, found, "choose a smaller picture size, at most about 32768x32768")
         if not self.tiled:
             do = "give a smaller size" if self.turntable else "give a smaller size, or write an .exr or .png, in tiles"
             found = f"{pixels / 1e6:.0f} million pixels at once"

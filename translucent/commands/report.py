@@ -32,15 +32,15 @@ class ReportOptions:
     """Options of ``translucent report``."""
 
     output: Path | None = option(
-        names=("-o", "--output"), metavar="DIR", help="Folder for report.html, .svg, .json and .csv."
+        names=("-o", "--output"), metavar="DIR", help="Output folder for report.html, .svg, .json and .csv."
     )
     quick: bool = option(
         False,
-        help="Measure roughly, in about a minute: fewer scenes, methods, pixels and repetitions.",
+        help="Measure roughly, in about a minute, with fewer scenes, methods, pixels and repetitions.",
     )
-    size: str | None = option(metavar="WxH", help="Size of the timed frames in pixels.")
+    size: str | None = option(metavar="WxH", help="Size of the timed pictures in pixels.")
     methods: str | None = option(
-        metavar="NAME,...", help="Measure only these methods: signed-depth, k-buffer, ray-marched, ..."
+        metavar="NAME,...", help="Measure only these thickness methods: signed-depth, k-buffer, ray-marched, ..."
     )
     only: str | None = option(
         metavar="PART,...", help="Measure only these parts: scenes, scaling, slabs, shadows, hard-cases."
@@ -48,17 +48,23 @@ class ReportOptions:
     source: Path | None = option(
         names=("--from",),
         metavar="JSON",
-        help="Write the report of this file again, without measuring; with --only, measure these parts anew.",
+        help=(
+            "Write the report page again from this report.json, without new measurements. With --only, "
+            "measure these parts again."
+        ),
     )
     limit: float | None = option(
-        metavar="SECONDS", help="Stop measuring after this time; the report names the scenes that are missing."
+        metavar="SECONDS", help="Stop measuring after this time. The report lists the scenes that are missing."
     )
     compare: Path | None = option(
-        metavar="JSON", help="Print what got worse since this report; exit code 1 if anything did."
+        metavar="JSON",
+        help=("Print which methods are slower or less accurate than in this report.json. The exit code is then 1."),
     )
     medium: MediumOptions = group(MediumOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
-    backend: str | None = option(metavar="B", help="egl, window or osmesa. Default: one that works on this machine.")
+    backend: str | None = option(
+        metavar="B", help=("OpenGL platform: egl, window or osmesa. Default: the first that works on this machine.")
+    )
 
 
 @click.command(epilog="Example: translucent report model.stl --unit mm -o out/report --quick")
@@ -78,17 +84,23 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
     measuring = models or given.quick or given.size or given.methods or given.backend or given.limit is not None
     if source is not None and not parts and (measuring or filling.color or filling.distance or filling.preset):
         raise InputError(
-            f"--from {source}", "nothing is measured, so there is nothing else to ask for", "leave one out"
+            f"--from {source}", "--from measures nothing, so this option has no effect", "omit one of the two"
         )
     if models and parts and "scenes" not in parts:
         do = "add scenes, or leave MODEL out"
-        raise InputError(f"--only {given.only}", "a MODEL is measured among the scenes", do)
+        raise InputError(
+            f"--only {given.only}", "a MODEL is measured as one of the scenes, so the part 'scenes' is needed", do
+        )
     if given.limit is not None and not given.limit > 0.0:
-        raise InputError(f"--limit {given.limit:g}", "not above 0", "give seconds, such as 600")
+        raise InputError(f"--limit {given.limit:g}", "the time must be above 0", "give seconds, such as 600")
     medium = filling.read()
     if medium is not None and not models:
         requested = "--color" if filling.preset is None else f"--preset {filling.preset}"
-        raise InputError(requested, "no MODEL to fill; the toolkit's scenes keep their media", "add a MODEL")
+        raise InputError(
+            requested,
+            ("the command needs a MODEL for this medium, because the built-in scenes keep their own media"),
+            "add a MODEL",
+        )
     limited = False
     before = None if given.compare is None else read_report(given.compare)
     made = None if source is None else read_report(source)
@@ -116,7 +128,9 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
     worse = [change for change in changes or () if change.worse]
     if made.failures:
         raise RenderError(
-            f"report: {len(made.failures)} of its measurements", f"they failed: {'; '.join(made.failures)}", "see above"
+            f"report: {len(made.failures)} of its measurements failed",
+            f"failed: {'; '.join(made.failures)}",
+            "see the messages above",
         )
     if worse:
         count = f"{len(worse)} {'thing' if len(worse) == 1 else 'things'} got worse"
@@ -189,7 +203,7 @@ def _parts(only: str | None) -> tuple[Part, ...]:
         if name not in known:
             close = difflib.get_close_matches(name, known, n=1)
             do = f"did you mean {close[0]}?" if close else f"use some of {', '.join(known)}"
-            raise InputError(f"--only {only}", f"{name!r} is no part of a report", do)
+            raise InputError(f"--only {only}", f"the report has no part {name!r}", do)
     return tuple(part for part in known if part in named)
 
 

@@ -87,14 +87,18 @@ process.stdout.write(JSON.stringify(answer));
 @click.command(epilog="Example: translucent shader signed_depth --define OPAQUE=0 --define SPECTRAL=0 --target webgl2")
 @click.argument("name", required=False)
 @click.option(
-    "--define", "defines", multiple=True, metavar="X=1", help="Value of a switch; repeat for each switch of the shader."
+    "--define",
+    "defines",
+    multiple=True,
+    metavar="X=1",
+    help="Value of a shader switch, such as OPAQUE=0. Repeat the option for each switch.",
 )
 @click.option(
     "--target",
     type=click.Choice(["glsl", "webgl2", "vulkan", "hlsl", "msl", "wgsl"]),
     default="glsl",
     show_default=True,
-    help="Language of the output.",
+    help="Language of the printed shader.",
 )
 @common_options
 def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Language, as_json: bool) -> None:
@@ -114,7 +118,7 @@ def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Languag
     if name is None:
         if given or target != "glsl":
             option = f"--define {defines[0]}" if defines else f"--target {target}"
-            raise InputError(option, "no shader is named", "add its NAME")
+            raise InputError(option, "no shader name is given", "add the NAME of a shader")
         return _list(as_json)
     found = find_shader(name)
     if target == "hlsl" or target == "msl" or target == "wgsl":
@@ -165,7 +169,11 @@ def _define(text: str) -> tuple[str, int]:
     """Parse a switch and its value; one without a value is on."""
     key, equals, value = text.partition("=")
     if not (key.isidentifier() and (value.isdecimal() if equals else True)):
-        raise InputError(f"--define {text!r}", "not a name with a whole number", "write for example --define OPAQUE=0")
+        raise InputError(
+            f"--define {text!r}",
+            "the value must be a switch name and a whole number",
+            "write for example --define OPAQUE=0",
+        )
     return key, int(value) if equals else 1
 
 
@@ -249,8 +257,8 @@ def translate(name: str, defines: Mapping[str, int], language: Language) -> Tran
     if name.endswith(".glsl") and not is_library:
         raise InputError(
             f"shader {name!r} in {_LANGUAGES[language]}",
-            "it is a part of stages, and asks them for what is not in it",
-            "take a stage (.vert, .frag), a file of lib/, or --target glsl, webgl2 or vulkan",
+            "the file is only a part of other shaders, and uses names that these shaders define",
+            "choose a complete shader (.vert, .frag), a file of lib/, or --target glsl, webgl2 or vulkan",
         )
     vulkan: Dialect = "vulkan"
     lifted = lift(name, defines, vulkan)
@@ -296,7 +304,10 @@ def _by_naga(what: str, source: str, stage: str) -> str:
     absent = InputError(
         "--target wgsl",
         "naga is not installed",
-        f"install Node.js, and 'npm install {NAGA}' here, or elsewhere with NODE_PATH set to its node_modules",
+        (
+            f"install Node.js, then run 'npm install {NAGA}' in this folder, or elsewhere with NODE_PATH set "
+            "to its node_modules"
+        ),
     )
     if node is None:
         raise absent
@@ -309,10 +320,10 @@ def _by_naga(what: str, source: str, stage: str) -> str:
     if done.returncode == 3:
         raise absent
     if done.returncode:
-        raise InputError(what, f"naga stopped: {_first_line(done.stderr)}", "take another target")
+        raise InputError(what, f"naga stopped: {_first_line(done.stderr)}", "choose another target")
     answer: dict[str, str] = json.loads(done.stdout)
     if "error" in answer:
-        raise InputError(what, f"naga: {_first_line(answer['error'])}", "take another target")
+        raise InputError(what, f"naga: {_first_line(answer['error'])}", "choose another target")
     return answer["text"]
 
 
@@ -323,7 +334,7 @@ def _run(what: str, command: Sequence[str], folder: str) -> str:
         # It names the file that it was given, first alone and then with the line.
         output = (done.stdout + done.stderr).replace(f"{command[-1]}:", "line ")
         reported = _first_line("\n".join(line for line in output.splitlines() if folder not in line))
-        raise InputError(what, f"{tool}: {reported or 'it stopped'}", "take another target")
+        raise InputError(what, f"{tool}: {reported or 'it stopped'}", "choose another target")
     return done.stdout
 
 

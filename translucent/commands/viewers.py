@@ -59,12 +59,14 @@ class PreviewOptions:
     """Options of ``translucent preview``."""
 
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
-    session: Path | None = option(metavar="FILE", help="Open this session, a .toml file.")
+    session: Path | None = option(metavar="FILE", help="Open this saved session, a .toml file.")
     stage: str | None = option(metavar="S", help=_stage_words)
-    size: str = option("1600x1000", metavar="WxH", help="Size of the window.")
-    scale: float = option(1.0, help="Size of letters and fields, 0.5 to 4.")
-    script: Path | None = option(metavar="FILE", help="Run the actions of a .toml file, then close the window.")
-    screenshot: Path | None = option(metavar="PNG", help="Save a picture of the window as this .png before it closes.")
+    size: str = option("1600x1000", metavar="WxH", help="Size of the window in pixels.")
+    scale: float = option(1.0, help="Scale of text and controls, 0.5 to 4.")
+    script: Path | None = option(metavar="FILE", help="Run the actions of this .toml file, then close the window.")
+    screenshot: Path | None = option(
+        metavar="PNG", help="Before the window closes, save a picture of the window as this .png file."
+    )
 
 
 @click.command(epilog="Example: translucent preview goblet")
@@ -86,11 +88,19 @@ def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
     if stage is not None and stage != AUTO:
         stage_named(stage)
     if session is not None and model is not None:
-        raise InputError(f"--session {str(session)!r}", f"{model} is given, too", "give one of them")
+        raise InputError(
+            f"--session {str(session)!r}",
+            f"{model} is given, too, but a session already names its model",
+            "omit one of the two",
+        )
     if not 0.5 <= given.scale <= 4.0:
-        raise InputError(f"--scale {given.scale}", "not in 0.5 to 4", "give for example 2")
+        raise InputError(f"--scale {given.scale}", "the scale must lie in 0.5 to 4", "use a value such as 2")
     if screenshot is not None and (screenshot.suffix.lower() != ".png" or not screenshot.parent.is_dir()):
-        raise InputError(f"--screenshot {str(screenshot)!r}", "no .png in a folder that is there", "give such a path")
+        raise InputError(
+            f"--screenshot {str(screenshot)!r}",
+            "this is not a .png file in an existing folder",
+            "give the path of a .png file in an existing folder",
+        )
     pixels = read_size(given.size)
     if session is not None:
         document = load_session(session)
@@ -145,24 +155,28 @@ RENDERED, NO_POSTER = "rendered", "none"
 class PageOptions:
     """Options of ``translucent page``."""
 
-    output: Path = option(names=("-o", "--output"), required=True, help="An .html file.")
+    output: Path = option(names=("-o", "--output"), required=True, help="Output file, such as viewer.html.")
     medium: BodyOptions = group(BodyOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
-    size: str = option("1280x800", metavar="WxH", help="Size of the poster and of the framed view in pixels.")
+    size: str = option(
+        "1280x800", metavar="WxH", help="Size of the poster picture, and aspect ratio of the first view, in pixels."
+    )
     camera: CameraOptions = group(CameraOptions)
     stage: str | None = stage_option()
     ground: str | None = ground_option()
     look: LookOptions = group(LookOptions)
     choices: ChoiceOptions = group(ChoiceOptions, without=("paths", "caustics", "adaptive"))
-    samples: int = option(16, metavar="N", help="Samples per pixel while nothing moves.")
-    title: str | None = option(metavar="TEXT", help="Title of the page. Default: the name of the model.")
+    samples: int = option(16, metavar="N", help="Number of samples per pixel while the view is still.")
+    title: str | None = option(metavar="TEXT", help="Title of the HTML page. Default: the name of the model.")
     poster: str = option(
         RENDERED,
         metavar="PICTURE",
-        help="Picture that the page shows until the scene is loaded, and without WebGL2: a .png, .jpg or .webp, "
-        "rendered, or none.",
+        help=(
+            "Poster: the picture that the page shows until the scene is loaded, and in browsers without "
+            "WebGL2. A .png, .jpg or .webp file, or rendered, or none."
+        ),
     )
-    simplify: int | None = option(metavar="N", help="Show a copy of the model with about N triangles.")
+    simplify: int | None = option(metavar="N", help="Simplify the model to about N triangles for the page.")
     overwrite: bool = overwrite_option()
     verbose: bool = verbose_option()
 

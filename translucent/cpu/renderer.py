@@ -176,7 +176,7 @@ class CpuRenderer:
             If the renderer is closed.
         """
         if self._closed:
-            raise RenderError("rendering", "the renderer is closed", "make a new one")
+            raise RenderError("rendering", "the renderer has been closed", "create a new renderer")
         started = time.perf_counter()
         scene, samples = plan.scene, plan.request.samples
         shader = Shader.of(scene, plan, self._embree_meshes(scene))

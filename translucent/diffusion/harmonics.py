@@ -127,8 +127,16 @@ def _check(body: Object, diffusion: Diffusion) -> None:
     requested, medium = f"scattered light of {body.mesh.name!r}", body.medium
     if medium is None or not medium.scatters:
         do = "give one that does, for example --preset wax, or tl.scattering_medium('#f2e0b8', 0.002)"
-        raise InputError(requested, "its medium does not scatter" if medium is not None else "no medium", do)
+        raise InputError(
+            requested,
+            "the medium of the body does not scatter light" if medium is not None else "the body has no medium",
+            do,
+        )
     if np.asarray(medium.emission).any():
-        raise InputError(requested, "its medium emits: that light depends on no other", "leave the emission out")
+        raise InputError(
+            requested,
+            ("the medium emits light, which a scatter bake cannot store because it does not depend on the environment"),
+            "use a medium without emission",
+        )
     if (why := diffusion.refusal(body)) is not None:
-        raise InputError(requested, why, "give a closed mesh, a thicker body, or a higher resolution")
+        raise InputError(requested, why, "use a closed mesh, a thicker body, or a higher resolution")

@@ -192,10 +192,10 @@ def read_array(
     except Exception as error:  # a header is Python, and what is broken in it raises whatever Python does
         raise InputError(requested, f"not a NumPy array ({shown(error)})", do) from error
     if dtype.hasobject or dtype.kind not in kinds or not dtype.itemsize:
-        raise InputError(requested, f"its type is {str(dtype)!r}, not numbers", do)
+        raise InputError(requested, f"its values are of type {str(dtype)!r}, and not numbers", do)
     needed, held = math.prod(shape) * dtype.itemsize, size - stream.tell()
     if not 0 <= needed <= held:
-        raise InputError(requested, f"it is cut short: {held} of {needed} bytes", do)
+        raise InputError(requested, f"the file is cut off: {held} of {needed} bytes are present", do)
     stream.seek(0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -218,7 +218,7 @@ def read_arrays(path: str | Path, requested: str, names: Iterable[str], do: str)
         except InputError:
             raise
         except Exception as error:  # of zipfile and of each kind of compression
-            raise InputError(requested, f"it cannot be read ({shown(error)})", do) from error
+            raise InputError(requested, f"the file cannot be read ({shown(error)})", do) from error
     return found
 
 
@@ -261,7 +261,7 @@ def open_picture(
         try:
             image = Image.open(io.BytesIO(data), formats=formats)
         except Image.DecompressionBombError:
-            raise InputError(requested, "it has too many pixels", "make it smaller") from None
+            raise InputError(requested, "the picture has too many pixels", "use a smaller picture") from None
         except Exception as error:  # each of Pillow's readers raises its own kinds
             found = f"it is not an image that can be read: none of {', '.join(formats)}"
             raise UnreadableError(requested, found, do) from error
@@ -289,12 +289,12 @@ def read_exr(path: str | Path, requested: str) -> tuple[dict[str, Any], dict[str
         require_room(requested, f"{width}x{height} pixels", sum(12 * w * h * n for w, h, n in sizes), stored)
         with _silent(), OpenEXR.File(str(path), separate_channels=True) as file:
             if not file.parts:  # of damaged pixels the library leaves their part out
-                raise InputError(requested, "its pixels are damaged", "copy the file again")
+                raise InputError(requested, "the pixel data is damaged", "copy the file again")
             return dict(file.header()), {name: np.array(channel.pixels) for name, channel in file.channels().items()}
     except InputError:
         raise
     except Exception as error:  # of the library's C++
-        raise InputError(requested, f"not an OpenEXR file ({shown(error)})", "check the file") from error
+        raise InputError(requested, f"the file is not an OpenEXR file ({shown(error)})", "check the file") from error
 
 
 @contextlib.contextmanager

@@ -41,10 +41,12 @@ def require_file(path: Path, requested: str) -> None:
     if os.path.isfile(path):
         return
     if os.path.isdir(path):
-        raise InputError(requested, "it is a folder", "give a file in it")
+        raise InputError(requested, "the path is a folder", "give the path of a file")
     if os.path.exists(path):
-        raise InputError(requested, "it is a pipe or a device", "copy its content into a file, and give that")
-    raise InputError(requested, "no such file", "check the path")
+        raise InputError(
+            requested, "the path is a pipe or a device", "copy the content into a file, and give the path of this file"
+        )
+    raise InputError(requested, "no file has this path", "check the path")
 
 
 def require_output(path: Path, requested: str) -> None:
@@ -65,9 +67,9 @@ def require_output(path: Path, requested: str) -> None:
     """
     folder = path.parent
     if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise InputError(requested, f"{str(folder)!r} is no folder", "choose another one")
+        raise InputError(requested, f"{str(folder)!r} is not a folder", "choose another path")
     if not os.path.isdir(folder):
-        raise InputError(requested, f"no folder {str(folder)!r}", "make the folder first")
+        raise InputError(requested, f"the folder {str(folder)!r} does not exist", "create the folder first")
     _require_replaceable(path, requested)
     _require_writable(path, requested)
 
@@ -78,11 +80,13 @@ def _require_replaceable(path: Path, requested: str) -> None:
         mode = os.stat(path).st_mode
     except (OSError, ValueError) as error:  # nothing is there, or what makes a file says why it cannot be there
         if isinstance(error, OSError) and error.errno == errno.ELOOP:
-            raise InputError(requested, "links of that name lead to each other", "choose another name") from error
+            raise InputError(
+                requested, "the symbolic links of this path point at each other", "choose another path"
+            ) from error
         return
     if not stat.S_ISREG(mode):
         what = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
-        raise InputError(requested, f"{what} of that name is there", "choose another name")
+        raise InputError(requested, f"{what} of this name already exists", "choose another name")
 
 
 def require_folder(path: Path, requested: str) -> None:
@@ -105,7 +109,7 @@ def require_folder(path: Path, requested: str) -> None:
     if there is None:
         return
     if not os.path.isdir(there):
-        raise InputError(requested, f"{str(there)!r} is no folder", "choose another one")
+        raise InputError(requested, f"{str(there)!r} is not a folder", "choose another path")
     _require_writable(there / path.name, requested)
 
 
@@ -116,7 +120,9 @@ def _require_writable(path: Path, requested: str) -> None:
             os.lstat(path)
         temporary, held = _temporary_file(Path(os.path.realpath(path)))
     except OSError as error:
-        raise RenderError(requested, f"it cannot be written ({error.strerror})", "check the folder") from error
+        raise RenderError(
+            requested, f"the file cannot be written ({error.strerror})", "check the permissions of the folder"
+        ) from error
     held.close()
     temporary.unlink(missing_ok=True)
 
@@ -190,7 +196,7 @@ class OutputFiles:
 
 
 def _unwritable(path: Path, error: OSError, do: str) -> RenderError:
-    return RenderError(f"output {str(path)!r}", f"it cannot be written ({error.strerror or error})", do)
+    return RenderError(f"output {str(path)!r}", f"the file cannot be written ({error.strerror or error})", do)
 
 
 def remove_partial(path: Path) -> None:
@@ -286,7 +292,7 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RenderError(
-            f"folder {str(folder)!r}", f"it cannot be made ({error.strerror})", "check the path"
+            f"folder {str(folder)!r}", f"the folder cannot be created ({error.strerror})", "check the path"
         ) from error
 
 

@@ -66,15 +66,19 @@ def open_file(path: str | Path, requested: str, limit: int = MAX_FILE) -> Binary
     try:
         stream = open(path, "rb", opener=_open_at_once)  # noqa: SIM115
     except OSError as error:
-        raise InputError(requested, f"it cannot be read ({error.strerror})", "check its permissions") from None
+        raise InputError(
+            requested, f"the file cannot be read ({error.strerror})", "check the permissions of the file"
+        ) from None
     found = os.fstat(stream.fileno())
     if stat.S_ISREG(found.st_mode) and found.st_size <= limit:
         return stream
     stream.close()
     if not stat.S_ISREG(found.st_mode):
-        raise InputError(requested, "it is no file", "give a regular file")
+        raise InputError(requested, "the path is not a regular file", "give the path of a regular file")
     raise InputError(
-        requested, f"it has {size_text(found.st_size)}, more than {size_text(limit)}", "split it, or check it"
+        requested,
+        f"the file has {size_text(found.st_size)}, more than the limit of {size_text(limit)}",
+        "check the file, or split it into smaller files",
     )
 
 
@@ -89,7 +93,7 @@ def read_bytes(path: str | Path, requested: str, limit: int = MAX_FILE) -> bytes
         try:
             return stream.read(os.fstat(stream.fileno()).st_size)
         except OSError as error:
-            raise InputError(requested, f"it cannot be read ({error.strerror})", "check the disk") from None
+            raise InputError(requested, f"the file cannot be read ({error.strerror})", "check the disk") from None
 
 
 def read_text(path: str | Path, requested: str, limit: int = MAX_TEXT, do: str = "save it as text") -> str:
@@ -120,13 +124,17 @@ def linked_file(folder: Path, link: str, requested: str, allow_outside: bool = F
     """
     name = unquote(link)
     if _SCHEME.match(name):
-        raise InputError(requested, f"{link!r} is no path", "keep its files together, and link them by relative paths")
+        raise InputError(
+            requested,
+            f"the link {link!r} is not a valid path",
+            "keep all files of the model together, and link them by relative paths",
+        )
     if "\0" in name:
-        raise InputError(requested, f"{link!r} names no file", "export it again")
+        raise InputError(requested, f"the link {link!r} names no file", "export the model again")
     path = folder / name
     if not allow_outside and not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
         do = "keep its files together, or say --allow-outside (in Python, allow_outside=True)"
-        raise InputError(requested, f"{link!r} is outside its folder", do)
+        raise InputError(requested, f"the link {link!r} leads outside the folder of the model", do)
     return path
 
 
@@ -153,7 +161,7 @@ def require_room(requested: str, found: str, size: int, stored: int, do: str = "
     """
     if size > (allowed := max(FREE, RATIO * stored)):
         limit = f"of so small a file at most {size_text(allowed)} are read"
-        raise InputError(requested, f"{found} take {size_text(size)}; {limit}", do)
+        raise InputError(requested, f"{found} need {size_text(size)}; {limit}", do)
 
 
 def size_text(size: int) -> str:
@@ -274,7 +282,9 @@ def require_memory(requested: str, found: str, size: int, do: str) -> None:
     """
     if size <= SMALL or (free := free_memory()) is None or size <= free:
         return
-    raise InputError(requested, f"{found} take about {size_text(size)} of memory, and {size_text(free)} are free", do)
+    raise InputError(
+        requested, (f"{found} need about {size_text(size)} of memory, but only {size_text(free)} are free"), do
+    )
 
 
 def require_allowed(requested: str, size: int) -> None:

@@ -201,7 +201,11 @@ class PhaseFunction(ABC):
         """Phase function in 1/sr at the cosine of the scattering angle: 1 is straight on."""
         cosine = np.asarray(cos_scatter, dtype=np.float64)
         if not (np.abs(cosine) <= 1 + 1e-6).all():  # what rounding makes of 1
-            raise InputError("cosine of an angle of scattering", "not in -1 to 1", "give cosines, 1 for straight on")
+            raise InputError(
+                "cosine of a scattering angle",
+                "the cosine must lie in -1 to 1",
+                "give cosines, where 1 means straight ahead",
+            )
         return phase_value(self.parameters, cosine)
 
     def __str__(self) -> str:
@@ -225,7 +229,9 @@ class HenyeyGreenstein(PhaseFunction):
 
     def __post_init__(self) -> None:
         if not -1 < self.anisotropy < 1:
-            raise InputError(f"anisotropy {self.anisotropy}", "not between -1 and 1", "give for example 0.8")
+            raise InputError(
+                f"anisotropy {self.anisotropy}", "the anisotropy must lie between -1 and 1", "use a value such as 0.8"
+            )
 
     @property
     def parameters(self) -> Parameters:
@@ -259,9 +265,13 @@ class Draine(PhaseFunction):
 
     def __post_init__(self) -> None:
         if not -1 < self.g < 1:
-            raise InputError(f"Draine's g {self.g}", "not between -1 and 1", "give for example 0.6")
+            raise InputError(
+                f"Draine's g {self.g}", "the parameter must lie between -1 and 1", "use a value such as 0.6"
+            )
         if not 0 <= self.alpha <= MAX_ALPHA:
-            raise InputError(f"Draine's alpha {self.alpha}", f"not in 0 to {MAX_ALPHA:g}", "give for example 1")
+            raise InputError(
+                f"Draine's alpha {self.alpha}", f"the parameter must lie in 0 to {MAX_ALPHA:g}", "use a value such as 1"
+            )
 
     @property
     def parameters(self) -> Parameters:
@@ -299,7 +309,9 @@ class WaterDroplets(PhaseFunction):
     def __post_init__(self) -> None:
         if not DROPLETS[0] <= self.diameter <= DROPLETS[1]:
             raise InputError(
-                f"water droplets of {self.diameter:g} m", "not of 5e-6 to 5e-5 m", "give for example 2e-5 for a cloud"
+                f"water droplets of {self.diameter:g} m",
+                "the droplet diameter must lie in 5e-6 to 5e-5 m",
+                "use a value such as 2e-5 for a cloud",
             )
 
     @property
@@ -322,7 +334,9 @@ class WaterDroplets(PhaseFunction):
 
 def _moments(count: int) -> int:
     if not 0 <= count <= MOST_MOMENTS:
-        raise InputError(f"moments {brief(count)}", f"not in 0 to {MOST_MOMENTS}", "give for example 3")
+        raise InputError(
+            f"moments {brief(count)}", f"the number of moments must lie in 0 to {MOST_MOMENTS}", "use a value such as 3"
+        )
     return count
 
 
@@ -343,7 +357,9 @@ def parse_phase(text: str) -> PhaseFunction:
     """
     name, *words = text.split() or [""]
     if name not in PHASE_FUNCTIONS:
-        raise InputError(f"phase function {name!r}", "there is none of that name", f"use {', '.join(PHASE_FUNCTIONS)}")
+        raise InputError(
+            f"phase function {name!r}", "no phase function has this name", f"use one of {', '.join(PHASE_FUNCTIONS)}"
+        )
     of = PHASE_FUNCTIONS[name]
     names = [field.name for field in fields(of)]  # type: ignore[arg-type]
     try:
@@ -351,5 +367,9 @@ def parse_phase(text: str) -> PhaseFunction:
     except ValueError:
         numbers = []
     if len(numbers) != len(names):
-        raise InputError(f"phase function {text!r}", f"not {len(names)} numbers", f"give {name} {' '.join(names)}")
+        raise InputError(
+            f"phase function {text!r}",
+            f"this phase function needs {len(names)} numbers",
+            f"write {name} {' '.join(names)}",
+        )
     return of(*numbers)

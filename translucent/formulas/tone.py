@@ -116,5 +116,5 @@ def tone_curve(name: str) -> Callable[[npt.ArrayLike], Array]:
         If there is none.
     """
     if not isinstance(name, str) or name not in TONES:
-        raise InputError(f"tone {brief(name)}", "not a known tone curve", f"use one of {', '.join(TONES)}")
+        raise InputError(f"tone {brief(name)}", "no tone curve has this name", f"use one of {', '.join(TONES)}")
     return _CURVES[name]

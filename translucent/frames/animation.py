@@ -121,7 +121,7 @@ def check_animation(path: Path, fps: float) -> None:
         If a film is requested without the imageio-ffmpeg package.
     """
     if not 1.0 <= fps <= 100.0:
-        raise InputError(f"{fps} pictures per second", "not in 1 to 100", "give for example 24")
+        raise InputError(f"{fps} pictures per second", "the frame rate must lie in 1 to 100", "use a value such as 24")
     what = f"animation {str(path)!r}"
     if path.is_dir() or not path.suffix:
         require_folder(path, what)
@@ -172,13 +172,15 @@ def _alike(frames: Iterable[Pixels]) -> Iterator[Pixels]:
     pictures = iter(frames)
     first = next(pictures, None)
     if first is None:
-        raise InputError("animation", "it has no frames", "give at least one")
+        raise InputError("animation", "the animation has no frames", "give at least one frame")
 
     def checked() -> Iterator[Pixels]:
         for i, picture in enumerate(chain([first], pictures)):
             if picture.shape != first.shape or picture.dtype != np.uint8 or picture.shape[2:] != (3,):
                 found = f"shape {picture.shape} and type {picture.dtype}"
-                raise InputError(f"frame {i} of an animation", found, "give (h, w, 3) uint8, all of one size")
+                raise InputError(
+                    f"frame {i} of an animation", found, "give arrays (h, w, 3) of uint8, all of the same size"
+                )
             yield picture
 
     return checked()
@@ -212,7 +214,11 @@ def turntable(scene: Scene, count: int) -> Iterator[Scene]:
         If the count is not a whole number above 1.
     """
     if not isinstance(count, int) or count < 2:
-        raise InputError(f"turntable of {count!r} pictures", "not a whole number above 1", "give for example 36")
+        raise InputError(
+            f"turntable of {count!r} pictures",
+            "the number of pictures must be a whole number above 1",
+            "use a value such as 36",
+        )
     center = scene.shown_bounds.mean(axis=0)
     for i in range(count):
         angle = 360.0 * i / count

@@ -120,12 +120,22 @@ def thickness_samples(seen: Frame | npt.ArrayLike) -> Array:
     if thickness.size == 0:
         if isinstance(seen, Frame) and seen.coverage.any():
             found = f"all {int(seen.coverage.sum())} pixels that the mesh covers are marked invalid"
-            raise InputError("thickness of what is seen", found, "close its holes: translucent explain lists them")
-        raise InputError("thickness of what is seen", "no covered, valid pixel", "frame the mesh in the picture")
+            raise InputError(
+                "thickness of the visible model",
+                found,
+                "close the holes of the mesh, which `translucent explain` lists",
+            )
+        raise InputError(
+            "thickness of the visible model",
+            "no pixel shows a valid part of the model",
+            "move the camera so that the model is in the picture",
+        )
     if isinstance(seen, Frame):
         return np.maximum(thickness, 0.0)  # a difference of float32 sums, a rounding below 0 at a silhouette
     if not (np.isfinite(thickness).all() and (thickness >= 0).all()):
-        raise InputError("thickness of what is seen", "a value is negative or not finite", "give metres of 0 and above")
+        raise InputError(
+            "thickness of the visible model", "a value is negative or not finite", "give metres, 0 or above"
+        )
     return thickness
 
 
@@ -182,19 +192,23 @@ def medium_for_average_color(seen: Frame | npt.ArrayLike, color: str | npt.Array
 def _solve(thickness: Array, name: str, target: float) -> float:
     if not CLAMP <= target <= 1:
         do = "a medium cannot add light" if target > 1 else f"give {CLAMP:g} or more: darker is black on any display"
-        raise InputError(f"average color with {name} = {target:g}", f"not in {CLAMP:g} <= t <= 1", do)
+        raise InputError(f"average color with {name} = {target:g}", f"the value must satisfy {CLAMP:g} <= t <= 1", do)
     if target == 1:
         return 0.0
     clear = float(np.mean(thickness == 0))
     if target <= clear:
         found = f"{100 * clear:.3g} % of the pixels have no thickness and stay white"
-        raise InputError(f"average color with {name} = {target:g}", found, "give a brighter color, or another view")
+        raise InputError(f"average color with {name} = {target:g}", found, "choose a brighter color, or another view")
     # Without a unit: lengths as fractions of the mean one, so that neither kilometers nor micrometers overflow.
     scale = float(thickness.mean())
     with np.errstate(under="ignore", over="ignore"):
         solved = _root(thickness / scale, log(target)) / scale if scale > 0 else np.inf
     if not np.isfinite(solved):
-        raise InputError(f"thickness of {scale:g} m", "so thin that the extinction overflows", "check the unit")
+        raise InputError(
+            f"thickness of {scale:g} m",
+            "the model is so thin that the extinction overflows",
+            "check the unit of length",
+        )
     return float(solved)
 
 

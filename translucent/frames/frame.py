@@ -356,7 +356,11 @@ def check_exposure(stops: float) -> float:
     try:
         within = bool(-MAX_EXPOSURE <= stops <= MAX_EXPOSURE)
     except (TypeError, ValueError):  # texts, arrays, complex numbers
-        raise InputError(f"exposure {brief(stops)}", "not a number", "give stops, for example 1.5") from None
+        raise InputError(
+            f"exposure {brief(stops)}", "the exposure is not a number", "give the exposure in stops, for example 1.5"
+        ) from None
     if not within:
-        raise InputError(f"exposure {stops}", f"not within {MAX_EXPOSURE:g} stops", "give for example 1.5")
+        raise InputError(
+            f"exposure {stops}", f"the exposure must lie within {MAX_EXPOSURE:g} stops", "use a value such as 1.5"
+        )
     return stops

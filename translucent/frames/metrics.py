@@ -78,15 +78,25 @@ def compare(
         If the sizes differ, or no pixel is left.
     """
     if quantity not in get_args(Quantity):
-        raise InputError(f"quantity {quantity!r}", "not known", f"use one of {', '.join(get_args(Quantity))}")
+        raise InputError(
+            f"quantity {quantity!r}", "no quantity has this name", f"use one of {', '.join(get_args(Quantity))}"
+        )
     if frame.size != truth.size:
-        raise InputError("compare", f"sizes {frame.size} and {truth.size}", "render both at one size")
+        raise InputError(
+            "compare",
+            f"the frame has size {frame.size}, and the truth has size {truth.size}",
+            "render both at the same size",
+        )
     covered = frame.coverage | truth.coverage
     used = frame.coverage & truth.coverage & frame.valid & truth.valid
     words = "covered and valid in both"
     if mask is not None:
         if np.shape(mask) != used.shape or np.asarray(mask).dtype != bool:
-            raise InputError("compare", f"a mask that is no array {used.shape} of bool", "give one, as `interior` does")
+            raise InputError(
+                "compare",
+                f"the mask is not an array {used.shape} of bool",
+                "give a mask of this shape, as `interior` returns it",
+            )
         used &= mask
         words += ", within the given mask"
     if not used.any():
@@ -94,7 +104,7 @@ def compare(
             "compare",
             f"no pixel is {words}: the frame covers {int(frame.coverage.sum())}, {int((~frame.valid).sum())} invalid, "
             f"the truth {int(truth.coverage.sum())}, {int((~truth.valid).sum())} invalid",
-            "check that both show the body, and that its mesh is closed",
+            "check that both pictures show the body, and that the mesh of the body is closed",
         )
     error = (
         np.asarray(getattr(frame, quantity), np.float64)[used] - np.asarray(getattr(truth, quantity), np.float64)[used]
@@ -125,7 +135,9 @@ def interior(hit_counts: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     """
     hit_counts = np.asarray(hit_counts)
     if hit_counts.ndim != 2 or not hit_counts.size:
-        raise InputError(f"hit counts of shape {hit_counts.shape}", "no picture", "give an array (h, w)")
+        raise InputError(
+            f"hit counts of shape {hit_counts.shape}", "the array is not a picture", "give an array of shape (h, w)"
+        )
     padded = np.pad(hit_counts, 1, mode="edge")
     height, width = hit_counts.shape
     shifted = [padded[i : i + height, j : j + width] for i in range(3) for j in range(3)]

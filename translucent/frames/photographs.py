@@ -142,7 +142,7 @@ def fit_photographs(photographs: Sequence[Photograph], ior: float | None = None)
     """
     photographs = tuple(photographs)
     if not (photographs and all(isinstance(one, Photograph) for one in photographs)):
-        raise InputError("fit to photographs", "there are none", "give at least one tl.Photograph")
+        raise InputError("fit to photographs", "no photograph is given", "give at least one tl.Photograph")
     left_out: list[str] = []
     fit = fit_steps([_steps(one, number, left_out) for number, one in enumerate(photographs)], ior)
     return dataclasses.replace(fit, warnings=(*left_out, *fit.warnings))
@@ -160,7 +160,11 @@ def parse_patches(text: str, unit: str = "m") -> list[tuple[Rectangle, float]]:
     """
     where, equals, lengths = text.partition("=")
     if not (equals and lengths.strip()):
-        raise InputError(f"patch {text!r}", "no thickness", "write X,Y,W,H=2mm, or X,Y,W,H=1mm,2mm,4mm for equal steps")
+        raise InputError(
+            f"patch {text!r}",
+            "the patch has no thickness",
+            "write X,Y,W,H=2mm, or X,Y,W,H=1mm,2mm,4mm for steps of equal width",
+        )
     x, y, width, height = whole = parse_rectangle(where)
     first, dots, last = lengths.partition("..")
     if dots:
@@ -185,9 +189,15 @@ def parse_rectangle(text: str) -> Rectangle:
     try:
         x, y, width, height = (int(part) for part in text.split(","))
     except ValueError:
-        raise InputError(f"rectangle {text!r}", "not four whole numbers", "write X,Y,W,H in pixels") from None
+        raise InputError(
+            f"rectangle {text!r}", "the rectangle is not four whole numbers", "write X,Y,W,H in pixels"
+        ) from None
     if min(x, y) < 0 or min(width, height) < 1 or max(x, y, width, height) > MOST_PIXELS:
-        raise InputError(f"rectangle {text!r}", "in no picture", "count X,Y,W,H from the top left, in pixels")
+        raise InputError(
+            f"rectangle {text!r}",
+            "the rectangle lies outside the picture",
+            "give X,Y,W,H in pixels, counted from the top left corner",
+        )
     return x, y, width, height
 
 
@@ -207,10 +217,16 @@ def read_photographs(path: Path, unit: str = "m") -> list[Photograph]:
     try:
         shared = toml_value(read_text(path, what_for))
     except ValueError as error:
-        raise InputError(what_for, f"no TOML ({shown(error)})", "see the docs on media for an example") from None
+        raise InputError(
+            what_for,
+            f"the file is not valid TOML ({shown(error)})",
+            "the documentation page on photographs shows an example",
+        ) from None
     tables = shared.pop("photograph", None)
     if not (isinstance(tables, list) and tables and all(isinstance(table, dict) for table in tables)):
-        raise InputError(what_for, "no table [[photograph]]", 'write [[photograph]] and file = "steps.jpg" below it')
+        raise InputError(
+            what_for, "the file has no table [[photograph]]", 'write [[photograph]] and file = "steps.jpg" below it'
+        )
     return [
         _photograph({**shared, **table}, f"{what_for}, number {n}", path, unit) for n, table in enumerate(tables, 1)
     ]
@@ -220,12 +236,12 @@ def _photograph(table: dict[str, Any], what_for: str, path: Path, unit: str) -> 
     wrong = sorted(table.keys() ^ {"file", "white", "patches"})
     if wrong:
         found = "is missing" if wrong[0] in ("file", "white", "patches") else "is not known"
-        raise InputError(what_for, f"{wrong[0]!r} {found}", "give file, white and patches")
+        raise InputError(what_for, f"{wrong[0]!r} {found}", "each photograph needs the keys file, white and patches")
     file, white, patches = table["file"], table["white"], table["patches"]
     texts = [file, white, *patches] if isinstance(patches, list) else [None]
     if not all(isinstance(text, str) for text in texts):
         raise InputError(
-            what_for, "a value is no text", 'write for example white = "10,10,60,60", patches = ["90,10,60,60=2mm"]'
+            what_for, "a value is not a text", 'write for example white = "10,10,60,60", patches = ["90,10,60,60=2mm"]'
         )
     listed = [patch for text in patches for patch in parse_patches(text, unit)]
     return Photograph(path.parent / file, parse_rectangle(white), listed)
@@ -241,15 +257,21 @@ def _steps(photograph: Photograph, number: int, left_out: list[str]) -> PatchTra
     white = _measured(picture, photograph.white, f"white of {name}")
     if (white.saturated > MOST_LIMITED).any():
         percent = 100 * white.saturated.max()
-        raise InputError(f"white of {name}", f"{percent:.0f} % of its pixels are saturated", "expose it shorter")
+        raise InputError(
+            f"white of {name}",
+            f"{percent:.0f} % of the pixels of the white rectangle are saturated",
+            "use a shorter exposure",
+        )
     if (white.black > MOST_LIMITED).any():
-        raise InputError(f"white of {name}", "it is black", "mark a place where nothing is in front of the light")
+        raise InputError(
+            f"white of {name}", "the white rectangle is black", "choose a rectangle in which nothing covers the light"
+        )
     if not photograph.patches:
-        raise InputError(name, "no patches", "give at least one, with its thickness")
+        raise InputError(name, "the photograph has no patches", "give at least one patch, with its thickness")
     rows = []
     for rectangle, thickness in photograph.patches:
         if not 0 < thickness < np.inf:
-            raise InputError(f"patch of {name}", f"thickness {thickness} m", "give a length above 0")
+            raise InputError(f"patch of {name}", f"the thickness is {thickness} m", "give a length above 0")
         what = f"patch {','.join(map(str, rectangle))} of {name}"
         rows.append(_depth(_measured(picture, rectangle, what), white, what, left_out))
     depth, variance = (np.array(part) for part in zip(*rows, strict=True))
@@ -263,7 +285,7 @@ def _depth(patch: _Mean, white: _Mean, what: str, left_out: list[str]) -> tuple[
     if (bright & (patch.saturated <= MOST_LIMITED)).any():
         channel = int(np.flatnonzero(bright)[0])
         found = f"{CHANNELS[channel]} {patch.mean[channel]:.3g} is above the white's {white.mean[channel]:.3g}"
-        raise InputError(what, found, "mark as white a place where nothing is in front of the same light")
+        raise InputError(what, found, "choose white rectangles in which nothing covers the same light")
     noisy = patch.variance > (MOST_ERROR * patch.mean) ** 2
     for limited, why in (
         (patch.saturated > MOST_LIMITED, "saturated"),
@@ -281,12 +303,20 @@ def _measured(picture: LinearPicture, rectangle: Rectangle, what: str) -> _Mean:
     x, y, width, height = rectangle
     high, wide = picture.linear.shape[:2]
     if min(x, y) < 0 or x + width > wide or y + height > high:
-        raise InputError(what, f"outside of the picture of {wide} x {high} pixels", "give X,Y,W,H from the top left")
+        raise InputError(
+            what,
+            f"the rectangle lies outside the picture of {wide} x {high} pixels",
+            "give X,Y,W,H in pixels, counted from the top left corner",
+        )
     if min(width, height) < TILES:
-        raise InputError(what, f"{width} x {height} pixels", f"give one of at least {TILES} x {TILES}")
+        raise InputError(
+            what,
+            f"the rectangle has only {width} x {height} pixels",
+            f"use a rectangle of at least {TILES} x {TILES} pixels",
+        )
     pixels = np.asarray(picture.linear[y : y + height, x : x + width], dtype=np.float64)
     if not np.isfinite(pixels).all():
-        raise InputError(what, "a pixel is not finite", "choose another place")
+        raise InputError(what, "a pixel of the rectangle is not a finite number", "choose another rectangle")
     low, high_limit = picture.limits
     black, saturated = (pixels <= low).mean(axis=(0, 1)), (pixels >= high_limit).mean(axis=(0, 1))
     median = np.median(pixels, axis=(0, 1))

@@ -59,7 +59,9 @@ def unit_of(thing: Any, unit: str | None = None) -> tuple[float, str]:
     units = {getattr(part, "units", None) for part in parts}
     if len(units) > 1:
         found = f"its parts are in different units: {', '.join(sorted(map(str, units)))}"
-        raise InputError(f"scene {foreign_name(thing)!r}", found, "convert them: scene.convert_units('meters')")
+        raise InputError(
+            f"scene {foreign_name(thing)!r}", found, "convert all meshes to metres: scene.convert_units('meters')"
+        )
     own = next(iter(units), None)
     if not isinstance(own, str) or own == "none":  # as trimesh notes units that are set to None
         return 1.0, "m"
@@ -69,7 +71,7 @@ def unit_of(thing: Any, unit: str | None = None) -> tuple[float, str]:
         return float(import_trimesh("trimesh.units").unit_conversion(own, "meters")), ""
     except (KeyError, ValueError):
         do = f"give unit=, one of {', '.join(METRES_PER_UNIT)}"
-        raise InputError(f"mesh {foreign_name(thing)!r}", f"its units {own!r} are not known", do) from None
+        raise InputError(f"mesh {foreign_name(thing)!r}", f"the unit {own!r} of the mesh is not known", do) from None
 
 
 def foreign_parts(thing: Any) -> list[Part] | None:
@@ -92,7 +94,9 @@ def foreign_parts(thing: Any) -> list[Part] | None:
         if not getattr(thing, "n_cells", 1):
             raise _faceless(thing)
         do = "give its surface: grid.extract_surface().triangulate()"
-        raise InputError(f"mesh {foreign_name(thing)!r}", f"{type(thing).__name__} is no surface", do)
+        raise InputError(
+            f"mesh {foreign_name(thing)!r}", f"an object of type {type(thing).__name__} is not a surface", do
+        )
     return None
 
 
@@ -102,7 +106,9 @@ def _faceless(thing: Any) -> InputError:
     found = " and ".join(f"{count} {name}" for count, name in counts if count)
     surface = "points, cloud.reconstruct_surface().triangulate(), or of lines, line.tube(radius=1).triangulate()"
     return InputError(
-        f"mesh {foreign_name(thing)!r}", f"it has {found or 'no points'} and no faces", f"make a surface of {surface}"
+        f"mesh {foreign_name(thing)!r}",
+        f"the mesh has {found or 'no points'} but no faces",
+        f"make a surface from {surface}",
     )
 
 
@@ -110,7 +116,9 @@ def _numbers(thing: Any, name: str) -> Array:
     try:
         return np.array(getattr(thing, name), dtype=np.float64, order="C")
     except (TypeError, ValueError):
-        raise InputError(f"mesh {foreign_name(thing)!r}", f"its {name} are no numbers", "check the arrays") from None
+        raise InputError(
+            f"mesh {foreign_name(thing)!r}", f"the {name} of the mesh are not numbers", "check the arrays of the mesh"
+        ) from None
 
 
 def _triangles(thing: Any, name: str) -> npt.NDArray[np.int32]:
@@ -119,20 +127,20 @@ def _triangles(thing: Any, name: str) -> npt.NDArray[np.int32]:
     if hasattr(thing, "triangulate"):
         advice = "triangulate it: mesh.triangulate()"
     if getattr(thing, "n_strips", 0):
-        raise InputError(asked, f"it has {thing.n_strips} strips of triangles", advice)
+        raise InputError(asked, f"the mesh has {thing.n_strips} triangle strips", advice)
     try:
         faces = np.asarray(getattr(thing, name))
     except ValueError:  # rows of unequal lengths
-        raise InputError(asked, "its faces have different numbers of corners", advice) from None
+        raise InputError(asked, "the faces of the mesh have different numbers of corners", advice) from None
     if faces.ndim == 1 and faces.dtype.kind in "iu":
         if len(faces) % 4 or (faces[::4] != 3).any():
-            raise InputError(asked, "not all of its faces are triangles", advice)
+            raise InputError(asked, "not all faces of the mesh are triangles", advice)
         faces = faces.reshape(-1, 4)[:, 1:]
     if not faces.size:
         return np.empty((0, 3), np.int32)
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
         kinds = {4: "quads"}.get(faces.shape[-1], f"an array of shape {faces.shape} of {faces.dtype}")
-        raise InputError(asked, f"its faces are {kinds}, not triangles", advice)
+        raise InputError(asked, f"the faces of the mesh are {kinds}, and not triangles", advice)
     return np.array(faces, dtype=np.int32, order="C")
 
 

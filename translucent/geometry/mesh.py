@@ -81,12 +81,12 @@ class Mesh(Frozen):
         vertices = self._array("vertices", self.vertices, np.float64, 3, copy)
         faces = self._array("faces", self.faces, np.int32, 3, copy)
         if len(faces) == 0:
-            raise InputError(f"mesh {self.name!r}", "it has no faces", "give a triangle mesh")
+            raise InputError(f"mesh {self.name!r}", "the mesh has no faces", "use a mesh of triangles")
         if faces.min() < 0 or faces.max() >= len(vertices):
             bad = int(np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(vertices)).any(axis=1))[0])
             raise InputError(
                 f"mesh {self.name!r}",
-                f"face {bad} = {tuple(faces[bad].tolist())} points outside the {len(vertices)} vertices",
+                (f"face {bad} = {tuple(faces[bad].tolist())} refers to points outside the {len(vertices)} vertices"),
                 "export the mesh again",
             )
         self._freeze("vertices", vertices)
@@ -97,11 +97,11 @@ class Mesh(Frozen):
             values = self._array(field, given, np.float64, columns, copy)
             if len(values) != len(vertices):
                 found = f"{len(values)} {field} for {len(vertices)} vertices"
-                raise InputError(f"mesh {self.name!r}", found, "give one per vertex")
+                raise InputError(f"mesh {self.name!r}", found, "give one value per vertex")
             self._freeze(field, values)
         if self.colors is not None and not ((self.colors >= 0) & (self.colors <= 1)).all():
             raise InputError(
-                f"mesh {self.name!r}", "a color of a vertex is not in 0 to 1", "give linear RGB and opacity"
+                f"mesh {self.name!r}", "a vertex color is outside 0 to 1", "give linear RGB, and opacity if present"
             )
 
     def _array(self, field: str, value: Any, dtype: Any, columns: int, copy: bool) -> npt.NDArray[Any]:
@@ -112,12 +112,16 @@ class Mesh(Frozen):
             array = array.astype(dtype, order="C", copy=copy)
         except (TypeError, ValueError, OverflowError):
             raise InputError(
-                f"mesh {self.name!r}", f"{field} are not numbers of {np.dtype(dtype)}", "check the arrays"
+                f"mesh {self.name!r}",
+                f"the values of {field} cannot be converted to {np.dtype(dtype)}",
+                "check the arrays of the mesh",
             ) from None
         if array.size == 0:
             array = array.reshape(0, columns)
         if array.ndim != 2 or array.shape[1] != columns:
-            raise InputError(f"mesh {self.name!r}", f"{field} of shape {array.shape}", f"give shape (n, {columns})")
+            raise InputError(
+                f"mesh {self.name!r}", f"{field} has the shape {array.shape}", f"use the shape (n, {columns})"
+            )
         return array
 
     def _freeze(self, field: str, array: npt.NDArray[Any]) -> None:
@@ -246,7 +250,9 @@ class Mesh(Frozen):
 def _point(point: npt.ArrayLike) -> Array:
     found = vectors("point", point)
     if found.ndim != 1:
-        raise InputError(f"point of shape {found.shape}", "more than one", "give (x, y, z)")
+        raise InputError(
+            f"point of shape {found.shape}", "the array holds more than one point", "give one point (x, y, z)"
+        )
     return found
 
 
@@ -359,7 +365,7 @@ Triangles = tuple[Array, npt.NDArray[np.int32], Array | None]
 def joined(parts: list[Triangles], requested: str) -> Triangles:
     """Concatenate the triangles of all parts; raises `InputError` if there are none."""
     if not parts:
-        raise InputError(requested, "it has no faces", "give a triangle mesh, not points or lines")
+        raise InputError(requested, "the mesh has no faces", "use a mesh of triangles, not of points or lines")
     if len(parts) == 1:
         return parts[0]
     starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts[:-1])])

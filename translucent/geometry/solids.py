@@ -40,7 +40,11 @@ def revolve(profile: npt.ArrayLike, segments: int, closed: bool = False) -> tupl
     """
     radius, z = np.asarray(profile, dtype=np.float64).T
     if segments < 3 or len(radius) < 2 + closed:
-        raise InputError("a surface of revolution", f"{len(radius)} points, {segments} segments", "give 3 or more")
+        raise InputError(
+            "a surface of revolution",
+            f"{len(radius)} points and {segments} segments are too few",
+            "use 3 points and 3 segments, or more",
+        )
     angle = 2.0 * pi * np.arange(segments) / segments
     x, y = np.outer(radius, np.cos(angle)), np.outer(radius, np.sin(angle))
     grid = np.stack([x, y, np.broadcast_to(z[:, None], x.shape)], axis=-1)
@@ -182,4 +186,8 @@ class SphericalShell(Spheres):
 def require_measures(solid: object, holds: bool, *numbers: float) -> None:
     """Raise `InputError` unless the measures of a solid are finite, and a condition holds."""
     if not (holds and all(isfinite(number) for number in numbers)):
-        raise InputError(str(solid), "its measures do not make a solid", "give finite, positive, ordered measures")
+        raise InputError(
+            str(solid),
+            "these dimensions do not describe a solid",
+            "give finite, positive dimensions in ascending order",
+        )

@@ -352,7 +352,7 @@ def _pairs(triangles: Array, points: Array) -> Iterator[tuple[Integers, Integers
         ends = np.cumsum(runs)
         if (tests := tests + int(ends[-1])) > MOST_PAIRS:
             found = f"{count} of them that look inwards lie one in another"
-            raise InputError("parts of a mesh", found, "remove what is there twice, or split the mesh")
+            raise InputError("connected parts of a mesh", found, "remove duplicate faces, or split the mesh")
         for part in np.split(np.arange(len(runs)), np.searchsorted(ends, np.arange(BLOCK, ends[-1], BLOCK))):
             run, place = expanded(first[part], runs[part])
             yield begin + triangle[part[run]], order[place]

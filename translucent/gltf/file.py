@@ -127,12 +127,14 @@ class GltfFile:
                 return binascii.a2b_base64(uri.partition(",")[2], strict_mode=True)
             except ValueError as error:
                 found = f"{uri[:57]!r}... cannot be read ({error})"
-                raise UnreadableError(requested, found, "export the file again") from error
+                raise UnreadableError(requested, found, "export the model again") from error
         path = linked_file(self.path.parent, uri, requested, self.allow_outside)
         try:
             return read_bytes(path, "")
         except InputError as error:
-            raise UnreadableError(requested, f"{uri!r} cannot be read ({error})", "keep its files together") from None
+            raise UnreadableError(
+                requested, f"the linked file {uri!r} cannot be read ({error})", "keep all files of the model together"
+            ) from None
 
 
 def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
@@ -156,7 +158,7 @@ def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
     if path.suffix.lower() not in (".glb", ".gltf") and not binary:
         raise InputError(requested, f"suffix {path.suffix!r}", "give a .glb or .gltf file")
     if not size:
-        raise InputError(requested, "it is empty", "copy or export the file again")
+        raise InputError(requested, "the file is empty", "copy or export the file again")
     if not binary:
         _require_short(requested, size)
     return gltf_of(path, read_bytes(path, requested), allow_outside)
@@ -177,20 +179,24 @@ def gltf_of(path: Path, content: bytes, allow_outside: bool = False) -> GltfFile
         del data  # half of the memory
         tree = json_value(text)
     except ValueError as error:
-        raise InputError(requested, f"its JSON is broken ({error})", "copy or export the file again") from error
+        raise InputError(
+            requested, f"the JSON of the file is broken ({error})", "copy or export the file again"
+        ) from error
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
-        raise InputError(requested, "its JSON has no asset, so it is not glTF 2.0", "give a .glb or .gltf file")
+        raise InputError(
+            requested, "the JSON of the file has no 'asset', so the file is not glTF 2.0", "give a .glb or .gltf file"
+        )
     return GltfFile(path, tree, chunks, allow_outside)
 
 
 def _split(requested: str, data: bytes) -> tuple[bytes, bytes]:
     """Split a .glb into its JSON and everything after it."""
-    cut = InputError(requested, f"cut short at {len(data)} bytes", "copy or export the file again")
+    cut = InputError(requested, f"the file is cut off after {len(data)} bytes", "copy or export the file again")
     if len(data) < HEADER.size + CHUNK.size:
         raise cut
     _, version, length = HEADER.unpack_from(data)
     if version != GLB_VERSION:
-        raise InputError(requested, f"GLB version {version}", "export it as glTF 2.0")
+        raise InputError(requested, f"the file has GLB version {version}", "export the model as glTF 2.0")
     if length > len(data):
         raise cut
     start, parts = HEADER.size, []
@@ -203,7 +209,7 @@ def _split(requested: str, data: bytes) -> tuple[bytes, bytes]:
         parts.append((kind, start, start + CHUNK.size + size))
         start = parts[-1][2]
     if not parts or parts[0][0] != JSON_CHUNK:
-        raise InputError(requested, "its first chunk is not JSON", "copy or export the file again")
+        raise InputError(requested, "the first chunk of the file is not JSON", "copy or export the file again")
     _require_short(requested, parts[0][2] - parts[0][1])
     return data[parts[0][1] + CHUNK.size : parts[0][2]], data[parts[0][2] : length]
 
@@ -212,7 +218,9 @@ def _require_short(requested: str, size: int) -> None:
     """Raise `InputError` where a JSON of so many bytes takes too much memory, most of it for data in its links."""
     do = "save it as .glb, or keep its data in files beside it"
     if size > MAX_JSON:
-        raise InputError(requested, f"its JSON has {size_text(size)}, more than {size_text(MAX_JSON)}", do)
+        raise InputError(
+            requested, (f"the JSON of the file has {size_text(size)}, more than the limit of {size_text(MAX_JSON)}"), do
+        )
     require_memory(requested, f"its {size_text(size)} of JSON", 3 * size, do)
 
 
@@ -409,7 +417,11 @@ def _packed(file: GltfFile, tree: Json) -> bytes:
     text += b" " * (-len(text) % 4)
     length = HEADER.size + CHUNK.size + len(text) + len(chunks)
     if length > _LONGEST:
-        raise InputError(f"output .glb of {str(file.path)!r}", "more than 4 GiB, which no .glb holds", "write a .gltf")
+        raise InputError(
+            f"writing {str(file.path)!r}",
+            "the file would be larger than 4 GiB, the limit of the .glb format",
+            "write a .gltf instead",
+        )
     return HEADER.pack(MAGIC, GLB_VERSION, length) + CHUNK.pack(len(text), JSON_CHUNK) + text + chunks
 
 

@@ -189,7 +189,9 @@ def load_scene(
 def _exported(scene: Any) -> GltfFile:
     """The .glb that a scene of trimesh exports."""
     if scene.is_empty:
-        raise InputError(f"scene {foreign_name(scene)!r}", "it has no geometry", "add some: scene.add_geometry(mesh)")
+        raise InputError(
+            f"scene {foreign_name(scene)!r}", "the scene has no geometry", "add a mesh: scene.add_geometry(mesh)"
+        )
     return gltf_of(Path(foreign_name(scene)), scene.export(file_type="glb"))
 
 
@@ -198,8 +200,8 @@ def _read(path: Any, allow_outside: bool) -> GltfFile:
     if Path(path).suffix.lower() not in SUFFIXES:
         raise InputError(
             f"scene {str(path)!r}",
-            f"suffix {Path(path).suffix!r}, and scenes are glTF files",
-            "give a .glb or .gltf file, or read a mesh with tl.load_mesh",
+            f"the suffix {Path(path).suffix!r} is not that of a glTF file",
+            "give a .glb or .gltf file; to read a single mesh, use tl.load_mesh",
         )
     return read_gltf(path, allow_outside)
 
@@ -330,8 +332,8 @@ def scene_camera(
         listed = ", ".join(f"{i} of node {label(nodes, node)}" for i, (_, node) in enumerate(placed))
         raise InputError(
             f"camera {brief(index)} of {str(file.path)!r}",
-            f"it has {listed}" if placed else "it has no cameras",
-            "give one of these numbers" if placed else "leave the camera out: all objects are in view then",
+            f"the file has {listed}" if placed else "the file has no cameras",
+            "use one of these camera numbers" if placed else "omit the camera: the view then shows all objects",
         )
     camera, node = placed[index]
     where = f"camera {label(cameras, camera)} of node {label(nodes, node)}"

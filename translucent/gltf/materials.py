@@ -301,7 +301,11 @@ def volume_extensions_of(index: int, material: Json) -> Json:
     found: Json = material.setdefault("extensions", {})
     if excluded := [name for name in EXCLUDED if name in found]:
         requested = f"material {index} {material.get('name', '')!r}"
-        raise InputError(requested, f"{excluded[0]} excludes a volume", "give the object another material")
+        raise InputError(
+            requested,
+            f"the extension {excluded[0]} of the material excludes a volume",
+            "use another material for this object",
+        )
     return found
 
 

@@ -99,10 +99,10 @@ def variant_index(file: GltfFile, name: str | None) -> int | None:
         return names.index(name)
     requested = f"variant {name!r} of {str(file.path)!r}"
     if not names:
-        raise InputError(requested, f"it has no variants ({VARIANTS})", "leave the variant out")
+        raise InputError(requested, f"the file has no material variants ({VARIANTS})", "omit the variant")
     near = close_names(name, names)
     do = f"use one of {', '.join(names)}"
-    raise InputError(requested, "no such variant", f"{did_you_mean(near)} {do}" if near else do)
+    raise InputError(requested, "the file has no variant of this name", f"{did_you_mean(near)} {do}" if near else do)
 
 
 def material_index(file: GltfFile, primitive: Json, variant: int | None) -> int | None:
@@ -192,7 +192,7 @@ def thickness_map(file: GltfFile, material: GltfMaterial) -> Array | None:
     except InputError:
         raise
     except Exception as error:  # each of Pillow's decoders raises its own kinds
-        raise InputError(requested, f"it cannot be read ({shown(error)})", "export the file again") from error
+        raise InputError(requested, f"the file cannot be read ({shown(error)})", "export the model again") from error
     return material.thickness * (levels / 65535.0 if deep else levels[..., 1] / 255.0)
 
 
@@ -214,7 +214,11 @@ def thickness_at(file: GltfFile, material: GltfMaterial, uv: npt.ArrayLike) -> A
     """
     coordinates = np.asarray(uv, dtype=np.float64)
     if coordinates.shape[-1:] != (2,) or not np.isfinite(coordinates).all():
-        raise InputError(f"UVs of shape {coordinates.shape}", "not finite pairs (..., 2)", "give u and v")
+        raise InputError(
+            f"texture coordinates of shape {coordinates.shape}",
+            "texture coordinates must be finite pairs (..., 2)",
+            "give u and v for each vertex",
+        )
     image = thickness_map(file, material)
     if image is None:
         return np.full(coordinates.shape[:-1], material.thickness)
@@ -247,10 +251,14 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
         If the time is negative or not finite, the file has no animation, or one is wrong.
     """
     if not 0 <= seconds < math.inf:
-        raise InputError(f"time {seconds!r}", "negative or not finite", "give seconds from the start")
+        raise InputError(
+            f"time {seconds!r}",
+            "the time is negative or not finite",
+            "give the seconds since the start of the animations",
+        )
     animations = file.items("animations")
     if not animations:
-        raise InputError(f"time {seconds:g} of {str(file.path)!r}", "it has no animations", "leave the time out")
+        raise InputError(f"time {seconds:g} of {str(file.path)!r}", "the file has no animations", "omit the time")
     accessors, moved = Accessors(file), [dict(node) for node in file.items("nodes")]
     ends: list[float] = []
     taken: set[tuple[int, str]] = set()

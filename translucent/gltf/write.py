@@ -108,7 +108,9 @@ def write_medium(
         If the file cannot be written.
     """
     if thickness is not None and not 0 < thickness < math.inf:
-        raise InputError(f"thickness {thickness!r}", "not above 0 and finite", "give a length, for example 0.02")
+        raise InputError(
+            f"thickness {thickness!r}", "the thickness must be finite and above 0", "use a length such as 0.02"
+        )
     filling = Filling(medium, distance, object_name, thickness, keep_ior)
     return write_media(path_in, path_out, [filling], draft_extensions=draft_extensions, allow_outside=allow_outside)
 
@@ -136,7 +138,7 @@ def write_media(
     check_gltf_output(Path(path_out))
     if draft_extensions is not None and draft_extensions not in DRAFTS:
         known = f"use {' or '.join(map(repr, DRAFTS))}, or None"
-        raise InputError(f"draft_extensions {draft_extensions!r}", "not known", known)
+        raise InputError(f"draft_extensions {draft_extensions!r}", "no draft extension has this name", known)
     file = read_gltf(path_in, allow_outside)
     entered = {material.index for material in materials_of(file) if material.transmission > 0}
     tree = copy.deepcopy(file.tree)
@@ -214,7 +216,7 @@ def _meshes_named(file: GltfFile, name: str) -> set[int]:
             known = {str(n.get("name", file.item("meshes", n["mesh"]).get("name", ""))) for n in nodes if "mesh" in n}
             raise InputError(
                 f"object {name!r}",
-                f"{str(file.path)!r} has no mesh of that name",
+                f"no mesh in {str(file.path)!r} has this name",
                 f"use one of {', '.join(sorted(known - {''})) or 'none: its objects have no names'}",
             )
         return found
@@ -249,7 +251,11 @@ def _fill(file: GltfFile, index: int, filling: Filling, sizes: list[float]) -> N
     factor = before.get("thicknessFactor", 0) or max(sizes) if filling.thickness is None else filling.thickness
     if not factor > 0:
         requested = f"material {index} {material.get('name', '')!r}"
-        raise InputError(requested, "its objects are flat and have no thickness", "give one, or choose another object")
+        raise InputError(
+            requested,
+            "the objects are flat, so they have no default thickness",
+            "give a thickness, or choose another object",
+        )
     ior = extensions.get(IOR, {}).get("ior", DEFAULT_IOR) if filling.keep_ior else filling.medium.ior
     made = volume_extensions(filling.medium, filling.distance, factor, ior)
     kept = {key: value for key, value in before.items() if key not in ("attenuationColor", "attenuationDistance")}

@@ -362,7 +362,7 @@ def require_own_process() -> None:
     if _opened_in not in (None, os.getpid()):
         raise RenderError(
             "OpenGL in a forked process",
-            f"process {_opened_in} has opened it before the fork, which its driver does not survive",
+            (f"process {_opened_in} opened OpenGL before the fork, and the driver does not work after a fork"),
             'start processes with multiprocessing.get_context("spawn")',
         )
 
@@ -391,7 +391,9 @@ def open_context(backend: str | None = None) -> GpuContext:
         In a process that is forked from one that has opened OpenGL, or that may take too little memory.
     """
     if backend is not None and backend not in get_args(Backend):
-        raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(get_args(Backend))}")
+        raise InputError(
+            f"backend {backend!r}", "no backend has this name", f"use one of {', '.join(get_args(Backend))}"
+        )
     if _opened_in is None:  # what takes most is loaded once
         require_allowed("OpenGL", _TAKEN)
     _note_process()
@@ -417,7 +419,9 @@ def adopt_context(gl: moderngl.Context) -> GpuContext:
     """
     _note_process()
     if not isinstance(gl, moderngl.Context):
-        raise InputError(f"context {brief(gl)}", f"of type {type(gl).__name__}", "give a moderngl.Context")
+        raise InputError(
+            f"context {brief(gl)}", f"of type {type(gl).__name__}", "give an object of type moderngl.Context"
+        )
     if gl.gc_mode is None:
         gl.gc_mode = "context_gc"
     return GpuContext(gl, "adopted", gl.info)

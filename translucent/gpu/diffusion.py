@@ -225,8 +225,8 @@ class GridTexture:
         except moderngl.Error as error:
             raise RenderError(
                 f"density grids of {width}x{height}x{depth} voxels in all",
-                f"OpenGL has no room for them ({error})",
-                "use coarser grids",
+                f"OpenGL does not have enough memory for these grids ({error})",
+                "use grids with fewer voxels",
             ) from error
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         return texture

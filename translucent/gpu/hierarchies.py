@@ -373,8 +373,8 @@ def _require_room(gl: moderngl.Context, meshes: Sequence[Mesh]) -> None:
     if needed > MUCH_MEMORY:
         warnings.warn(
             TranslucentWarning(
-                f"tracing rays through {sum(faces):,} triangles takes up to {size_text(needed)} of memory; "
-                "use interfaces=tl.ScreenInterfaces(), or coarser meshes, for less"
+                f"ray tracing through {sum(faces):,} triangles takes up to {size_text(needed)} of memory; "
+                "to save memory, use interfaces=tl.ScreenInterfaces(), or meshes with fewer triangles"
             ),
             stacklevel=2,
         )
@@ -389,7 +389,7 @@ def _check_texels(gl: moderngl.Context, texels: int) -> None:
         found, do = f"at least {texels:,} texels, and this OpenGL holds {room:,}", ", or coarser meshes"
     else:
         return
-    raise RenderError("tracing rays through the meshes", found, f"use interfaces=tl.ScreenInterfaces(){do}")
+    raise RenderError("ray tracing through the meshes", found, f"use interfaces=tl.ScreenInterfaces(){do}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -428,9 +428,9 @@ def _texture(gl: moderngl.Context, count: int, pieces: Sequence[_Piece]) -> mode
             texture.write(part, viewport=(0, row, _WIDTH, height))
     except moderngl.Error as error:
         raise RenderError(
-            "tracing rays through the meshes",
-            f"OpenGL has no room for {size_text(16 * rows * _WIDTH)} of them ({error})",
-            "use interfaces=tl.ScreenInterfaces(), or coarser meshes",
+            "ray tracing through the meshes",
+            (f"OpenGL does not have enough memory for {size_text(16 * rows * _WIDTH)} of mesh data ({error})"),
+            "use interfaces=tl.ScreenInterfaces(), or meshes with fewer triangles",
         ) from error
     texture.filter = moderngl.NEAREST, moderngl.NEAREST
     return texture

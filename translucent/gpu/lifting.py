@@ -58,8 +58,11 @@ def _head(name: str, code: str, dialect: Dialect) -> tuple[int, list[str]]:
     if stores:
         raise InputError(
             f"shader {name!r} for {'WebGL2' if dialect == 'webgl2' else 'other languages'}",
-            f"it writes to buffers, which {'WebGL2 has none of' if dialect == 'webgl2' else 'are not translated'}",
-            "use the shaders of a method that does not: signed_depth for sums, peel and peel_fold for ordered segments",
+            (
+                "the shader writes to buffers, which "
+                f"{('WebGL2 has none of' if dialect == 'webgl2' else 'are not translated')}"
+            ),
+            ("use a method without such shaders: signed_depth for sums, peel and peel_fold for sorted intervals"),
         )
     if dialect == "vulkan":
         extension = "#extension GL_EXT_samplerless_texture_functions : require"
@@ -271,10 +274,10 @@ def find_shader(name: str) -> str:
     if len(found) == 1:
         return found[0]
     if found:
-        raise InputError(f"shader {name!r}", "several files are called so", f"use one of {', '.join(found)}")
+        raise InputError(f"shader {name!r}", "several shader files have this name", f"use one of {', '.join(found)}")
     close = close_names(name, known) or close_names(name, dict.fromkeys(stems.values()))
     do = did_you_mean(close) if close else "'translucent shader' lists all"
-    raise InputError(f"shader {name!r}", "no such shader", do)
+    raise InputError(f"shader {name!r}", "no shader has this name", do)
 
 
 def switches(name: str) -> list[str]:
@@ -301,11 +304,15 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
         If a switch is unknown or missing, the shader refuses the values, or it needs what the target lacks.
     """
     if target not in get_args(Dialect):
-        raise InputError(f"target {target!r}", "unknown", f"use one of {', '.join(get_args(Dialect))}")
+        raise InputError(f"target {target!r}", "no target has this name", f"use one of {', '.join(get_args(Dialect))}")
     gathered = gather(name)
     if unknown := sorted(defines.keys() - gathered.switches):
         known = ", ".join(sorted(gathered.switches)) or "it has none"
-        raise InputError(f"shader {name!r}", f"no switch {', '.join(unknown)} is in it", f"switches: {known}")
+        raise InputError(
+            f"shader {name!r}",
+            f"the shader has no switch {', '.join(unknown)}",
+            f"the switches of this shader are: {known}",
+        )
     missing: set[str] = set()
     parts = list(_parts(_decided(name, gathered, defines, missing)))
     if missing:
@@ -313,7 +320,9 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
         least = least or dict.fromkeys(missing, 1)
         options = " ".join(f"--define {key}={least[key]}" for key in sorted(missing))
         count = f"{len(missing)} {'switch' if len(missing) == 1 else 'switches'}"
-        raise InputError(f"shader {name!r}", f"it asks for {count} more", f"add {options}, or other values")
+        raise InputError(
+            f"shader {name!r}", f"the shader needs {count} more switches", f"add {options}, or choose other values"
+        )
     kept = _reached(parts)
     used = set().union(*(part.names for part in kept))
     texts = [part.text.strip("\n") for part in kept]
@@ -359,7 +368,7 @@ def _decided(name: str, gathered: Gathered, defines: Mapping[str, int], missing:
             live.pop()
             done.pop()
         elif live[-1] and word == "error" and not missing:
-            raise InputError(f"shader {name!r}", rest, "give other values")
+            raise InputError(f"shader {name!r}", rest, "choose other values of the switches")
         elif live[-1] and not word:
             yield file, line
 

@@ -391,20 +391,24 @@ class GpuRenderer:
         """Lock against use by other threads, as the context can be current in one thread only."""
         require_own_process()
         if not self._turn.acquire(blocking=False):
-            raise RenderError("rendering", "another thread uses this renderer", "give each thread one of its own")
+            raise RenderError(
+                "rendering", "another thread is using this renderer", "create one renderer for each thread"
+            )
         try:
             yield
         except moderngl.Error as error:
             if not any(words in str(error) for words in ("not complete", "cannot create")):
                 raise
-            raise RenderError("rendering", f"OpenGL has no memory for it ({error})", "render smaller") from error
+            raise RenderError(
+                "rendering", f"OpenGL does not have enough memory for the picture ({error})", "choose a smaller picture"
+            ) from error
         finally:
             self._turn.release()
 
     def _require_open(self) -> None:
         if self._closed or self._interrupted:
             how = "it was interrupted" if self._interrupted and not self._closed else "the renderer is closed"
-            raise RenderError("rendering", how, "make a new one")
+            raise RenderError("rendering", how, "create a new renderer")
 
     def step(self, kind: type[Pass]) -> Pass:
         """The pass of a kind, made when it is first requested, with the context current."""

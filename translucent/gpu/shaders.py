@@ -159,9 +159,13 @@ def _with_switches(name: str, gathered: Gathered, defines: Mapping[str, int] | N
     body = "\n".join(gathered.lines)
     given = dict(defines or {})
     if unknown := sorted(given.keys() - gathered.switches):
-        raise RenderError(f"shader {name!r}", f"defines {unknown} that it does not ask for", "check the spelling")
+        raise RenderError(
+            f"shader {name!r}", f"the code defines {unknown}, which the shader does not use", "check the spelling"
+        )
     if missing := sorted(gathered.switches - given.keys()):
-        raise RenderError(f"shader {name!r}", f"it asks for {missing}, which are not defined", "define them as 0 or 1")
+        raise RenderError(
+            f"shader {name!r}", f"the shader needs {missing}, which the code does not define", "define them as 0 or 1"
+        )
     head = [f"#version {version} core", f"// shaders/{name}"]
     head += [f"#define {key} {int(value)}" for key, value in given.items()]
     if re.search(r"^\s*precise ", body, re.MULTILINE):
@@ -181,7 +185,9 @@ class Gathered:
         """Add a file, reached through includes from `parents`, and the files that it includes."""
         if name in parents:
             raise RenderError(
-                f"shader {parents[0]!r}", f"includes go in circles: {' -> '.join([*parents, name])}", "cut one"
+                f"shader {parents[0]!r}",
+                f"files include each other in a circle: {' -> '.join([*parents, name])}",
+                "remove one of these includes",
             )
         if name in self.files:
             return
@@ -228,7 +234,9 @@ def _text(name: str, parents: tuple[str, ...]) -> str:
         of_block, _, instance = name[1:-1].partition(" as ")
         if (found := generated.get(of_block)) is None:
             raise RenderError(
-                f"shader {parents[-1]!r}", f"includes {name}", f"use one of {', '.join(generated)}, constants"
+                f"shader {parents[-1]!r}",
+                f"the shader includes {name}, which does not exist",
+                f"include one of {', '.join(generated)}, or constants",
             )
         return found.named(instance) if instance and isinstance(found, UniformBlock) else found.glsl
     return shader_path(name).read_text(encoding="utf-8")
@@ -269,7 +277,7 @@ def build_program(
         stages.append(_with_switches(name, gathered, own, version))
     used = {key for stage in stages for key in given if f"#define {key} " in stage.text}
     if unused := sorted(given.keys() - used):
-        raise RenderError(f"shaders {vertex!r} and {fragment!r}", f"neither asks for {unused}", "check the spelling")
+        raise RenderError(f"shaders {vertex!r} and {fragment!r}", f"neither shader uses {unused}", "check the spelling")
     try:
         with DeferredSignals():
             program = gl.program(vertex_shader=stages[0].text, fragment_shader=stages[1].text)
@@ -298,7 +306,7 @@ def build_compute(
 
 
 def _refused(stage: ShaderSource, log: str) -> RenderError:
-    return RenderError(f"shader {stage.files[0]!r}", stage.locate(log).strip(), "mend the GLSL")
+    return RenderError(f"shader {stage.files[0]!r}", stage.locate(log).strip(), "correct the GLSL code")
 
 
 def _bind(
@@ -326,7 +334,9 @@ def set_uniform(program: moderngl.Program | moderngl.ComputeShader, name: str, v
         program[name].value = value
     except KeyError:
         known = ", ".join(sorted(program))
-        raise RenderError(f"uniform {name!r}", f"the program has only {known}", "check the spelling") from None
+        raise RenderError(
+            f"uniform {name!r}", f"the program only has the uniforms {known}", "check the spelling"
+        ) from None
 
 
 def set_used(program: moderngl.Program | moderngl.ComputeShader, values: Mapping[str, Any]) -> None:

@@ -128,8 +128,8 @@ class ShadowViews:
             side //= 2
         raise RenderError(
             f"shadows of {len(lights)} lights and {len(sky)} directions of the environment",
-            f"no texture of this OpenGL, at most {limit} texels wide, holds their maps",
-            "use fewer",
+            (f"no texture of this OpenGL can hold all shadow maps: the largest texture is {limit} texels wide"),
+            "use fewer lights or directions",
         )
 
     def __iter__(self) -> Iterator[ShadowView]:
@@ -360,9 +360,12 @@ class ShadowAtlas:
             depth = gl.depth_renderbuffer(extent)
         except moderngl.Error as error:
             raise RenderError(
-                "maps of shadows",
-                f"OpenGL has no room for {_TEXEL * extent[0] * extent[1] / 1e6:.0f} MB of them ({error})",
-                "give shadows=tl.ShadowMaps(size=...) a smaller size",
+                "shadow maps",
+                (
+                    f"OpenGL does not have enough memory for {_TEXEL * extent[0] * extent[1] / 1000000.0:.0f} "
+                    f"MB of shadow maps ({error})"
+                ),
+                "use smaller shadow maps: shadows=tl.ShadowMaps(size=...)",
             ) from error
         for texture in (sums, ends):
             texture.filter = moderngl.NEAREST, moderngl.NEAREST

@@ -137,8 +137,8 @@ class Storage:
         except moderngl.Error as error:
             raise RenderError(
                 self._owner,
-                f"OpenGL has no room for {size / 1e6:.0f} MB of surfaces ({error})",
-                "use DepthPeeling, render in parts, or smaller",
+                (f"OpenGL does not have enough memory for {size / 1000000.0:.0f} MB of surface lists ({error})"),
+                "use DepthPeeling, render the picture in parts, or choose a smaller picture",
             ) from error
         return self._buffers[name]
 
@@ -169,7 +169,9 @@ class Targets:
         limit = int(gl.info["GL_MAX_TEXTURE_SIZE"])
         if max(size) > limit:
             raise RenderError(
-                f"frame size {size[0]}x{size[1]}", f"this OpenGL allows at most {limit}", "render in parts, or smaller"
+                f"frame size {size[0]}x{size[1]}",
+                f"this OpenGL allows at most {limit} pixels along a side",
+                "render the picture in parts, or choose a smaller picture",
             )
         self._gl = gl
         self.size = size
@@ -244,8 +246,8 @@ class Targets:
                 megabytes = found.bytes_of() * self.size[0] * self.size[1] / 1e6
                 raise RenderError(
                     f"frame size {self.size[0]}x{self.size[1]}",
-                    f"OpenGL has no room for {megabytes:.0f} MB of it ({error})",
-                    "render in parts, or smaller",
+                    f"OpenGL does not have enough memory for {megabytes:.0f} MB of pixels ({error})",
+                    "render the picture in parts, or choose a smaller picture",
                 ) from error
         return self._framebuffers[name]
 

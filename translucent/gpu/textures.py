@@ -91,7 +91,9 @@ class TextureCache:
         if (found := self._textures.get(texture)) is None:
             height, width, channels = texture.pixels.shape
             if max(width, height) > (limit := int(self._gl.info["GL_MAX_TEXTURE_SIZE"])):
-                raise RenderError(f"{texture!r}", f"this OpenGL allows at most {limit}", "give a smaller picture")
+                raise RenderError(
+                    f"{texture!r}", f"this OpenGL allows at most {limit} texels along a side", "use a smaller picture"
+                )
             before_making(self._gl)
             content = np.ones((height, width, 4), dtype=np.float16)
             with np.errstate(under="ignore"):

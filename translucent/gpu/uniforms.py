@@ -431,7 +431,9 @@ def light_uniforms(scene: Scene, shine: bool, ground: Mapping[str, npt.ArrayLike
         If there are more lights than the block holds.
     """
     if shine and len(scene.lights) > MAX_LIGHTS:
-        raise InputError("lighting opaque objects", f"{len(scene.lights)} lights", f"use at most {MAX_LIGHTS}")
+        raise InputError(
+            "lighting opaque objects", f"the scene has {len(scene.lights)} lights", f"use at most {MAX_LIGHTS} lights"
+        )
     lights, center = scene.lights[:MAX_LIGHTS], media_center(scene)
     position, power, disc = np.zeros((3, MAX_LIGHTS, 4))
     cone = np.tile(ALL_AROUND, (MAX_LIGHTS, 1))

@@ -264,7 +264,9 @@ class Viewport:
         limit = int(self.engine.context.info["GL_MAX_TEXTURE_SIZE"])
         if max(size) > limit:
             raise RenderError(
-                f"viewport of {size[0]}x{size[1]}", f"this OpenGL allows at most {limit}", "make the window smaller"
+                f"viewport of {size[0]}x{size[1]}",
+                f"this OpenGL allows at most {limit} pixels along a side",
+                "make the window smaller",
             )
         try:
             texture = self._gl.texture(size, 4)

@@ -119,15 +119,17 @@ _converted: WeakKeyDictionary[Any, tuple[list[Any], list[tuple[Mesh, Array]]]] =
 def translucent_nodes(scene: Any, names: Collection[str]) -> list[tuple[Any, str]]:
     """Visible mesh nodes that have one of these names, or whose meshes do, with that name; in a fixed order."""
     if not isinstance(scene, pyrender.Scene):
-        raise InputError(f"pyrender scene {scene!r}", f"of type {type(scene).__name__}", "give a pyrender.Scene")
+        raise InputError(
+            f"pyrender scene {scene!r}", f"of type {type(scene).__name__}", "give an object of type pyrender.Scene"
+        )
     nodes = sorted((node for node in scene.mesh_nodes if node.mesh.is_visible), key=_order)
     known = {name for node in nodes for name in (node.name, node.mesh.name) if name is not None}
     if unknown := sorted(set(names) - known):
         listed = ", ".join(map(repr, sorted(known))) or "no names: give nodes some, scene.add(mesh, name=...)"
         raise InputError(
             f"media for {', '.join(map(repr, unknown))}",
-            f"no visible node or mesh of the pyrender scene has the name; it has {listed}",
-            "use one of its names",
+            f"no visible node or mesh of the pyrender scene has this name; the scene has {listed}",
+            "use one of these names",
         )
     chosen = []
     for node in nodes:
@@ -147,7 +149,9 @@ def converted(scene: Any, media: Mapping[str, Medium], size: tuple[int, int], ov
         for mesh, pose in _meshes(node, node.mesh.name or name):
             objects.append(Object(mesh, media[name], scene.get_pose(node) @ pose))
     if not objects:
-        raise InputError("rendering a pyrender scene", "no medium is given", "give media={'name': tl.Medium(...)}")
+        raise InputError(
+            "rendering a pyrender scene", "no medium is given for any node", "give media={'name': tl.Medium(...)}"
+        )
     background = Environment.constant(np.asarray(scene.bg_color[:3], dtype=np.float64) ** GAMMA)
     return Scene(objects, camera_of(scene, size), _lights(scene), background, overlap)
 
@@ -179,7 +183,7 @@ def _raw_meshes(mesh: Any, name: str) -> Iterator[tuple[Mesh, Array]]:
 def _triangles(primitive: Any, name: str) -> tuple[Array, npt.NDArray[np.int32]]:
     if primitive.mode != pyrender.GLTF.TRIANGLES:
         raise InputError(
-            f"the medium of {name!r}", f"its mesh has a primitive of mode {primitive.mode}", "give it triangles"
+            f"the medium of {name!r}", f"the mesh has a primitive of mode {primitive.mode}", "use a mesh of triangles"
         )
     vertices = np.asarray(primitive.positions, dtype=np.float64)
     corners = np.arange(len(vertices)) if primitive.indices is None else np.asarray(primitive.indices)
@@ -190,7 +194,9 @@ def camera_of(scene: Any, size: tuple[int, int]) -> Camera:
     """The camera that a pyrender scene is drawn with, if the toolkit has such cameras."""
     node = scene.main_camera_node
     if node is None:
-        raise InputError("rendering a pyrender scene", "it has no camera", "add one: scene.add(camera, pose=...)")
+        raise InputError(
+            "rendering a pyrender scene", "the scene has no camera", "add a camera: scene.add(camera, pose=...)"
+        )
     camera, pose = node.camera, scene.get_pose(node)
     if isinstance(camera, pyrender.OrthographicCamera):
         # pyrender takes the width from the picture, whatever xmag says.
@@ -200,16 +206,22 @@ def camera_of(scene: Any, size: tuple[int, int]) -> Camera:
         if max(map(abs, off)) > _CENTERED or not math.isclose(camera.fx, camera.fy, rel_tol=1e-9):
             raise InputError(
                 "camera of the pyrender scene",
-                f"its intrinsics fx {camera.fx:g}, fy {camera.fy:g}, cx {camera.cx:g}, cy {camera.cy:g} do not look "
-                f"through the middle of {size[0]}x{size[1]} with square pixels",
-                "draw in the size that they are for, with fx = fy, or use a PerspectiveCamera",
+                (
+                    f"the intrinsics fx {camera.fx:g}, fy {camera.fy:g}, cx {camera.cx:g}, cy {camera.cy:g} "
+                    f"do not describe square pixels and a view through the middle of {size[0]}x{size[1]} "
+                    "pixels"
+                ),
+                (
+                    "render at the picture size for which the intrinsics were made, with fx = fy, or use a "
+                    "PerspectiveCamera"
+                ),
             )
         return Camera(pose, fov_y=math.degrees(2.0 * math.atan(size[1] / (2.0 * camera.fy))))
     if camera.aspectRatio is not None and not math.isclose(camera.aspectRatio, size[0] / size[1], rel_tol=1e-6):
         raise InputError(
             "camera of the pyrender scene",
-            f"aspectRatio {camera.aspectRatio:g} for a picture of {size[0]}x{size[1]}, which it stretches",
-            "leave aspectRatio out: it is the output of the picture then",
+            f"aspectRatio {camera.aspectRatio:g} would stretch a picture of {size[0]}x{size[1]} pixels",
+            "omit aspectRatio: pyrender then uses the aspect ratio of the picture",
         )
     return Camera(pose, fov_y=math.degrees(camera.yfov))
 
@@ -221,8 +233,8 @@ def _lights(scene: Any) -> list[Light]:
         if np.linalg.matrix_rank(pose[:3, :3]) < 3:
             raise InputError(
                 f"light {light.name or node.name or 'without a name'!r} of the pyrender scene",
-                "the transform of its node is singular (a scale of 0, in it or above it)",
-                "give every axis a scale other than 0",
+                "the transform of the light's node is singular: it, or a node above, has a scale of 0",
+                "use a scale other than 0 along every axis",
             )
         power = light.intensity * np.asarray(light.color, dtype=np.float64)
         if isinstance(light, pyrender.PointLight):
@@ -270,7 +282,9 @@ def _add_lights(part: Any, scene: Scene) -> None:
     for kind in {type(light) for light in scene.lights}:
         if (count := sum(isinstance(light, kind) for light in scene.lights)) > MAX_N_LIGHTS:
             raise InputError(
-                "drawing with pyrender", f"{count} of {kind.__name__}", f"use at most {MAX_N_LIGHTS} of each kind"
+                "drawing with pyrender",
+                f"the scene has {count} lights of type {kind.__name__}",
+                f"use at most {MAX_N_LIGHTS} lights of each type",
             )
     for light in scene.lights:
         pose = np.eye(4)
@@ -497,8 +511,8 @@ def _offscreen(size: tuple[int, int]) -> Any:
         return pyrender.OffscreenRenderer(*size)
     except Exception as error:  # each of the window systems raises its own kinds
         raise RenderError(
-            "drawing with pyrender in a context of its own",
-            f"there is none ({type(error).__name__}: {error})",
+            "drawing with pyrender in a separate OpenGL context",
+            f"no such context can be created ({type(error).__name__}: {error})",
             "without a window, set PYOPENGL_PLATFORM=egl before anything imports pyrender",
         ) from error
 
@@ -507,7 +521,9 @@ def _require_room(size: tuple[int, int]) -> None:
     limit = int(GL.glGetIntegerv(GL.GL_MAX_RENDERBUFFER_SIZE))
     if max(size) > limit:
         raise RenderError(
-            f"frame size {size[0]}x{size[1]}", f"this OpenGL allows at most {limit}", "render in parts, or smaller"
+            f"frame size {size[0]}x{size[1]}",
+            f"this OpenGL allows at most {limit} pixels along a side",
+            "render the picture in parts, or choose a smaller picture",
         )
 
 
@@ -520,8 +536,8 @@ def _as_render_error() -> Iterator[None]:
     except (OpenGLError, RuntimeError) as error:  # of shaders that do not compile or fit, the second
         raise RenderError(
             "drawing with pyrender",
-            f"OpenGL refused ({' '.join(str(error).split())})",
-            "leave out flags for shadows, which fail with textures on some drivers",
+            f"OpenGL reported an error ({' '.join(str(error).split())})",
+            "omit pyrender flags for shadows, which fail with textures on some drivers",
         ) from error
 
 

@@ -133,7 +133,9 @@ def to_mitsuba(
     except ImportError:
         raise RenderError("to_mitsuba", "mitsuba is not installed", f"pip install mitsuba, {without}") from None
     if mitsuba.variant() is None:
-        raise RenderError("to_mitsuba", "no variant of Mitsuba is set", "mitsuba.set_variant('llvm_ad_rgb')")
+        raise RenderError(
+            "to_mitsuba", "no variant of Mitsuba has been chosen", "call mitsuba.set_variant('llvm_ad_rgb')"
+        )
     home = Path(tempfile.mkdtemp(prefix="translucent-mitsuba-") if folder is None else folder)
     with OutputFiles() as written:
         for name, write in files.items():
@@ -195,7 +197,9 @@ def write_mitsuba(scene: Scene, size: tuple[int, int], path: str | Path, *, samp
 def check_output(path: Path) -> None:
     """Raise `InputError` before any work is done if no scene can be written to the path."""
     if path.suffix.lower() != ".xml":
-        raise InputError(f"scene for Mitsuba {str(path)!r}", "not an .xml file", "name it for example scene.xml")
+        raise InputError(
+            f"scene for Mitsuba {str(path)!r}", "the name must end in .xml", "name it for example scene.xml"
+        )
     require_output(path, f"scene for Mitsuba {str(path)!r}")
 
 
@@ -235,7 +239,7 @@ def describe(scene: Scene, size: tuple[int, int], samples: int = SAMPLES) -> tup
     check_scene(scene)
     size = check_size(size)
     if samples < 1:
-        raise InputError(f"samples {samples}", "less than 1", "give for example 256")
+        raise InputError(f"samples {samples}", "the number of samples must be at least 1", "use a value such as 256")
     for found, do in _beyond(scene):
         raise InputError("a scene for Mitsuba", found, do)
     rough = [body for body in scene.bodies if body.surface is not None and body.surface.roughness > ROUGH]

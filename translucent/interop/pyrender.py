@@ -77,7 +77,7 @@ def load_pyrender(backend: str | None = None) -> ModuleType:
         bound = f"PYOPENGL_PLATFORM={platform}" if platform else "no PYOPENGL_PLATFORM set"
         raise RenderError(
             "drawing with pyrender",
-            f"it cannot be imported with {bound} ({type(error).__name__}: {error})",
+            f"pyrender cannot be imported with {bound} ({type(error).__name__}: {error})",
             "pip install pyrender==0.1.45; apt-get install libegl1 libgl1 libgl1-mesa-dri; without a window, set "
             "PYOPENGL_PLATFORM=egl before anything imports pyrender",
         ) from error
@@ -90,8 +90,8 @@ def load_pyrender(backend: str | None = None) -> ModuleType:
     if missing:
         raise RenderError(
             f"drawing with pyrender {pyrender.__version__}",
-            f"it has no {', '.join(missing)}",
-            "pip install pyrender==0.1.45",
+            f"this version of pyrender has no {', '.join(missing)}",
+            "run pip install pyrender==0.1.45",
         )
     _let_pyopengl_know_references()
     if os.environ.get("PYOPENGL_PLATFORM") == "egl":
@@ -268,14 +268,19 @@ def _require_copying(why: str, *, owned: bool, shared: bool | None) -> None:
         raise RenderError(
             "sharing an OpenGL context with pyrender",
             why,
-            "leave shared out, or bind PyOpenGL to the same window system: without a window, set PYOPENGL_PLATFORM=egl "
-            "before anything imports pyrender",
+            (
+                "omit shared=, or bind PyOpenGL to the same window system: without a window, set "
+                "PYOPENGL_PLATFORM=egl before anything imports pyrender"
+            ),
         )
     if not owned:
         raise RenderError(
-            "copying a picture of pyrender",
-            f"{why}; the renderer draws in a context of somebody else, which pyrender's own would displace",
-            "give another renderer, or set PYOPENGL_PLATFORM for the window before anything imports pyrender",
+            "copying a picture from pyrender",
+            (
+                f"{why}; the renderer draws in the OpenGL context of another library, which pyrender's own "
+                "context would replace"
+            ),
+            ("use another renderer, or set PYOPENGL_PLATFORM for the window before anything imports pyrender"),
         )
 
 
@@ -361,7 +366,11 @@ def render_scene(
 def _require_opaque(scene: Scene) -> None:
     if not scene.opaque:
         names = ", ".join(repr(body.mesh.name) for body in scene.bodies)
-        raise InputError("drawing opaque objects with pyrender", f"{names}: all have media", "render without pyrender")
+        raise InputError(
+            "drawing opaque objects with pyrender",
+            f"all nodes have a medium, so no opaque node is left: {names}",
+            "render without pyrender",
+        )
 
 
 def _opaque_part(scene: Any, translucent: Collection[str], size: tuple[int, int], flags: int) -> Any:
@@ -371,8 +380,11 @@ def _opaque_part(scene: Any, translucent: Collection[str], size: tuple[int, int]
     if flags & ~PICTURE_FLAGS:
         raise InputError(
             f"pyrender flags {flags}",
-            f"{flags & ~PICTURE_FLAGS} is not for shadows of directional or spot lights, culling or wireframes",
-            "leave it out",
+            (
+                f"the flags {flags & ~PICTURE_FLAGS} do not concern shadows of directional or spot lights, "
+                "culling or wireframes"
+            ),
+            "omit these flags",
         )
     hidden = [node for node, _ in translucent_nodes(scene, translucent)]
     camera_of(scene, size)

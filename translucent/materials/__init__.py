@@ -79,17 +79,21 @@ def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: floa
     """
     writer = TARGETS.get(target.lower().replace("-", "_").replace(" ", "_").replace(".", ""))
     if writer is None:
-        raise InputError(f"target {target!r}", "not a known target", f"use one of {', '.join(TARGETS)}")
+        raise InputError(f"target {target!r}", "no target has this name", f"use one of {', '.join(TARGETS)}")
     if not 0 < distance < np.inf:
-        raise InputError(f"distance {distance!r}", "not above 0 and finite", "give it in metres, for example 0.02")
+        raise InputError(
+            f"distance {distance!r}",
+            "the distance must be finite and above 0",
+            "give the distance in metres, for example 0.02",
+        )
     if not 0 <= roughness <= 1:
-        raise InputError(f"roughness {roughness!r}", "not in 0 to 1", "give 0 for a polished surface")
+        raise InputError(f"roughness {roughness!r}", "the roughness must lie in 0 to 1", "use 0 for a polished surface")
     given, own = np.asarray(color, dtype=np.float64), medium.transmittance(distance)
     if given.shape != (3,) or not (np.abs(given - own) <= _SAME_COLOR).all():
         raise InputError(
             f"color {given.tolist()} after {distance:g} m",
-            f"the medium has {tuple(own.round(4).tolist())} there",
-            "give medium.transmittance(distance)",
+            f"the medium has the color {tuple(own.round(4).tolist())} after this distance",
+            "use the color medium.transmittance(distance)",
         )
     return writer.write(medium, float(distance), float(roughness)).rstrip("\n")
 
@@ -142,7 +146,7 @@ def load_roughness(path: str | Path) -> float:
     except (ValueError, TypeError, AttributeError, ParseError):
         found = math.nan
     if not 0 <= found <= 1:
-        raise InputError(what, "its roughness is not a number in 0 to 1", "correct it")
+        raise InputError(what, "the roughness of the material is not a number in 0 to 1", "correct the roughness")
     return found
 
 

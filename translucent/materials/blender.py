@@ -76,13 +76,21 @@ def from_principled_node(
 def _color(socket: str, value: npt.ArrayLike) -> Array:
     triple = np.asarray(value, dtype=np.float64)
     if triple.shape != (3,) or not ((triple >= 0).all() and (triple <= 1).all()):
-        raise InputError(f"Blender {socket} {value!r}", "not three numbers in 0..1", "give the linear color")
+        raise InputError(
+            f"Blender {socket} {value!r}",
+            "the color must be three numbers in 0..1",
+            "give the linear color of the socket",
+        )
     return triple
 
 
 def _density(value: float) -> float:
     if not 0 <= value < np.inf:
-        raise InputError(f"Blender Density {value!r}", "negative or not finite", "give the node's density")
+        raise InputError(
+            f"Blender Density {value!r}",
+            "the density is negative or not finite",
+            "give the density of the Blender node",
+        )
     return float(value)
 
 

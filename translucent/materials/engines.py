@@ -192,7 +192,11 @@ def from_mean_free_path_cm(mean_free_path: npt.ArrayLike) -> Medium:
     """Absorbing medium of a mean free path (3,) in cm, > 0; infinity is no extinction."""
     path = np.asarray(mean_free_path, dtype=np.float64)
     if path.shape != (3,) or not (path > 0).all():
-        raise InputError(f"mean free path {mean_free_path!r}", "not three lengths above 0", "give them in cm")
+        raise InputError(
+            f"mean free path {mean_free_path!r}",
+            "the mean free path must be three lengths above 0",
+            "give three lengths in cm",
+        )
     return Medium(absorption=CENTIMETERS_PER_METRE / path)
 
 
@@ -266,15 +270,21 @@ def read_json(text: str) -> Medium:
     try:
         values = json_value(text)
     except ValueError as error:
-        raise InputError("medium as JSON", f"it is broken ({error})", "write it again") from error
+        raise InputError("medium as JSON", f"the JSON is broken ({error})", "write the medium again") from error
     if not isinstance(values, dict):
-        raise InputError("medium as JSON", "not an object", "write it again")
+        raise InputError("medium as JSON", "the JSON is not an object", "write the medium again")
     known = (*_TRIPLES, *_NUMBERS, _PHASE)
     if unknown := sorted(set(values) - set(known)):
-        raise InputError("medium as JSON", f"unknown {', '.join(unknown)}", f"use {', '.join(known)}")
+        raise InputError(
+            "medium as JSON",
+            f"the JSON has the unknown keys {', '.join(unknown)}",
+            f"use only the keys {', '.join(known)}",
+        )
     for field in _NUMBERS:
         if isinstance(number := values.get(field, 0), bool) or not isinstance(number, int | float):
-            raise InputError("medium as JSON", f"{field} is {number!r}, not a number", "write it again")
+            raise InputError(
+                "medium as JSON", f"the value of {field} is {number!r}, and not a number", "write the medium again"
+            )
     if _PHASE in values:
         values[_PHASE] = parse_phase(str(values[_PHASE]))
     return Medium(**values)
@@ -292,7 +302,7 @@ def _read(text: str, _: str) -> Medium:
         return read_json(text)
     (found,) = materials_of(GltfFile(Path("material.gltf"), {"asset": {"version": "2.0"}, "materials": [entry]}))
     if (medium := found.medium()) is None:
-        raise InputError("glTF material", "it has no volume", "give one with KHR_materials_volume")
+        raise InputError("glTF material", "the material has no volume", "use a material with KHR_materials_volume")
     return medium
 
 

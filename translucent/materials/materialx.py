@@ -124,15 +124,17 @@ class SurfaceShader:
         what = f"{self.title} document"
         if "<!DOCTYPE" in text or "<!ENTITY" in text:
             raise InputError(
-                what, "it declares entities, which may unpack into anything", "export it without a DOCTYPE"
+                what,
+                "the file declares XML entities, which may expand without limit",
+                "export the file without a DOCTYPE",
             )
         try:
             root = ElementTree.fromstring(text)
         except (ElementTree.ParseError, ValueError) as error:
-            raise InputError(what, f"its XML is broken ({error})", "export it again") from error
+            raise InputError(what, f"the XML of the file is broken ({error})", "export the file again") from error
         surface = next(root.iter(self.node), None)
         if surface is None:
-            raise InputError(what, f"it has no <{self.node}>", "export that surface")
+            raise InputError(what, f"the file has no element <{self.node}>", "export a surface of this type")
         space = root.get("colorspace", "lin_rec709")
         inputs = {element.get("name", ""): element for element in surface.iter("input")}
         stated: dict[str, float | Array] = {}
@@ -140,13 +142,17 @@ class SurfaceShader:
             if (element := inputs.get(key)) is None:
                 continue
             if (value := element.get("value")) is None:
-                raise InputError(what, f"{key} comes from a node", "give it a constant value")
+                raise InputError(what, f"{key} is connected to a node", "give this input a constant value")
             stated[key] = parse_value(what, key, value.split(","), default, element.get("colorspace", space))
         version = surface.get("version", "")
         stated_version = tuple(map(int, re.findall(r"\d{1,9}", version)[:2]))
         newer = self.last_version is not None and stated_version > self.last_version
         if newer and np.any(stated.get(self.scatter, 0.0)):
-            raise InputError(what, f"version {version}, whose scatter color means another thing", "export version 1.1")
+            raise InputError(
+                what,
+                f"the file has version {version}, in which the scatter color has another meaning",
+                "export the file as version 1.1",
+            )
         return medium_of(self, stated, metres_per_unit(unit))
 
 
@@ -190,9 +196,11 @@ def medium_of(shader: SurfaceShader, stated: Mapping[str, float | Array], metres
     )
     color, scatter = np.asarray(values[shader.color]), np.asarray(values[shader.scatter])
     if weight == 0:
-        raise InputError(what, f"{shader.weight} is 0, so it is opaque", "raise the weight")
+        raise InputError(what, f"{shader.weight} is 0, so the material is opaque", "use a weight above 0")
     if not ((color >= 0).all() and (color <= 1).all() and (scatter >= 0).all() and 0 <= depth < math.inf):
-        raise InputError(what, "a transmission color outside 0..1, or a negative depth", "correct the values")
+        raise InputError(
+            what, "the transmission color is outside 0..1, or the depth is negative", "correct these values"
+        )
     depth *= metres
     if depth == 0:  # a tint of the surface: there is no medium
         return Medium(ior=ior)
@@ -212,11 +220,13 @@ def parse_value(what: str, key: str, parts: list[str], default: float | Array, s
         numbers = np.zeros(0)
     if numbers.shape != (1 if scalar else 3,) or not np.isfinite(numbers).all():
         kind = "a number" if scalar else "three numbers"
-        raise InputError(what, f"{key} is {', '.join(parts)!r}, not {kind}", "correct it")
+        raise InputError(
+            what, f"the value of {key} is {', '.join(parts)!r}, and not of type {kind}", "correct this value"
+        )
     if scalar:
         return float(numbers[0])
     if space not in (*_LINEAR, _SRGB):
-        raise InputError(what, f"color space {space!r}", "use lin_rec709 or srgb_texture")
+        raise InputError(what, f"the color space is {space!r}", "use the color space lin_rec709 or srgb_texture")
     return srgb_to_linear(numbers) if space == _SRGB else numbers
 
 

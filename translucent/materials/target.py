@@ -54,7 +54,7 @@ def stated_color(what: str, text: str, start: str) -> Array:
     """(3,): a color behind `start`, each channel in 0..1; raises `InputError` otherwise."""
     color = stated(what, text, start, 3)
     if not ((color >= 0) & (color <= 1)).all():
-        raise InputError(what, f"a color {color.tolist()}, not in 0..1", "correct it")
+        raise InputError(what, f"the color {color.tolist()} is outside 0..1", "correct the color")
     return color
 
 
@@ -62,7 +62,7 @@ def stated_length(what: str, text: str, start: str) -> float:
     """A length behind `start`, > 0; raises `InputError` otherwise."""
     length = float(stated(what, text, start)[0])
     if not length > 0:
-        raise InputError(what, f"{start.strip()!r} is {length:g}, not above 0", "correct it")
+        raise InputError(what, f"{start.strip()!r} is {length:g}, but must be above 0", "correct this value")
     return length
 
 
@@ -88,11 +88,15 @@ def stated(what: str, text: str, start: str, count: int = 1, default: float | No
     _, found, rest = text.partition(start)
     if not found:
         if default is None:
-            raise InputError(what, f"it has no {start.strip()!r}", "give the text as it was printed")
+            raise InputError(
+                what, f"the text has no {start.strip()!r}", "give the text exactly as the command printed it"
+            )
         return np.full(count, default)
     line = rest.partition("\n")[0]
     numbers = np.array([float(number) for number in _NUMBERS.findall(line)[:count]])
     if numbers.shape != (count,) or not np.isfinite(numbers).all():
         kind = "a number" if count == 1 else f"{count} numbers"
-        raise InputError(what, f"{start.strip()!r} without {kind} behind it", "give the text as it was printed")
+        raise InputError(
+            what, f"{start.strip()!r} is not followed by {kind}", "give the text exactly as the command printed it"
+        )
     return numbers

@@ -103,17 +103,21 @@ def read_usda(text: str, _: str = "m") -> Medium:
         If the text is no such layer, has no such shader, or its inputs are out of range or not constant.
     """
     if not text.startswith("#usda"):
-        raise InputError("USD layer", "not .usda text", "convert it, for example with usdcat -o out.usda FILE")
+        raise InputError(
+            "USD layer", "the file is not .usda text", "convert the file, for example with usdcat -o out.usda FILE"
+        )
     tokens = [match[1] or match[2] for match in _TOKENS.finditer(text) if match[1] or match[2]]
     metres = _CENTIMETER
     if "metersPerUnit" in tokens[:-2]:
         metres = float(parse_value("USD layer", "metersPerUnit", [tokens[tokens.index("metersPerUnit") + 2]], 1.0, ""))
         if not metres > 0:
-            raise InputError("USD layer", f"metersPerUnit is {metres:g}", "correct it, for example to 0.01")
+            raise InputError("USD layer", f"metersPerUnit is {metres:g}", "correct metersPerUnit, for example to 0.01")
     for block in _blocks(tokens):
         if shader := _SHADERS.get(block.identifier):
             return medium_of(shader, dict(_stated(shader, block)), metres)
-    raise InputError("USD layer", f"it has no shader {' or '.join(_SHADERS)}", "export such a MaterialX surface")
+    raise InputError(
+        "USD layer", f"the file has no shader {' or '.join(_SHADERS)}", "export a MaterialX surface of this type"
+    )
 
 
 def _blocks(tokens: list[str]) -> Iterator[_Block]:
@@ -124,7 +128,9 @@ def _blocks(tokens: list[str]) -> Iterator[_Block]:
         index += 1
         if token == "{":
             if len(stack) > _MAX_DEPTH:
-                raise InputError("USD layer", f"more than {_MAX_DEPTH} levels of braces", "export it again")
+                raise InputError(
+                    "USD layer", f"the file has more than {_MAX_DEPTH} levels of braces", "export the file again"
+                )
             stack.append(_Block())
         elif token == "}" and len(stack) > 1:
             yield stack.pop()
@@ -156,7 +162,9 @@ def _stated(shader: SurfaceShader, block: _Block) -> Iterator[tuple[str, float |
     what = f"{shader.title} shader of a USD layer"
     for key, default in shader.defaults().items():
         if key in block.varying:
-            raise InputError(what, f"{key} comes from a node or changes with time", "give it a constant value")
+            raise InputError(
+                what, f"{key} is connected to a node or changes with time", "give this input a constant value"
+            )
         if key in block.inputs:
             parts, space = block.inputs[key]
             yield key, parse_value(what, key, parts, default, _SPACES.get(space, space))

@@ -122,14 +122,20 @@ def scattering_medium(
     """
     path = np.asarray(mean_free_path, dtype=np.float64)
     if path.shape not in ((), (3,)) or not (np.isfinite(path).all() and (path >= 1e-300).all()):
-        raise InputError(f"mean free path {path.tolist()}", "not one or three lengths above 0", "give it in metres")
+        raise InputError(
+            f"mean free path {path.tolist()}",
+            "the mean free path must be one length or three lengths above 0",
+            "give the mean free path in metres",
+        )
     triple, g = parse_color(color), _anisotropy(anisotropy)
     with np.errstate(under="ignore"):
         if model == "hulst":
             s = _similarity(triple)
             albedo, rest = hulst_albedo(triple, g), s * s * (1.0 - g) / (1.0 - g * s * s)
         elif anisotropy != 0:
-            raise InputError(f"anisotropy {anisotropy}", "Chiang's map is isotropic", 'use model="hulst"')
+            raise InputError(
+                f"anisotropy {anisotropy}", "Chiang's formula is only for isotropic scattering", 'use model="hulst"'
+            )
         else:
             albedo, rest = chiang_albedo(triple), np.exp(-_chiang_depth(_fraction("color", triple)))
         return Medium(absorption=rest / path, scattering=albedo / path, anisotropy=anisotropy, ior=ior)
@@ -153,12 +159,16 @@ def _fraction(what: str, values: npt.ArrayLike, most: float = 1.0) -> Array:
     array = np.asarray(values, dtype=np.float64)
     inside = (array >= 0) & (array <= most)
     if not inside.all():
-        raise InputError(f"{what} {float(array[~inside].flat[0]):g}", f"not in 0 to {most:g}", f"give a linear {what}")
+        raise InputError(
+            f"{what} {float(array[~inside].flat[0]):g}", f"the value must lie in 0 to {most:g}", f"give a linear {what}"
+        )
     return array
 
 
 def _anisotropy(values: npt.ArrayLike) -> Array:
     g = np.asarray(values, dtype=np.float64)
     if not (np.abs(g) < 1).all():
-        raise InputError(f"anisotropy {g.tolist()}", "not between -1 and 1", "give for example 0.8")
+        raise InputError(
+            f"anisotropy {g.tolist()}", "the anisotropy must lie between -1 and 1", "use a value such as 0.8"
+        )
     return g

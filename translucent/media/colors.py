@@ -83,12 +83,16 @@ def pixel_color(path: str | Path, x: int, y: int) -> Array:
     what = f"pixel {x},{y} of {str(path)!r}"
     image, channels = _read(what, path, "give an image file and a pixel, for example photo.png@120,45")
     if not (0 <= x < image.width and 0 <= y < image.height):
-        raise InputError(what, f"the image has {image.width} x {image.height} pixels", "count from 0 at the top left")
+        raise InputError(
+            what,
+            f"the image has {image.width} x {image.height} pixels",
+            "count pixels from 0, starting at the top left corner",
+        )
     if image.mode.startswith("I;16"):
         return srgb_to_linear(np.full(3, _pixel(image, x, y) / 65535.0))
     *straight, alpha = _pixel(image.convert("RGBA"), x, y)
     if alpha == 0:
-        raise InputError(what, "the pixel is wholly transparent", "pick one that has a color")
+        raise InputError(what, "the pixel is fully transparent", "choose a pixel that has a color")
     if channels:
         return srgb_to_linear(np.array([_pixel(channel, x, y) for channel in channels]) / 65535.0)
     return srgb_to_linear(np.array(straight) / 255.0)
@@ -121,7 +125,9 @@ def _read(what: str, path: str | Path, do: str, per_pixel: int = 16) -> tuple[Im
             deep = _is_deep(image, data)
             if not (image.mode.startswith("I;16") or image.mode in _EIGHT_BITS) or (deep and image.format != "PNG"):
                 kind = f"{image.mode} of 16 bits" if deep else image.mode
-                raise InputError(what, f"pixels of the kind {kind}", "save it as an 8-bit RGB image")
+                raise InputError(
+                    what, f"the pixel format {kind} is not supported", "save the picture as an 8-bit RGB image"
+                )
             upright, turn = ImageOps.exif_transpose(image), image.getexif().get(_ORIENTATION, 1)
             if upright.mode == "P":  # with what Pillow warns of
                 upright = upright.convert("RGBA")
@@ -129,7 +135,7 @@ def _read(what: str, path: str | Path, do: str, per_pixel: int = 16) -> tuple[Im
     except InputError:
         raise
     except Exception as error:  # each of Pillow's decoders raises its own kinds
-        raise InputError(what, "not an image that can be read", do) from error
+        raise InputError(what, "the file is not a readable image", do) from error
 
 
 def _is_deep(image: ImageFile, data: bytes) -> bool:
@@ -153,7 +159,7 @@ def _deep_channels(what: str, data: bytes, turn: int) -> list[Image]:
         values = pyspng.load(data)
     except RuntimeError as error:
         raise InputError(
-            what, f"pixels of a kind that is not read ({error})", "save it as an 8-bit RGB image"
+            what, f"the pixel format is not supported ({error})", "save the picture as an 8-bit RGB image"
         ) from None
     channels = [fromarray(values[..., i]) for i in range(3)]
     for channel in channels:
@@ -202,10 +208,14 @@ def parse_color(color: str | npt.ArrayLike) -> Array:
         triple = np.array(color, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError(
-            f"color {color!r}", "not three numbers", "give a linear (r, g, b) triple or a hex string"
+            f"color {color!r}", "a color needs three numbers", "give a linear (r, g, b) triple or a hex string"
         ) from None
     if triple.shape != (3,):
-        raise InputError(f"color {color!r}", f"shape {triple.shape}, not (3,)", "give one number each for r, g and b")
+        raise InputError(
+            f"color {color!r}",
+            f"the color has shape {triple.shape}, and not (3,)",
+            "give one number for each of r, g and b",
+        )
     return _finite(triple, str(color))
 
 
@@ -218,13 +228,17 @@ def _parse_text(text: str) -> Array:
         except ValueError:
             triple = np.zeros(0)
         if triple.shape != (3,):
-            raise InputError(f"color {text!r}", "not three numbers", "write for example linear(0.18, 0.62, 0.35)")
+            raise InputError(
+                f"color {text!r}",
+                "the parentheses must contain three numbers",
+                "write a color such as linear(0.18, 0.62, 0.35)",
+            )
         triple = _finite(triple, text)
         return srgb_to_linear(triple) if match[1].lower() == "srgb" else triple
     if match := _PIXEL.fullmatch(text):
         return pixel_color(match[1], int(match[2]), int(match[3]))
     if not text.strip():
-        raise InputError(f"color {text!r}", "empty", QUOTE_HINT)
+        raise InputError(f"color {text!r}", "the text is empty", QUOTE_HINT)
     try:
         rgb = ImageColor.getrgb(f"#{text.strip()}" if _BARE_HEX.fullmatch(text) else text.strip())
     except ValueError:
@@ -233,15 +247,15 @@ def _parse_text(text: str) -> Array:
             raise InputError(f"color {text!r}", found, f"write {hex_of_bytes(map(float, eight.groups()))!r}") from None
         raise InputError(
             f"color {text!r}",
-            "neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)",
-            "write for example '#7b1e3a', 'salmon' or 'linear(0.18,0.62,0.35)'",
+            "the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)",
+            "write a color such as '#7b1e3a', 'salmon' or 'linear(0.18,0.62,0.35)'",
         ) from None
     return srgb_to_linear(np.array(rgb[:3]) / 255.0)
 
 
 def _finite(triple: Array, text: str) -> Array:
     if not np.isfinite(triple).all():
-        raise InputError(f"color {text}", "a channel is not finite", "give numbers")
+        raise InputError(f"color {text}", "a channel of the color is not a finite number", "give three finite numbers")
     return triple
 
 
@@ -263,6 +277,8 @@ def reflectance(color: ColorLike, name: str) -> Array:
             raise
         values = np.zeros(0)
     if values.shape != (3,) or not ((values >= 0) & (values <= 1)).all():
-        raise InputError(f"{where} {color!r}", "not three numbers in 0 to 1", "give for example (0.6, 0.6, 0.6)")
+        raise InputError(
+            f"{where} {color!r}", "the value must be three numbers in 0 to 1", "use a value such as (0.6, 0.6, 0.6)"
+        )
     values.setflags(write=False)
     return values

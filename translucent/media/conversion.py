@@ -57,7 +57,9 @@ def extinction_from_colors(colors: npt.ArrayLike, distances: npt.ArrayLike) -> A
     """
     t, d = _triples(colors), np.asarray(distances, dtype=np.float64)
     if not (d > 0).all():
-        raise InputError(f"distance {float(d[~(d > 0)].flat[0]):g} m", "not above 0", "give distances in metres")
+        raise InputError(
+            f"distance {float(d[~(d > 0)].flat[0]):g} m", "a distance must be above 0", "give distances in metres"
+        )
     if d.ndim:
         t, d = np.broadcast_arrays(t, d[..., None])
     flat, result = np.ascontiguousarray(t).reshape(-1), np.empty(t.shape)
@@ -71,7 +73,11 @@ def extinction_from_colors(colors: npt.ArrayLike, distances: npt.ArrayLike) -> A
     with np.errstate(over="ignore", under="ignore"):
         result /= d
     if not np.isfinite(result).all():
-        raise InputError("extinction of a color at a distance", "it overflows", "check the unit of the distance")
+        raise InputError(
+            "extinction from a color at a distance",
+            "the extinction is too large for a number",
+            "check the unit of the distance",
+        )
     return result
 
 
@@ -118,9 +124,9 @@ def lengths(metres: npt.ArrayLike) -> Array:
     found = np.asarray(metres, dtype=np.float64)
     if (below := found < 0).any():
         raise InputError(
-            f"what passes {float(found[below].flat[0]):g} m",
-            f"below 0{'' if found.ndim == 0 else f' at {int(below.sum())} of {found.size} places'}",
-            "give lengths of paths through the medium, 0 or more",
+            f"transmittance after {float(found[below].flat[0]):g} m",
+            (f"the length is below 0{('' if found.ndim == 0 else f' at {int(below.sum())} of {found.size} places')}"),
+            "give lengths of paths through the medium, 0 or above",
         )
     return found
 
@@ -134,7 +140,9 @@ def condition_number(colors: npt.ArrayLike) -> Array:
     """
     found = np.asarray(colors, dtype=np.float64)
     if (found < 0).any():
-        raise InputError("condition number of a color", "a channel below 0", "give linear colors, 0 to 1")
+        raise InputError(
+            "condition number of a color", "a channel of the color is below 0", "give linear colors, from 0 to 1"
+        )
     with np.errstate(divide="ignore"):
         return 1.0 / np.abs(np.log(found))
 
@@ -197,13 +205,21 @@ def distance_for_color(extinction: npt.ArrayLike, color: npt.ArrayLike) -> Dista
     """
     sigma, depth = _triples(extinction), extinction_from_colors(color, 1.0)
     if sigma.shape != (3,) or not (np.isfinite(sigma).all() and (sigma >= 0).all() and (sigma > 0).any()):
-        raise InputError(f"extinction {sigma.tolist()}", "not three numbers >= 0, one above", "give one that absorbs")
+        raise InputError(
+            f"extinction {sigma.tolist()}",
+            "the extinction must be three numbers >= 0, of which at least one is above 0",
+            "use a medium that absorbs or scatters light",
+        )
     peak = sigma.max()
     with np.errstate(under="ignore", over="ignore"):  # relative to the largest channel, no square can overflow
         relative = sigma / peak
         distance = float((relative * depth).sum() / (relative * relative).sum() / peak)
         if not np.isfinite(distance):
-            raise InputError(f"distance for color {np.asarray(color).tolist()}", "it overflows", "check the extinction")
+            raise InputError(
+                f"distance for color {np.asarray(color).tolist()}",
+                "the distance is too large for a number",
+                "check the extinction",
+            )
         per_channel = tuple(
             (float(x / s) if s > 0 else np.inf if x > 0 else None) for s, x in zip(sigma, depth, strict=True)
         )
@@ -292,7 +308,11 @@ def _channel_doubt(name: str, value: float) -> str | None:
 def _triples(values: npt.ArrayLike) -> Array:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim == 0 or array.shape[-1] != 3:
-        raise InputError(f"colors of shape {array.shape}", "not (..., 3)", "give red, green and blue on the last axis")
+        raise InputError(
+            f"colors of shape {array.shape}",
+            "the last axis must have three numbers: (..., 3)",
+            "put red, green and blue on the last axis",
+        )
     return array
 
 
@@ -302,8 +322,11 @@ def _outside(t: Array) -> InputError:
     where = f" in color {', '.join(str(i) for i in first[:-1])}" if len(first) > 1 else ""
     return InputError(
         f"{int(wrong.sum())} of {t.size} channels",
-        f"not in 0 < t <= 1, the first {CHANNELS[first[-1]]} = {t[first]:g}{where}",
-        "clamp zeros on purpose, and scale colors to at most 1",
+        (
+            f"transmitted colors must satisfy 0 < t <= 1, but the first wrong value is {CHANNELS[first[-1]]} "
+            f"= {t[first]:g}{where}"
+        ),
+        "replace zeros on purpose (tl.clamp_colors), and scale colors to at most 1",
     )
 
 

@@ -54,18 +54,22 @@ class DensityGrid(Frozen):
             with np.errstate(invalid="ignore", over="ignore"):  # what is no number is refused below
                 values = np.array(self.values, dtype=np.float64)
         except (TypeError, ValueError):
-            raise InputError("density grid", "not numbers", "give an array (nx, ny, nz)") from None
+            raise InputError(
+                "density grid", "the array does not contain numbers", "give an array of shape (nx, ny, nz)"
+            ) from None
         if values.ndim != 3 or not values.size:
             raise InputError(
-                "density grid", f"shape {values.shape}, not (nx, ny, nz)", "give at least one voxel along each axis"
+                "density grid",
+                f"the array has shape {values.shape}, and not (nx, ny, nz)",
+                "give at least one voxel along each axis",
             )
         bad = ~((values >= 0) & (values <= MAX_DENSITY))
         if bad.any():
             where = tuple(int(i) for i in np.argwhere(bad)[0])
             raise InputError(
                 "density grid",
-                f"{int(bad.sum())} values not in 0 to {MAX_DENSITY:g}, the first is {values[where]} at {where}",
-                "replace them, for example by 0",
+                (f"{int(bad.sum())} values are outside 0 to {MAX_DENSITY:g}; the first is {values[where]} at {where}"),
+                "replace these values, for example by 0",
             )
         values.setflags(write=False)
         object.__setattr__(self, "values", values)
@@ -141,7 +145,9 @@ def _ends(start: npt.ArrayLike, end: npt.ArrayLike) -> tuple[Array, Array]:
     first, last = vectors("density between points", start), vectors("density between points", end)
     if first.ndim != 2 or first.shape != last.shape:
         found = f"shapes {first.shape} and {last.shape}"
-        raise InputError("density between points", found, "give as many starts as ends, (k, 3) each")
+        raise InputError(
+            "density between points", found, "give as many start points as end points, each of shape (k, 3)"
+        )
     return first, last
 
 
@@ -305,12 +311,14 @@ def _along(points: npt.ArrayLike, axis: int) -> Array:
 
 def _check_profile(name: str, axis: int, start: float, end: float, positive: bool = False) -> None:
     if axis not in (0, 1, 2):
-        raise InputError(f"{name} axis {axis!r}", "not known", "use 0, 1 or 2 for x, y or z of the object")
+        raise InputError(
+            f"{name} axis {axis!r}", "the axis must be 0, 1 or 2", "use 0, 1 or 2 for the x, y or z axis of the object"
+        )
     for label, value in (("start", start), ("end", end)):
         if not 0 <= value <= MAX_DENSITY or (positive and value == 0):
             least = "above 0 and" if positive else "at least 0 and"
             raise InputError(
                 f"{name} {label} {value}",
-                f"not {least} at most {MAX_DENSITY:g}",
-                "give a relative density, for example 1",
+                f"the density must be {least} at most {MAX_DENSITY:g}",
+                "give a density relative to the medium, for example 1",
             )

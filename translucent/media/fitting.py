@@ -172,7 +172,9 @@ def fit_steps(photographs: Sequence[PatchTransmittances], ior: float | None = No
         who = "every channel is" if len(which) == 3 else f"{' and '.join(which)} {'is' if len(which) == 1 else 'are'}"
         rest = "" if len(which) == 3 else ", and no channel is darker"
         do = "give thicknesses in their order from the left of a patch, or from its top where that is the longer side"
-        raise InputError("fit to photographs", f"{who} brighter where it is thicker, as no plate is{rest}", do)
+        raise InputError(
+            "fit to photographs", f"{who} brighter where the plate is thicker, which is physically impossible{rest}", do
+        )
     found = [_fit_channel(photographs, samples, number, ior) for number, samples in enumerate(channels)]
     sigma, error, interval, loss, chi2, samples = (np.array(row) for row in list(zip(*found, strict=True))[:6])
     warnings = [line for one in found for line in one[6]]
@@ -225,7 +227,7 @@ def _channel(photographs: Sequence[PatchTransmittances], channel: int, ior: floa
     counts = [int(use.sum()) for use in kept]
     if not sum(counts):
         do = "change the exposure, or photograph thinner steps"
-        raise InputError(f"fit of {CHANNELS[channel]}", "every patch is too dark or saturated", do)
+        raise InputError(f"fit of {CHANNELS[channel]}", "every patch is too dark or saturated in this channel", do)
     pairs = list(zip(photographs, kept, strict=True))
     depth = np.concatenate([one.depth[use, channel] for one, use in pairs])
     noise = np.concatenate([one.variance[use, channel] for one, use in pairs]) + _FLOOR**2
@@ -429,21 +431,27 @@ def _samples(
     """Checked distances (n,), linear colors (n, 3) and weights (n,), largest 1."""
     d = np.asarray(distances, dtype=np.float64)
     if np.ndim(colors) == 0:
-        raise InputError("fit to colors", "one number", "give a color for each distance")
+        raise InputError("fit to colors", "a single number is not a color", "give one color for each distance")
     listed = colors if isinstance(colors, np.ndarray) else list(colors)  # type: ignore[arg-type]
     t = np.array([parse_color(color) for color in listed], dtype=np.float64).reshape(-1, 3)
     w = np.ones(len(t)) if weights is None else np.asarray(weights, dtype=np.float64)
     if not (d.shape == w.shape == t.shape[:1] and d.size):
         raise InputError(
-            f"fit to {d.size} distances, {len(t)} colors and {w.size} weights", "not as many, or none", "pair them up"
+            f"fit to {d.size} distances, {len(t)} colors and {w.size} weights",
+            "the numbers of distances, colors and weights differ, or are 0",
+            "give one color and one weight for each distance",
         )
     if not (np.isfinite(d).all() and (d > 0).all()):
-        raise InputError("fit", "a distance is not above 0 and finite", "give metres")
+        raise InputError("fit", "a distance is not finite, or not above 0", "give distances in metres")
     if not (t > 0).all():
         raise InputError(
-            f"fit to color {t[(t <= 0).any(axis=1)][0].tolist()}", "a channel is not above 0", "leave it out"
+            f"fit to color {t[(t <= 0).any(axis=1)][0].tolist()}",
+            "a channel of the color is not above 0",
+            "remove this color from the data",
         )
     if not (np.isfinite(w).all() and (w >= 0).all() and (w > 0).any()):
-        raise InputError("weights of a fit", "negative, not finite or all 0", "give numbers of 0 and above")
+        raise InputError(
+            "weights of a fit", "a weight is negative or not finite, or all weights are 0", "give weights of 0 or above"
+        )
     with np.errstate(under="ignore"):
         return d, t, w / w.max()

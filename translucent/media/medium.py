@@ -70,13 +70,23 @@ class Medium(Frozen):
         if self.phase is not None:
             if self.anisotropy not in (0.0, self.phase.mean_cosine):
                 raise InputError(
-                    f"medium anisotropy {self.anisotropy}", f"its phase function is {self.phase}", "give one of the two"
+                    f"medium anisotropy {self.anisotropy}",
+                    f"the phase function {self.phase} already determines the anisotropy",
+                    "give only one of the two",
                 )
             object.__setattr__(self, "anisotropy", self.phase.mean_cosine)
         if not -1 < self.anisotropy < 1:
-            raise InputError(f"medium anisotropy {self.anisotropy}", "not between -1 and 1", "give for example 0.8")
+            raise InputError(
+                f"medium anisotropy {self.anisotropy}",
+                "the anisotropy must lie between -1 and 1",
+                "use a value such as 0.8",
+            )
         if not 1 <= self.ior <= MAX_IOR:
-            raise InputError(f"medium ior {self.ior}", f"not in 1 to {MAX_IOR:g}", "give for example 1.5 for glass")
+            raise InputError(
+                f"medium ior {self.ior}",
+                f"the index of refraction must lie in 1 to {MAX_IOR:g}",
+                "use a value such as 1.5 for glass",
+            )
 
     @classmethod
     @checked
@@ -105,24 +115,36 @@ class Medium(Frozen):
                 raise InputError(
                     f"color {color!r}" if isinstance(color, str) else f"color {tuple(triple.tolist())}",
                     f"{channel} = {value:g} is not in 0 < t <= 1",
-                    "no finite extinction gives 0 or above 1; use for example 0.001 for nearly black"
+                    ("a channel of 0 would need an infinite extinction; use a value such as 0.001 for nearly black")
                     if value <= 0 and not bytes_of_color
-                    else f"write {bytes_of_color!r} for these numbers of 0 to 255"
+                    else f"write {bytes_of_color!r} if these are numbers from 0 to 255"
                     if bytes_of_color
-                    else "a medium cannot add light; scale the color to at most 1",
+                    else "a medium cannot amplify light; scale the color to at most 1",
                 )
         try:
             metres = float(distance)
         except (TypeError, ValueError):
             metres = np.nan
         if (stated := metres_in(str(distance))) is not None:
-            raise InputError(f"distance {distance!r}", "a text with a unit", f"give the metres: {stated:g}")
+            raise InputError(
+                f"distance {distance!r}",
+                "the distance is a text with a unit",
+                f"give the distance in metres: {stated:g}",
+            )
         if not metres > 0:
-            raise InputError(f"distance {distance!r}", "not above 0", "give the distance in metres, for example 0.02")
+            raise InputError(
+                f"distance {distance!r}",
+                "the distance must be above 0",
+                "give the distance in metres, for example 0.02",
+            )
         with np.errstate(over="ignore", under="ignore"):
             extinction = optics.extinction_from_color(triple, metres)
         if not (extinction <= MAX_COEFFICIENT).all():
-            raise InputError(f"distance {metres:g} m", "so short that the extinction overflows", "check the unit")
+            raise InputError(
+                f"distance {metres:g} m",
+                "the distance is so short that the extinction overflows",
+                "check the unit of the distance",
+            )
         return cls(absorption=extinction, ior=ior)
 
     @classmethod
@@ -160,13 +182,17 @@ class Medium(Frozen):
         """
         for name, value in (("number_density", number_density), ("radius", radius)):
             if not 0 <= value < np.inf:
-                raise InputError(f"particles of {name} {value}", "not a number of 0 and above", "give it in metres")
+                raise InputError(
+                    f"particles of {name} {value}",
+                    "the value must be a number of 0 or above",
+                    "give the value in metres",
+                )
         fractions = _channels("albedo", albedo)
         if (fractions > 1).any():
             raise InputError(
                 f"medium albedo {tuple(fractions.tolist())}",
-                "above 1",
-                "particles scatter at most all light that they meet",
+                "the albedo is above 1",
+                "particles cannot scatter more light than hits them",
             )
         # What overflows is refused as any medium is.
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
@@ -184,7 +210,9 @@ class Medium(Frozen):
             If the number is not above 0.
         """
         if not (math.isfinite(times) and times > 0):
-            raise InputError(f"medium diluted {times:g} times", "not above 0 and finite", "give for example 5")
+            raise InputError(
+                f"medium diluted {times:g} times", "the number must be finite and above 0", "use a value such as 5"
+            )
         absorption, scattering, emission = (
             np.asarray(one) / times for one in (self.absorption, self.scattering, self.emission)
         )
@@ -257,13 +285,19 @@ def _channels(field: str, value: Channels) -> Array:
     try:
         triple = np.broadcast_to(np.array(value, dtype=np.float64), (3,)).copy()
     except (TypeError, ValueError):
-        raise InputError(f"medium {field} {value!r}", "not one or three numbers", "give (r, g, b)") from None
+        raise InputError(
+            f"medium {field} {value!r}", "the value must be one or three numbers", "give (r, g, b) in 1/m"
+        ) from None
     limit = MAX_EMISSION if field == "emission" else MAX_COEFFICIENT
     if (triple > limit).any() and np.isfinite(triple).all():
-        raise InputError(f"medium {field} {tuple(triple.tolist())}", f"above {limit:g}", "check the unit")
+        raise InputError(
+            f"medium {field} {tuple(triple.tolist())}",
+            f"the value is above the limit of {limit:g}",
+            "check the unit of length",
+        )
     if not (np.isfinite(triple).all() and (triple >= 0).all()):
         raise InputError(
-            f"medium {field} {tuple(triple.tolist())}", "negative or not finite", "give values of 0 and above"
+            f"medium {field} {tuple(triple.tolist())}", "a value is negative or not finite", "give values of 0 or above"
         )
     triple.setflags(write=False)
     return triple
@@ -298,7 +332,9 @@ def color_at(medium: Medium, distance: float | None = None) -> tuple[Array, floa
         If the distance is not positive.
     """
     if distance is not None and not distance > 0:
-        raise InputError(f"distance {distance!r}", "not above 0", "give the distance in metres, for example 0.02")
+        raise InputError(
+            f"distance {distance!r}", "the distance must be above 0", "give the distance in metres, for example 0.02"
+        )
     densest = float(medium.extinction.max())
     if densest == 0:
         return np.ones(3), math.inf if distance is None else float(distance)

@@ -303,7 +303,11 @@ def read_presets(text: str, file: str = "presets.toml") -> dict[str, Preset]:
     for one in found.values():
         for alias in one.aliases:
             if alias in taken:
-                raise InputError(f"{file}, [{one.name}]", f"alias {alias!r} is a name already", "choose another")
+                raise InputError(
+                    f"{file}, [{one.name}]",
+                    f"the alias {alias!r} is already the name of a preset",
+                    "choose another alias",
+                )
             taken.add(alias)
     return found
 
@@ -354,7 +358,7 @@ def _entries(text: str, file: str) -> dict[str, object]:
     try:
         return toml_value(text)
     except ValueError as error:
-        raise InputError(file, f"no TOML: {error}", "correct the file") from None
+        raise InputError(file, f"the file is not valid TOML: {error}", "correct the file") from None
 
 
 def _line(text: str, name: str, reason: str) -> int:
@@ -377,9 +381,11 @@ class _Entry:
     def __init__(self, file: str, name: str, entry: object) -> None:
         self.where, self.name = f"{file}, [{name}]", name
         if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
-            raise InputError(self.where, "not a name in lower_snake_case", "write for example skim_milk")
+            raise InputError(self.where, "the name is not in lower_snake_case", "write a name such as skim_milk")
         if not isinstance(entry, Mapping):
-            raise InputError(self.where, "not a table", f"write [{name}], and its keys below")
+            raise InputError(
+                self.where, "the value is not a table", f"write [{name}], and the keys of the preset below"
+            )
         self.entry: Mapping[str, object] = entry
         self._check_keys()
 
@@ -402,21 +408,23 @@ class _Entry:
         self._exclude(given & {"absorption"}, "color")
         for key in sorted(given & _UNREDUCED):
             do = "give 'reduced_scattering', sigma_s (1 - g), in its place"
-            raise InputError(self.where, f"{key!r} beside 'color'", do)
+            raise InputError(self.where, f"the key {key!r} cannot be combined with 'color'", do)
         per_length = bool(given & {"reduced_scattering", "emission"})
         if "unit" in given and not per_length:
             raise InputError(
-                self.where, "'unit' beside 'color'", "leave it out: 'distance' has its own; only scattering needs one"
+                self.where,
+                "the key 'unit' cannot be combined with 'color'",
+                ("omit 'unit': the text of 'distance' contains its own unit, and only scattering needs this key"),
             )
         self._require(_ALWAYS | _BY_COLOR | ({"unit"} if per_length else set()), given)
 
     def _exclude(self, keys: set[str], other: str) -> None:
         for key in sorted(keys):
-            raise InputError(self.where, f"both {key!r} and {other!r}", "give one or the other")
+            raise InputError(self.where, f"the keys {key!r} and {other!r} exclude each other", "use one or the other")
 
     def _require(self, keys: set[str], given: set[str]) -> None:
         for key in sorted(keys - given):
-            raise InputError(self.where, f"no key {key!r}", "add it")
+            raise InputError(self.where, f"the preset has no key {key!r}", "add this key")
 
     def preset(self) -> Preset:
         """The preset that the table describes."""
@@ -529,7 +537,7 @@ class Row:
     def need(self, column: str) -> Any:
         """Value of a required column."""
         if column not in self.cells:
-            raise InputError(column, "missing", "fill it in")
+            raise InputError(column, "a value is missing", "fill in the missing value")
         return self.cells[column]
 
     def length(self, column: str, unit: str) -> float:
@@ -547,7 +555,7 @@ class Row:
         try:
             return float(self.need(column))
         except (TypeError, ValueError):
-            raise InputError(f"{column} {self.cells[column]!r}", "not a number", "give a number") from None
+            raise InputError(f"{column} {self.cells[column]!r}", "the value is not a number", "give a number") from None
 
 
 def read_table(path: str | Path, *, needs: Iterable[tuple[str, ...]]) -> list[Row]:
@@ -568,7 +576,7 @@ def read_table(path: str | Path, *, needs: Iterable[tuple[str, ...]]) -> list[Ro
     text = read_text(path, what, do="save it as CSV or JSON, in UTF-8")
     rows = _json_rows(what, path, text) if Path(path).suffix.lower() == ".json" else _csv_rows(path, text, needs)
     if not rows:
-        raise InputError(what, "no rows", "give at least one")
+        raise InputError(what, "the table has no rows", "add at least one row")
     return rows
 
 
@@ -581,7 +589,7 @@ def _csv_rows(path: str | Path, text: str, needs: Iterable[tuple[str, ...]]) -> 
             if not set(choice) & set(names):
                 found = f"no column {' or '.join(repr(name) for name in choice)}"
                 has = f"its first line says {', '.join(names)}" if names else "it is empty"
-                raise InputError(what, f"{found}: {has}", "name the columns in the first line")
+                raise InputError(what, f"{found}: {has}", "write the names of the columns into the first line")
         for line in reader:
             cells = [cell.strip() for cell in line]
             if any(cells):
@@ -589,7 +597,7 @@ def _csv_rows(path: str | Path, text: str, needs: Iterable[tuple[str, ...]]) -> 
                 spare = {"": "cells"} if any(cells[len(names) :]) else {}
                 rows.append(Row(f"{path} line {reader.line_num}", {**named, **spare}))
     except csv.Error as error:
-        raise InputError(what, f"line {reader.line_num}: {error}", "save it as CSV") from None
+        raise InputError(what, f"line {reader.line_num}: {error}", "save the table as CSV") from None
     return rows
 
 
@@ -597,9 +605,13 @@ def _json_rows(what: str, path: str | Path, text: str) -> list[Row]:
     try:
         items = json_value(text)
     except ValueError as error:
-        raise InputError(what, f"no JSON: {error}", "write a list of objects with color and distance") from None
+        raise InputError(
+            what, f"the file is not valid JSON: {error}", "write a list of objects with color and distance"
+        ) from None
     if not (isinstance(items, list) and all(isinstance(item, dict) for item in items)):
-        raise InputError(what, "not a list of objects", 'write [{"name": ..., "color": ..., "distance": ...}]')
+        raise InputError(
+            what, "the JSON is not a list of objects", 'write [{"name": ..., "color": ..., "distance": ...}]'
+        )
     return [
         Row(f"{path} item {i}", {name: value for name, value in item.items() if value not in (None, "")})
         for i, item in enumerate(items, 1)
@@ -609,4 +621,8 @@ def _json_rows(what: str, path: str | Path, text: str) -> list[Row]:
 def check_cells(row: Row) -> None:
     """Refuse a row with more cells than columns: most often an unquoted color with commas."""
     if "" in row.cells:
-        raise InputError("cells", "more than there are columns", 'quote a color with commas: "linear(.2,.6,.3)"')
+        raise InputError(
+            "cells of a table row",
+            "the row has more cells than there are columns",
+            'put a color that contains commas into quotes: "linear(.2,.6,.3)"',
+        )

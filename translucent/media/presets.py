@@ -69,7 +69,11 @@ def read_own_presets(folder: Path | None = None) -> tuple[dict[str, Preset], lis
         wrong += bad
         for name, one in good.items():
             if name in found:
-                wrong.append(InputError(what, f"[{name}] is in another file, too", "rename one of them"))
+                wrong.append(
+                    InputError(
+                        what, f"the preset [{name}] is also defined in another file", "rename one of the two presets"
+                    )
+                )
             found.setdefault(name, one)
     return found, wrong
 
@@ -84,7 +88,9 @@ def preset_name(words: str) -> str:
     """
     name = re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_")
     if not re.match(r"[a-z]", name):
-        raise InputError(f"preset {words!r}", "its name does not begin with a letter", "call it for example green jade")
+        raise InputError(
+            f"preset {words!r}", "the name of a preset must begin with a letter", "choose a name such as green jade"
+        )
     return name
 
 
@@ -159,7 +165,7 @@ def preset(name: str) -> Preset:
     if key in own:
         return own[key]
     if broken := [error for error in wrong if _is_about(error, key)]:
-        raise InputError(f"preset {name!r}", "yours cannot be read", str(broken[0]))
+        raise InputError(f"preset {name!r}", "your own preset of this name cannot be read", str(broken[0]))
     speaking = [one.name for one in _all().values() if _speaks_of(one, key)]
     close = close_names(key, [*_all(), *own]) or close_names(key, known) or speaking
     number = len(_all())
@@ -169,7 +175,7 @@ def preset(name: str) -> Preset:
         else f"use one of {', '.join(_WELL_KNOWN)} and {number - len(_WELL_KNOWN)} more, see 'translucent presets'"
     )
     unread = f"; your own are not all read: {wrong[0]}" if wrong else ""
-    raise InputError(f"preset {name!r}", "not a known preset", f"{do}{unread}")
+    raise InputError(f"preset {name!r}", "no preset has this name", f"{do}{unread}")
 
 
 @cache

@@ -159,7 +159,7 @@ def view(
         require_package("anywidget", "tl.view")
     except RenderError:
         do = f"{install_command('notebook')}, or write a page with tl.write_page"
-        raise InputError("tl.view", "the package anywidget is not installed", do) from None
+        raise InputError("tl.view", "the Python package anywidget is not installed", do) from None
     from translucent.notebook.widget import SceneView
 
     planned = plan_page(scene, RenderRequest(method, interfaces=interfaces))

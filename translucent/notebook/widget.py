@@ -106,7 +106,9 @@ class SceneView(Widget):  # type: ignore[misc]
         """Change several of color, distance, ior, roughness and preset at once."""
         if unknown := sorted(set(values) - {*_FLAT, "preset"}):
             raise InputError(
-                f"material {unknown[0]!r}", "not a trait of it", f"use one of {', '.join(_FLAT)} or preset"
+                f"material {unknown[0]!r}",
+                "the view has no trait of this name",
+                f"use one of {', '.join(_FLAT)}, or preset",
             )
         if "preset" in values:
             self.preset = values["preset"]
@@ -183,14 +185,18 @@ class SceneView(Widget):  # type: ignore[misc]
     def _check_medium(self, proposal: Any) -> int:
         number = int(proposal["value"])
         if not 0 <= number < len(self._bodies):
-            raise InputError(f"medium {number}", f"the scene has {len(self._bodies)}", "count from 0")
+            raise InputError(f"medium {number}", f"the scene has {len(self._bodies)} media", "count media from 0")
         return number
 
     @traitlets.validate("color")  # type: ignore[untyped-decorator]
     def _check_color(self, proposal: Any) -> str:
         exact = parse_color(proposal["value"])
         if not ((exact >= 0) & (exact <= 1)).all():
-            raise InputError(f"color {proposal['value']!r}", "a channel is not in 0..1", "give for example '#7b1e3a'")
+            raise InputError(
+                f"color {proposal['value']!r}",
+                "a channel of the color is outside 0..1",
+                "use a color such as '#7b1e3a'",
+            )
         self._check_editable()
         if not self._quiet:
             self._exact = exact
@@ -202,7 +208,7 @@ class SceneView(Widget):  # type: ignore[misc]
         low, high = {"distance": (0.0, np.inf), "ior": (1.0, MAX_IOR), "roughness": (0.0, 1.0)}[name]
         if not low <= value <= high or (name == "distance" and not 0 < value < np.inf):
             allowed = "above 0 and finite" if name == "distance" else f"in {low:g} to {high:g}"
-            raise InputError(f"{name} {value:g}", f"not {allowed}", "give another")
+            raise InputError(f"{name} {value:g}", f"the value must be {allowed}", "choose another value")
         self._check_editable()
         return value
 
@@ -216,7 +222,7 @@ class SceneView(Widget):  # type: ignore[misc]
             do = "render it: dataclasses.replace an object's medium, or tl.showcase(mesh, tl.preset(...).medium)"
             raise InputError(
                 f"preset {name!r} in a view",
-                "it scatters or emits, and such light is solved for before the view opens",
+                "this preset scatters or emits light, and a view can only change media that absorb",
                 do,
             )
         self._check_editable()
@@ -226,7 +232,7 @@ class SceneView(Widget):  # type: ignore[misc]
         """Raise `InputError` if the viewer cannot change the shown medium."""
         why = "" if self._quiet else next(filter(None, map(editable, self._bodies[self.medium])), "")
         if why:
-            raise InputError(f"medium {self.medium} of a view", why, "render another scene")
+            raise InputError(f"medium {self.medium} of a view", why, "render another scene to see another medium")
 
 
 def _users(scene: Scene) -> list[list[Object]]:

@@ -41,7 +41,9 @@ def simplified(scene: Scene, faces: int) -> Scene:
         If the package fast-simplification, which does it, is not installed; if the number is not above `LEAST_FACES`.
     """
     if faces < LEAST_FACES:
-        raise InputError(f"--simplify {faces}", f"fewer than {LEAST_FACES} triangles", "give for example 200000")
+        raise InputError(
+            f"--simplify {faces}", f"a mesh needs at least {LEAST_FACES} triangles", "use a value such as 200000"
+        )
     fraction = faces / triangles(scene)
     if fraction >= 1.0:
         return scene
@@ -58,7 +60,7 @@ def _coarse(mesh: Mesh, faces: int) -> Mesh:
         import fast_simplification
     except ImportError as error:
         do = "pip install fast-simplification, or reduce the model before, for example in Blender"
-        raise InputError("--simplify", "the package fast-simplification is not installed", do) from error
+        raise InputError("--simplify", "the Python package fast-simplification is not installed", do) from error
     # It asks for arrays that it could write to; more haste than this makes bodies thinner, by several percent.
     points, triangles = np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32)
     vertices, kept = fast_simplification.simplify(points, triangles, target_count=faces, agg=3)
@@ -187,7 +189,9 @@ class PagePlan:
             text = f"{count:,} triangles load and turn slowly in a browser: --simplify 300000 shows a coarser copy"
             found.append(Note(NoteKind.MANY_TRIANGLES, text))
         if any(body.density is not None for body in self.scene.objects):
-            found.append(Note(NoteKind.STEPS, "media of varying density stay as they are: no panel changes them"))
+            found.append(
+                Note(NoteKind.STEPS, "media of varying density: the panel of the page cannot change these media")
+            )
         if sum(body.covers for body in self.scene.objects) > 1:
             text = "layers are put over each other in the order in which the first camera sees them"
             found.append(Note(NoteKind.LAYERS, text))
@@ -257,7 +261,7 @@ def _planned(scene: Scene, request: RenderRequest, units: int) -> RenderPlan:
     method = request.method
     if method is not None and method.needs_storage:
         found = "its passes write to buffers, which WebGL2 has none of"
-        raise InputError(f"a page with {method}", found, "use SignedDepth, or DepthPeeling for ordered intervals")
+        raise InputError(f"a page with {method}", found, "use SignedDepth, or DepthPeeling for sorted intervals")
     machine = Capabilities(shader_storage=False, texture_units=units, textured_rays=False)
     chosen = plan_scene(scene, request, machine)
     if isinstance(peeling := chosen.method, DepthPeeling) and peeling.max_layers > MOST_LAYERS:

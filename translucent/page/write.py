@@ -148,7 +148,7 @@ def write_page(
 def check_output(path: Path) -> None:
     """Raise `InputError` before any work is done if no page can be written to the path, or its viewer was not built."""
     if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"page {str(path)!r}", "not an .html file", "name it for example viewer.html")
+        raise InputError(f"page {str(path)!r}", "the name must end in .html", "choose a name such as viewer.html")
     require_output(path, f"page {str(path)!r}")
     web_path("page.js")
 
@@ -159,7 +159,9 @@ def check_page_size(size: tuple[int, int]) -> tuple[int, int]:
     if max(width, height) > MOST_SIDE:
         requested = f"a page that frames {width}x{height} pixels"
         raise InputError(
-            requested, f"more than {MOST_SIDE} along a side", "give for example 1280x800: pages fit any window"
+            requested,
+            f"the poster has more than {MOST_SIDE} pixels along a side",
+            "use a size such as 1280x800: the page fits any window",
         )
     return width, height
 
@@ -178,10 +180,14 @@ def page_html(
     check_exposure(exposure)
     tone_curve(tone)
     if not isinstance(name, str):
-        raise InputError(f"name {brief(name)}", "not a text", "give the title of the page, for example 'Wine'")
+        raise InputError(
+            f"name {brief(name)}", "the title is not a text", "give the title of the page, for example 'Wine'"
+        )
     if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
         raise InputError(
-            f"samples {brief(samples)}", f"not a whole number in 1 to {MOST_SAMPLES}", "give for example 16"
+            f"samples {brief(samples)}",
+            f"the number of samples must be a whole number in 1 to {MOST_SAMPLES}",
+            "use a value such as 16",
         )
     name = name.encode("utf-8", "replace").decode()  # a name of a file may hold what is no character
     script = gzip.compress(web_path("page.js").read_bytes(), 9, mtime=0)
@@ -241,7 +247,9 @@ def _kind(picture: bytes, requested: str) -> str:
     for head, kind in {b"\x89PNG": "png", b"\xff\xd8\xff": "jpeg", b"RIFF": "webp"}.items():
         if picture.startswith(head):
             return kind
-    raise InputError(requested, "no PNG, JPEG or WebP picture", "give one of these")
+    raise InputError(
+        requested, "the poster is not a PNG, JPEG or WebP picture", "use a picture in one of these formats"
+    )
 
 
 def frame_html(frame: Frame, exposure: float, tone: str, name: str | None) -> str:
@@ -250,9 +258,13 @@ def frame_html(frame: Frame, exposure: float, tone: str, name: str | None) -> st
     scene, request = frame.scene, frame.plan.request
     if scene is None:
         found = "it holds no scene: it was drawn before a backdrop, or put together by hand"
-        raise InputError(requested, found, "write one of the whole scene: tl.write_page(scene, 'viewer.html')")
+        raise InputError(requested, found, "write a page of the whole scene: tl.write_page(scene, 'viewer.html')")
     if request.caustics is not None:
-        raise InputError(requested, "it has caustics, and WebGL2 has no photons", "render without caustics")
+        raise InputError(
+            requested,
+            "the scene has caustics, which pages cannot show because WebGL2 has no photons",
+            "render without caustics",
+        )
     planned = plan_page(scene, request)
     poster = jpeg(frame.to_srgb8(exposure, tone)) if frame.alpha is None else None
     return page_html(planned, name or title_of(scene), frame.size, exposure=exposure, tone=tone, poster=poster)

@@ -124,17 +124,24 @@ def _unlit_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
 def _check(scene: Scene, method: Method, capabilities: Capabilities) -> None:
     name = type(method).__name__
     if method.ordered and not solids_of(scene):
-        raise InputError(name, "all bodies are declared sheets, which have no inside", "use ThinLayer")
+        raise InputError(
+            name, "all bodies are declared as thin-walled sheets, which have no inside", "use the method ThinLayer"
+        )
     if method.needs_storage and not capabilities.shader_storage:
-        raise InputError(name, "this OpenGL has no shader storage buffers, which came with 4.3", "use DepthPeeling")
+        raise InputError(
+            name, "this OpenGL has no shader storage buffers, which need version 4.3", "use the method DepthPeeling"
+        )
     if method.ordered and (count := len(medium_slots(scene))) > MAX_SLOTS:
         raise InputError(
             name,
-            f"{count} winding numbers for each ray, one for each medium, priority and open body: more than {MAX_SLOTS}",
-            "let bodies share media and priorities, or close them",
+            (
+                f"the scene has {count} groups of bodies (for each medium, priority and open mesh), more than "
+                f"the limit of {MAX_SLOTS}"
+            ),
+            "use fewer different media and priorities, or close the open meshes",
         )
     if not method.tells_media_apart and media_differ(scene):
-        raise InputError(name, "bodies with different media", "use SignedDepth, which tells them apart")
+        raise InputError(name, "the bodies have different media", "use SignedDepth, which supports several media")
     method.check(scene)
 
 
@@ -211,9 +218,9 @@ def _light_views(scene: Scene, method: Method) -> tuple[PassSpec, ...]:
     lights = len(scene.lights)
     if lights > MAX_SCATTER_LIGHTS:
         raise InputError(
-            f"{lights} lights on media that scatter",
-            f"at most {MAX_SCATTER_LIGHTS} are followed into media",
-            f"leave out {lights - MAX_SCATTER_LIGHTS}, or let the media only absorb",
+            f"{lights} lights on scattering media",
+            f"the renderer supports at most {MAX_SCATTER_LIGHTS} lights inside scattering media",
+            f"remove {lights - MAX_SCATTER_LIGHTS} lights, or use media without scattering",
         )
     reason = (
         f"{lights} {'light' if lights == 1 else 'lights'} on a medium that scatters: the surfaces on the way from each "

@@ -82,9 +82,11 @@ def require_clear_priorities(scene: Scene) -> None:
         earlier, later = scene.objects[i], scene.objects[j]
         raise InputError(
             'overlap="priority"',
-            f"objects {i} ({earlier.mesh.name!r}) and {j} ({later.mesh.name!r}) may overlap with different "
-            f"media, and both have priority {later.priority}",
-            "give the one that displaces the other a higher priority",
+            (
+                f"objects {i} ({earlier.mesh.name!r}) and {j} ({later.mesh.name!r}) may overlap, have "
+                f"different media, and both have the priority {later.priority}"
+            ),
+            "give a higher priority to the object that displaces the other",
         )
 
 

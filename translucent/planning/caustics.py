@@ -146,7 +146,7 @@ def check_caustics(scene: Scene, method: Method | None, lit: tuple[int, ...]) ->
             if method.follows_paths
             else "it treats every face as a sheet, which refracts no light"
         )
-        raise InputError(f"caustics with {method}", found, "leave out one of the two")
+        raise InputError(f"caustics with {method}", found, "omit one of the two")
     _check_paths(scene, lit)
 
 
@@ -211,7 +211,7 @@ def _check_paths(scene: Scene, lit: tuple[int, ...]) -> None:
     """Refuse a scene in which no photon could land."""
     if not scene.lights:
         do = "add a tl.PointLight, tl.SpotLight or tl.DirectionalLight; light of the environment makes no caustics"
-        raise InputError("caustics", "the scene has no lights", do)
+        raise InputError("caustics", "the scene has no lights that can emit photons", do)
     if not any(_redirects_light(body) for body in scene.objects):
         found = f"no interface of {object_names(scene.bodies)} bends or mirrors light"
         raise InputError("caustics", found, "give a medium an index of refraction: ior=1.5")
@@ -220,14 +220,14 @@ def _check_paths(scene: Scene, lit: tuple[int, ...]) -> None:
         raise InputError("caustics", found, "add a ground: tl.Object(mesh)")
     if uneven := [body for body in scene.bodies if body.density is not None]:
         found = f"the density of {object_names(uneven)} varies, and photons follow even media"
-        raise InputError("caustics", found, "leave out one of the two")
+        raise InputError("caustics", found, "omit one of the two")
     if rough := [
         body
         for body in scene.bodies
         if body.sheet_thickness is not None and body.surface is not None and body.surface.roughness > 0.0
     ]:
         found = f"{object_names(rough)}: a sheet that is rough"
-        raise InputError("caustics", found, "give it an inside, or no roughness")
+        raise InputError("caustics", found, "use a closed body instead of the sheet, or a sheet without roughness")
 
 
 def gathers_light(scene: Scene) -> bool:

@@ -33,8 +33,10 @@ ONE_SHADED = 0.45
 #: Note of a plan in which rays hit interfaces as far as the first interval shows them.
 LATER_REFRACTION = Note(
     NoteKind.LATER_REFRACTION,
-    "refraction and reflection beyond the first interval of a ray: from there on rays go straight, and interfaces "
-    "reflect only the environment",
+    (
+        "refraction and reflection after the first body on a ray: the rest of the ray goes straight, and its "
+        "interfaces reflect only the environment"
+    ),
 )
 
 
@@ -146,8 +148,7 @@ def effects_of(scene: Scene, *, bends: bool = True, mirrored: str = "the environ
 #: Note of a plan in which rays refract at the front interface alone.
 ONE_INTERFACE = Note(
     NoteKind.ONE_INTERFACE,
-    "FrontInterface: bends once, where a ray enters; leaves without bending: rays leave curved bodies in wrong "
-    "directions",
+    ("FrontInterface: rays refract only where they enter a body, so they leave curved bodies in wrong directions"),
 )
 
 
@@ -205,7 +206,7 @@ class ScreenInterfaces(InterfaceMode):
             return (
                 PassSpec(
                     PassName.INTERFACES,
-                    f"{names}: normal and place of the sheet that a ray meets first",
+                    f"{names}: normal and position of the first sheet on each ray",
                     objects,
                     1,
                     cost=DRAW_COST * ONE_DRAWN,

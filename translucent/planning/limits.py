@@ -31,7 +31,10 @@ SHEET_ON_OPAQUE = 1e-6
 #: Note of a plan for an OpenGL version that cannot follow lights into media.
 UNLIT = Note(
     NoteKind.UNLIT,
-    "pixels with media that scatter are marked invalid: to render their light needs OpenGL 4.3, or the reference",
+    (
+        "pixels that show scattering media are marked as invalid: their light can be rendered only by OpenGL "
+        "4.3 or by the reference"
+    ),
 )
 
 
@@ -40,8 +43,10 @@ def open_limits(scene: Scene) -> list[Note]:
     return [
         Note(
             NoteKind.OPEN_MESH,
-            f"{mesh.name!r}: {'; '.join(mesh.diagnosis.problems)}: close it, or declare it a sheet "
-            "(sheet_thickness=..., --method thin-layer)",
+            (
+                f"{mesh.name!r}: {'; '.join(mesh.diagnosis.problems)}: close the mesh, or declare it a "
+                "thin-walled sheet (sheet_thickness=..., --method thin-layer)"
+            ),
         )
         for mesh in dict.fromkeys(scene.objects[i].mesh for i in open_bodies(scene))
     ]
@@ -64,7 +69,7 @@ def hole_limits(scene: Scene, method: Method) -> list[Note]:
             )
         else:
             continue
-        notes.append(Note(NoteKind.OPEN_MESH, f"{mesh.name!r}: {text}; FragmentLists can tell"))
+        notes.append(Note(NoteKind.OPEN_MESH, f"{mesh.name!r}: {text}; the method FragmentLists can find out"))
     return notes
 
 
@@ -77,7 +82,7 @@ def layer_limits(scene: Scene, method: Method) -> list[Note]:
     possible = sum(2 if mesh.diagnosis.convex else len(mesh.faces) for mesh in meshes)
     if possible <= most:
         return []
-    return [Note(NoteKind.LAYER_LIMIT, f"pixels with more than {most} surfaces are marked invalid")]
+    return [Note(NoteKind.LAYER_LIMIT, f"pixels whose rays cross more than {most} surfaces are marked as invalid")]
 
 
 def mesh_limits(scene: Scene, method: Method) -> list[Note]:
@@ -155,9 +160,7 @@ def _wants_holes(item: Object) -> bool:
 
 
 #: Note of a plan in which interfaces do nothing to light.
-STRAIGHT = Note(
-    NoteKind.REFRACTION, "refraction and reflection: rays go straight, though interfaces would refract and reflect them"
-)
+STRAIGHT = Note(NoteKind.REFRACTION, "refraction and reflection: rays go straight through interfaces")
 
 #: How a plan with ambient radiance shades pixels, beside what it does without.
 AMBIENT = "of the ambient radiance A, media scatter sigma_s A for each metre, which counts as emitted"
@@ -194,7 +197,10 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: InterfaceM
 
 def with_ambient(notes: Iterable[Note]) -> tuple[Note, ...]:
     """Notes of a plan in which media emit the ambient radiance that they would scatter."""
-    dimmed = Note(NoteKind.DIMMED_AMBIENT, "shadows in ambient light: it reaches each point of the media unchanged")
+    dimmed = Note(
+        NoteKind.DIMMED_AMBIENT,
+        ("shadows in ambient light: ambient light reaches every point of the media without attenuation"),
+    )
     return (*(note for note in notes if note.kind is not NoteKind.ONLY_REMOVES), dimmed)
 
 
@@ -204,7 +210,10 @@ def layers_instead(scene: Scene, refusals: Iterable[tuple[int, str]]) -> tuple[N
     for i, why in refusals:
         reasons.setdefault(why, []).append(scene.objects[i])
     return tuple(
-        Note(NoteKind.LAYER_INSTEAD, f"diffusion in {object_names(items)}: {why}; shown as layers")
+        Note(
+            NoteKind.LAYER_INSTEAD,
+            (f"diffusion in {object_names(items)}: {why}; these bodies are rendered as flat layers"),
+        )
         for why, items in reasons.items()
     )
 
@@ -260,7 +269,7 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
             )
             return [*notes, Note(NoteKind.SCATTERED_AGAIN, text)]
         if not scene.lights:
-            return [*notes, Note(NoteKind.ONLY_REMOVES, "in-scattered light: scattering only removes light")]
+            return [*notes, Note(NoteKind.ONLY_REMOVES, "in-scattered light: scattering only removes light from rays")]
         text = "in-scattered light: this method leaves out light that media scatter into rays; FragmentLists renders it"
         return [*notes, Note(NoteKind.LIGHTS_LEFT_OUT, text)]
     lit = scene.opaque or any(body.covers or (interfaces and body.has_interface) for body in scene.bodies)

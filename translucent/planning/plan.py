@@ -183,7 +183,9 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
 
 def _denoised_note(found: RenderPlan) -> Note:
     text = "denoised: a network (Open Image Denoise) replaces noise by its estimate, whose error is not known"
-    return Note(NoteKind.DENOISED, text if found.has_noise else "not denoised: this picture has no random noise")
+    return Note(
+        NoteKind.DENOISED, text if found.has_noise else "the picture is not denoised, because it has no random noise"
+    )
 
 
 def _with_point_lights(scene: Scene, rendered: Scene) -> tuple[Scene, tuple[Note, ...]]:
@@ -234,8 +236,8 @@ def _thickness(scene: Scene, request: RenderRequest, machine: Capabilities, *, a
     if not scene.bodies:
         raise InputError(
             f"rendering {object_names(scene.objects)}",
-            "nothing there has a medium",
-            "give an object one: medium=tl.Medium(...)",
+            "none of these objects has a medium",
+            "give at least one object a medium: medium=tl.Medium(...)",
         )
     if scene.overlap == "priority":
         require_clear_priorities(scene)
@@ -297,9 +299,9 @@ def marching_method(scene: Scene, method: Method | None, capabilities: Capabilit
     names = object_names(body for body in scene.bodies if body.density is not None)
     if not capabilities.shader_storage:
         raise InputError(
-            f"rendering {names} with a density that varies",
-            "this OpenGL has no shader storage buffers, which came with 4.3",
-            "render on the CPU (backend='cpu'), or march there: tl.reference.march(scene, size)",
+            f"rendering {names} with a varying density",
+            "this OpenGL has no shader storage buffers, which need version 4.3",
+            "render on the CPU (backend='cpu'), or with tl.reference.march(scene, size)",
         )
     if method is None:
         grids = [np.shape(body.density.values) for body in scene.bodies if isinstance(body.density, DensityGrid)]
@@ -307,8 +309,8 @@ def marching_method(scene: Scene, method: Method | None, capabilities: Capabilit
     if not method.marches:
         raise InputError(
             type(method).__name__,
-            f"{names}: the density varies, and only steps through the intervals find the optical depth",
-            "use RayMarched, or leave the choice to the planner",
+            f"{names}: the density varies, so only ray marching can find the optical depth",
+            "use the method RayMarched, or let the planner choose the method",
         )
     return method
 
@@ -378,8 +380,8 @@ def _ordered_method(scene: Scene, method: Method | None, machine: Capabilities, 
     if not solids_of(scene):
         raise InputError(
             f"rendering {object_names(scene.bodies)}",
-            f"{why}, and sheets have no place in the order",
-            "give all sheets one medium, or none that emits",
+            f"{why}, but the surfaces of sheets cannot be sorted among those of bodies",
+            "give all sheets the same medium, or a medium without emission",
         )
     cheapest = _cheapest_ordered(scene, machine)
     if method is not None:
@@ -404,7 +406,7 @@ def _traced(
     chosen = method or FragmentLists()
     sheets = chosen.makes_sheets
     if isinstance(interfaces, TracedInterfaces) and interfaces.hits == "gl":
-        raise InputError('TracedInterfaces(hits="gl")', "this renderer has no OpenGL", "leave hits out")
+        raise InputError('TracedInterfaces(hits="gl")', "this renderer does not use OpenGL", "omit hits")
     reason = "no OpenGL: all surfaces on each ray, in float64"
     if method is not None and not sheets:
         reason += f", in place of {method}, which was requested"
@@ -482,7 +484,7 @@ def _with_shadows(found: RenderPlan, scene: Scene, machine: Capabilities) -> Ren
     if found.request.over_backdrop:
         reason = "opaque objects are a picture drawn elsewhere (a backdrop): rays through the media end at its depth"
         behind = (PassSpec(PassName.BACKDROP, reason, cost=COSTS["resolve"]),)
-        drawn_elsewhere = Note(NoteKind.SHADOWS, "shadows that the objects of the backdrop throw onto media")
+        drawn_elsewhere = Note(NoteKind.SHADOWS, "shadows that the objects in the backdrop cast onto media")
         unmodelled = [*shadow_effects(scene), drawn_elsewhere]
     elif before and found.has(PassName.TRACED, PassName.SURFACES, PassName.PATH_TRACE):
         unmodelled = [*shadows_left_out(machine.texture_units)]
@@ -525,7 +527,9 @@ def _check_paths(scene: Scene, request: RenderRequest, method: PathTraced, machi
     """Raise `InputError` if paths cannot render a scene, or something is requested that they take the place of."""
     for what, requested in (("interfaces", request.interfaces), ("scattering", request.scattering)):
         if requested is not None:
-            raise InputError(f"{method} with {what}={requested}", f"random paths replace {what}", "give one of the two")
+            raise InputError(
+                f"{method} with {what}={requested}", f"path tracing replaces {what}", "give only one of the two"
+            )
     if not machine.opengl:
         found = "paths are followed by OpenGL, and this renderer works on the CPU"
         raise InputError(str(method), found, "use tl.reference.path_trace(scene, size, paths), or an OpenGL backend")
@@ -537,12 +541,12 @@ def _check_backdrop(scene: Scene, request: RenderRequest) -> None:
     if scene.opaque:
         raise InputError(
             "a backdrop",
-            f"the scene has opaque objects of its own: {object_names(scene.opaque)}",
-            "leave them out, or draw them in the backdrop",
+            f"the scene itself has opaque objects: {object_names(scene.opaque)}",
+            "remove these objects, or draw them into the backdrop",
         )
     if isinstance(request.method, PathTraced):
         found = "the objects of a backdrop have no mesh that a path could meet"
-        raise InputError(f"{request.method} before a backdrop", found, "leave out one of the two")
+        raise InputError(f"{request.method} in front of a backdrop", found, "omit one of the two")
     if request.interfaces is not None and request.interfaces.traced:
         found = "the objects of a backdrop have no mesh that a ray could meet"
-        raise InputError(f"{request.interfaces} before a backdrop", found, "use ScreenInterfaces()")
+        raise InputError(f"{request.interfaces} in front of a backdrop", found, "use ScreenInterfaces() instead")

@@ -87,10 +87,13 @@ def _opaque_bodies(scene: Scene, known: set[NoteKind]) -> tuple[Note, ...]:
     return (
         Note(
             NoteKind.OPAQUE_BODIES,
-            f"{object_names(body for *_, body in bodies)}: opaque at this size, as plastic: light turns back within "
-            f"{_text(free)} (the mean free path), {times:.0f} times in {short_length(_size(worst))}; "
-            f"{other_size(scene.shown_bounds, GLOWING / times)} its thin parts glow, and so they do "
-            f"diluted {times / GLOWING:.2g} times (--dilute {times / GLOWING:.2g})",
+            (
+                f"{object_names((body for *_, body in bodies))}: opaque at this size, as plastic: light turns "
+                f"back within {_text(free)} (the mean free path), {times:.0f} times in "
+                f"{short_length(_size(worst))}; {other_size(scene.shown_bounds, GLOWING / times)} light would "
+                f"shine through its thin parts; so it would if the medium were diluted {times / GLOWING:.2g} "
+                f"times (--dilute {times / GLOWING:.2g})"
+            ),
         ),
     )
 
@@ -111,10 +114,12 @@ def _unseen_bodies(scene: Scene) -> tuple[Note, ...]:
     return (
         Note(
             NoteKind.UNSEEN_BODIES,
-            f"{object_names(body for _, body in bodies)}: invisible: light goes "
-            f"{short_length(_size(first) / times)} through this medium before it is scattered or absorbed (the "
-            f"mean free path), and the size of the body is only {short_length(_size(first))}; "
-            f"{other_size(scene.shown_bounds, CLOUDY / times)} it shows",
+            (
+                f"{object_names((body for _, body in bodies))}: invisible: light travels "
+                f"{short_length(_size(first) / times)} through this medium before it is scattered or absorbed "
+                f"(the mean free path), but the size of the body is only {short_length(_size(first))}; "
+                f"{other_size(scene.shown_bounds, CLOUDY / times)} the medium would be visible"
+            ),
         ),
     )
 

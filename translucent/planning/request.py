@@ -71,7 +71,7 @@ class RenderRequest(Flags):
     def __post_init__(self) -> None:
         if not isinstance(self.samples, int) or not 1 <= self.samples <= MAX_SAMPLES:
             found = f"not a whole number in 1 to {MAX_SAMPLES}"
-            raise InputError(f"samples {brief(self.samples)}", found, "give for example 16")
+            raise InputError(f"samples {brief(self.samples)}", found, "use a value such as 16")
         for name, kind, what, examples in _TYPES:
             value = getattr(self, name)
             if value is not None and not isinstance(value, kind):
@@ -79,11 +79,11 @@ class RenderRequest(Flags):
                 do = f"give {', '.join(others)} or {last}" if others else f"give for example {last}"
                 if name == "interfaces" and isinstance(value, str) and value in _OLD_NAMES:
                     do = f"write interfaces=tl.{_OLD_NAMES[value]}"
-                raise InputError(f"{name} {brief(value)}", f"not {what}", do)
+                raise InputError(f"{name} {brief(value)}", f"the value must be {what}", do)
         if self.denoise and (self.transparent or self.over_backdrop):
             what = "a transparent frame" if self.transparent else "a backdrop"
             do = "leave out one of the two"
-            raise InputError("denoise", f"{what}: a denoiser cannot denoise the difference of two pictures", do)
+            raise InputError("denoise", f"{what}: the difference between two pictures cannot be denoised", do)
         if self.over_backdrop and self.caustics is not None:
             found = "the objects of a backdrop have no mesh that light could land on"
-            raise InputError("caustics before a backdrop", found, "leave out one of the two")
+            raise InputError("caustics in front of a backdrop", found, "omit one of the two")

@@ -84,8 +84,11 @@ class Diffusion(Scattering):
             cells = 0.25 * min(self.resolution, 10**9) ** 3
             raise InputError(
                 f"Diffusion resolution {brief(self.resolution)}",
-                f"a body would have {cells:.2g} cells and take about {CELL_BYTES * cells / 1e9:.0f} GB",
-                f"give at most {MOST_RESOLUTION}; 32 is enough where scattering dominates",
+                (
+                    f"at this resolution, a body would have {cells:.2g} cells and take about "
+                    f"{CELL_BYTES * cells / 1000000000.0:.0f} GB of memory"
+                ),
+                f"use at most {MOST_RESOLUTION}; 32 is enough for media that mainly scatter",
             )
         check_count("Diffusion resolution", self.resolution, MOST_RESOLUTION, least=LEAST_RESOLUTION, example=32)
 
@@ -260,7 +263,7 @@ def choose_treatments(
     if requested is not None and bodies and not of:
         i = next(iter(bodies))
         why = refused.get(i, "this renderer draws no layers")
-        raise InputError(str(requested), f"{scene.objects[i].mesh.name!r}: {why}", "use SingleScattering()")
+        raise InputError(str(requested), f"{scene.objects[i].mesh.name!r}: {why}", "use SingleScattering() instead")
     if not isinstance(chosen, Diffusion):
         return Treatments(of)
     if volumes:

@@ -49,11 +49,15 @@ class ShadowMaps:
         if isinstance(self.size, bool) or not isinstance(self.size, int) or not LEAST_SIZE <= self.size <= MOST_SIZE:
             raise InputError(
                 f"ShadowMaps size {self.size!r}",
-                f"not a whole number in {LEAST_SIZE} to {MOST_SIZE}",
-                "give for example 1024",
+                f"the size must be a whole number in {LEAST_SIZE} to {MOST_SIZE}",
+                "use a value such as 1024",
             )
         if self.directions is not None and not (isinstance(self.directions, int) and self.directions >= 1):
-            raise InputError(f"ShadowMaps directions {self.directions!r}", "not a number of them", "give for example 8")
+            raise InputError(
+                f"ShadowMaps directions {self.directions!r}",
+                "the value must be a number of directions",
+                "use a value such as 8",
+            )
 
 
 def shadows_left_out(units: int) -> tuple[Note, ...]:

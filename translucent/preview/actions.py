@@ -243,7 +243,7 @@ def apply(document: Document, action: Action) -> Document:
         case Recall():
             if (found := document.snapshot(action.name)) is None:
                 names = ", ".join(one.name for one in document.snapshots) or "none is kept"
-                raise InputError(f"snapshot {action.name!r}", "there is none of that name", f"use one of: {names}")
+                raise InputError(f"snapshot {action.name!r}", "no snapshot has this name", f"use one of: {names}")
             return document.seen_as(found.document)
         case ChoosePreset():
             return replace(material=preset_material(document.material, action.name))
@@ -276,7 +276,11 @@ def _changed(document: Document, action: SetField) -> Document:
     section, _, name = action.field.partition(".")
     owner = getattr(document, section, None) if section in document.__dataclass_fields__ else None
     if owner is None or name not in owner.__dataclass_fields__ or section == "model":
-        raise InputError(f"field {action.field!r}", "there is none to change", "use for example material.roughness")
+        raise InputError(
+            f"field {action.field!r}",
+            "this field does not exist, or cannot be changed",
+            "use a field such as material.roughness",
+        )
     if isinstance(owner, Material):
         changed = changed_material(owner, name, action.value)
         bare = _is_mesh(document.model.path)
@@ -306,7 +310,7 @@ def changed_material(material: Material, name: str, value: Any) -> Material:
         absorption = extinction_from_colors(material.color, material.distance)
         if not (absorption <= MAX_COEFFICIENT).all():
             found = "so short that the extinction overflows"
-            raise InputError(f"distance {material.distance:g} m", found, "check the unit")
+            raise InputError(f"distance {material.distance:g} m", found, "check the unit of length")
         return dataclasses.replace(material, source="color", preset="", absorption=triple_of(absorption))
     if name == "absorption" or (name in _OF_PRESET and material.source == "preset"):
         return _with_color(dataclasses.replace(material, source="coefficients", preset=""))

@@ -105,7 +105,9 @@ def run(
             if "glfw" not in str(error).lower():
                 raise
             found = f"no window can be opened on display {os.environ.get('DISPLAY', '')!r}"
-            raise RenderError("preview", found, "without a window: translucent render MODEL -o picture.png") from error
+            raise RenderError(
+                "preview", found, "to render without a window, run translucent render MODEL -o picture.png"
+            ) from error
         finally:
             window.work.close()
     if window.failure is not None:
@@ -257,7 +259,7 @@ class _Window:
         runner.fps_idling.fps_idle = WAITING_FPS if state.more else IDLE_FPS
         if self.script is not None and self.script.step(state):
             for text in filter(None, (state.view.problem, state.view.shader_problem)):
-                self.work.refuse(RenderError("the picture is not what it should be", text))
+                self.work.refuse(RenderError("the picture in the window may be wrong", text))
             runner.app_shall_exit = True
 
 

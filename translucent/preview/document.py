@@ -494,27 +494,35 @@ def checked(name: str, value: Any, like: Any) -> Any:
         return None if value is None else _number(name, value, range_)
     if isinstance(like, bool) or isinstance(value, bool):
         if not (isinstance(like, bool) and isinstance(value, bool)):
-            raise InputError(f"{name} = {value!r}", "of the wrong type", f"give for example {like!r}")
+            raise InputError(f"{name} = {value!r}", "the value has the wrong type", f"use a value such as {like!r}")
         return value
     if isinstance(like, str):
         if not isinstance(value, str) or (range_.words and value not in range_.words):
-            raise InputError(f"{name} = {value!r}", "not one of its words", f"use {', '.join(range_.words) or 'text'}")
+            raise InputError(
+                f"{name} = {value!r}",
+                "the value is not one of the allowed words",
+                f"use {', '.join(range_.words) or 'text'}",
+            )
         if name == "model.unit":
             metres_per_unit(value)
         return value
     if isinstance(like, tuple):
         if not isinstance(value, tuple | list) or len(value) != 3:
-            raise InputError(f"{name} = {value!r}", "not three numbers", "give for example [0.2, 0.6, 0.4]")
+            raise InputError(
+                f"{name} = {value!r}", "the value must be three numbers", "use a value such as [0.2, 0.6, 0.4]"
+            )
         return tuple(_number(name, one, range_) for one in value)
     return _number(name, value, range_)
 
 
 def _number(name: str, value: Any, range_: FieldRange) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{name} = {value!r}", "not a finite number", "give a number")
+        raise InputError(f"{name} = {value!r}", "the value must be a finite number", "use a finite number")
     if not range_.low <= value <= range_.high or (range_.above and value == range_.low):
         least = f"above {range_.low:g}" if range_.above else f"at least {range_.low:g}"
-        raise InputError(f"{name} = {value:g}", "out of its range", f"give {least} and at most {range_.high:g}")
+        raise InputError(
+            f"{name} = {value:g}", "the value is outside its range", f"use a value {least} and at most {range_.high:g}"
+        )
     return float(value)
 
 

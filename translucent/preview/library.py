@@ -144,7 +144,7 @@ class Library:
         """
         name = preset_name(words)
         if name in presets():
-            raise InputError(f"preset {name!r}", "one of the toolkit's has that name", "choose another")
+            raise InputError(f"preset {name!r}", "a built-in preset already has this name", "choose another name")
         medium = medium_of(material)
         g = float(medium.anisotropy)
         source = f"{SAVED}, after {material.preset}" if material.preset else SAVED

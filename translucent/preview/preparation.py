@@ -228,7 +228,11 @@ def _engine(written: float, device: str) -> tuple[GpuRenderer, CompileBudget]:
     """
     engine, budget = GpuRenderer(), CompileBudget()
     if (own := engine.context.renderer) != device:
-        raise RenderError("another process", f"it draws with {own}, and the window with {device}", "mend the drivers")
+        raise RenderError(
+            "the process that prepares pictures",
+            f"this process uses the driver {own}, but the window uses {device}",
+            "repair the installation of the graphics drivers",
+        )
     engine.context.gl.extra = budget
     return engine, budget
 

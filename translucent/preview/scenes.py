@@ -273,7 +273,7 @@ def picture_texture(path: str, written: int, *, encoded: bool) -> Texture:
 def _texture(path: str, item: Object, *, encoded: bool) -> Texture:
     if item.mesh.uv is None:
         found = f"{item.mesh.name or 'the mesh'} has no texture coordinates"
-        raise InputError(f"texture {path!r}", found, "unwrap it in a modeler, or choose no texture")
+        raise InputError(f"texture {path!r}", found, "unwrap the mesh in a modeler, or choose no texture")
     written = Path(path).stat().st_mtime_ns if Path(path).is_file() else 0
     return picture_texture(path, written, encoded=encoded)
 
@@ -469,7 +469,9 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
         If the environment cannot be read.
     """
     if document.orbit is None:
-        raise InputError("a picture", "no view is framed yet", "frame the model first")
+        raise InputError(
+            "saving a picture", "the window has not shown a view of the model yet", "wait until the model is visible"
+        )
     look, scene = document.look, loaded.scene
     objects = _objects(document.material, document.assigned, scene, document.placed)
     objects = tuple(item for number, item in enumerate(objects) if number not in document.hidden)

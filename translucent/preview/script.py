@@ -169,7 +169,9 @@ def read_script(path: str | Path) -> Script:
     table = read_toml(path, what)
     actions = table.get("action")
     if not isinstance(actions, list) or set(table) != {"action"}:
-        raise InputError(what, "not a list of [[action]]", 'write [[action]], and do = "turn" below')
+        raise InputError(
+            what, "the file does not contain a list of [[action]]", 'write [[action]], and do = "turn" on the next line'
+        )
     return Script.of([read_step(one, f"{what}, action {i}") for i, one in enumerate(actions, 1)])
 
 
@@ -182,17 +184,21 @@ def read_step(table: Any, where: str) -> Step:
     _, *parameters = inspect.signature(VERBS[verb]).parameters.values()
     known, values = {one.name: one.default for one in parameters}, {k: v for k, v in table.items() if k != "do"}
     if unknown := sorted(set(values) - set(known)):
-        raise InputError(where, f"{verb} knows no {unknown[0]!r}", f"use {', '.join(known) or 'nothing'}")
+        raise InputError(
+            where, f"the action {verb} has no parameter {unknown[0]!r}", f"use {', '.join(known) or 'nothing'}"
+        )
     found = {}
     for key, default in known.items():
         required = isinstance(default, type)
         if key not in values and required:
-            raise InputError(where, f"{verb} without {key!r}", f"give it: {', '.join(known)}")
+            raise InputError(
+                where, f"the action {verb} needs the parameter {key!r}", f"add the parameter: {', '.join(known)}"
+            )
         value = values.get(key, default)
         kind = default if required else type(default)
         if kind is float and isinstance(value, int):
             value = float(value)
         if kind is not object and not isinstance(value, kind):
-            raise InputError(where, f"{key} = {value!r}", f"give a {kind.__name__}")
+            raise InputError(where, f"{key} = {value!r}", f"give a value of type {kind.__name__}")
         found[key] = value
     return Step(verb, found)

@@ -72,10 +72,12 @@ def from_table(table: dict[str, Any], where: str) -> Document:
         If something in it is unknown, or out of its range.
     """
     if table.get("version") != VERSION:
-        raise InputError(where, f"version {table.get('version')!r}", f"use a session of version {VERSION}")
+        raise InputError(
+            where, f"the session has version {table.get('version')!r}", f"use a session of version {VERSION}"
+        )
     sections: dict[str, Any] = {}
     if not isinstance(table.get("assigned", []), list):
-        raise InputError(where, "assigned is no list", "write [[assigned]]")
+        raise InputError(where, "'assigned' is not a list", "write [[assigned]] before each entry")
     for section, fields in table.items():
         if section == "assigned":
             sections[section] = tuple(_assigned(entry, where) for entry in fields)
@@ -89,7 +91,7 @@ def from_table(table: dict[str, Any], where: str) -> Document:
             default = Orbit() if section == "orbit" else getattr(Document(), section)
             sections[section] = dataclasses.replace(default, **_fields(section, default, fields, where))
         elif section != "version":
-            raise InputError(where, f"an unknown [{section}]", f"use {', '.join(_SECTIONS)}")
+            raise InputError(where, f"the section [{section}] is unknown", f"use {', '.join(_SECTIONS)}")
     return Document(**sections)
 
 
@@ -97,13 +99,17 @@ def _assigned(entry: Any, where: str) -> Assigned:
     number = entry.get("object") if isinstance(entry, dict) else None
     fields = entry.get("material") if isinstance(entry, dict) else None
     if type(number) is not int or number < 0 or not isinstance(fields, dict) or len(entry) != 2:
-        raise InputError(f"{where}, [[assigned]]", "no object and material", "give object = 0, and [assigned.material]")
+        raise InputError(
+            f"{where}, [[assigned]]",
+            "the entry names no object and no material",
+            "add object = 0, and [assigned.material]",
+        )
     return Assigned(number, dataclasses.replace(Material(), **_fields("material", Material(), fields, where)))
 
 
 def _tables(section: str, entries: Any, where: str) -> list[dict[str, Any]]:
     if not isinstance(entries, list) or not all(isinstance(one, dict) for one in entries):
-        raise InputError(where, f"{section} is no list of tables", f"write [[{section}]]")
+        raise InputError(where, f"{section} is not a list of tables", f"write [[{section}]] before each entry")
     return entries
 
 
@@ -112,7 +118,9 @@ def _listed(section: str, entry: dict[str, Any], where: str) -> Any:
     fields = dict(entry)
     number = fields.pop("object", 0) if kind is Placed else 0
     if type(number) is not int or number < 0:
-        raise InputError(f"{where}, [[{section}]]", f"object = {number!r}", "give the number of an object, from 0")
+        raise InputError(
+            f"{where}, [[{section}]]", f"object = {number!r}", "give the number of an object, counted from 0"
+        )
     found = dataclasses.replace(kind(), **_fields(_LISTS[section], kind(), fields, where))
     return dataclasses.replace(found, object=number) if isinstance(found, Placed) else found
 
@@ -121,13 +129,17 @@ def _snapshot(entry: dict[str, Any], where: str) -> Snapshot:
     fields = dict(entry)
     name = fields.pop("name", None)
     if not isinstance(name, str) or not name or "snapshots" in fields:
-        raise InputError(f"{where}, [[snapshots]]", f"name = {name!r}, or snapshots in it", "give each a name")
+        raise InputError(
+            f"{where}, [[snapshots]]",
+            f"the name is {name!r}, or a snapshot contains snapshots",
+            "give each snapshot a name",
+        )
     return Snapshot(name, from_table(fields, f"{where}, snapshot {name}"))
 
 
 def _hidden(numbers: Any, where: str) -> tuple[int, ...]:
     if not isinstance(numbers, list) or not all(type(one) is int and one >= 0 for one in numbers):
-        raise InputError(where, f"hidden = {numbers!r}", "list numbers of objects, such as [0, 2]")
+        raise InputError(where, f"hidden = {numbers!r}", "give a list of object numbers, such as [0, 2]")
     return tuple(sorted(set(numbers)))
 
 
@@ -137,7 +149,7 @@ def _fields(section: str, default: Any, fields: dict[str, Any], where: str) -> d
         if key in _FORMER.get(section, ()):
             continue
         if key not in default.__dataclass_fields__:
-            raise InputError(f"{where}, [{section}]", f"an unknown key {key!r}", "check the spelling")
+            raise InputError(f"{where}, [{section}]", f"the key {key!r} is unknown", "check the spelling")
         try:
             found[key] = checked(f"{section}.{key}", value, getattr(default, key))
         except InputError as error:
@@ -180,7 +192,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     try:
         return toml_value(text)
     except ValueError as error:
-        raise InputError(what, f"no TOML: {error}", "correct the file") from None
+        raise InputError(what, f"the file is not valid TOML: {error}", "correct the file") from None
 
 
 def put_first(one: str, others: Sequence[str]) -> list[str]:

@@ -272,7 +272,7 @@ class WindowState:
     def change_place(self, name: str, value: Any, *, step: bool = False) -> None:
         """Give a field of the place of the moved object, such as ``location``, a value."""
         if (number := self.moved) is None:
-            return self.work.refuse(InputError(f"placed.{name}", "no object is selected", "click one first"))
+            return self.work.refuse(InputError(f"placed.{name}", "no object is selected", "click an object first"))
         try:
             value = checked(f"placed.{name}", value, getattr(Placed(), name))
         except InputError as error:
@@ -311,7 +311,7 @@ class WindowState:
         """Give a field of the selected light a value."""
         lights = list(self.work.document.lights)
         if self.light is None or self.light >= len(lights):
-            return self.work.refuse(InputError(f"light.{name}", "no light is selected", "add or choose one first"))
+            return self.work.refuse(InputError(f"light.{name}", "no light is selected", "add or select a light first"))
         try:
             value = checked(f"light.{name}", value, getattr(AddedLight(), name))
         except InputError as error:
@@ -331,7 +331,7 @@ class WindowState:
     def view_from(self, name: str) -> None:
         """See the model from a side of `VIEWS`."""
         if name not in VIEWS:
-            return self.work.refuse(InputError(f"view {name!r}", "there is none", f"use {', '.join(VIEWS)}"))
+            return self.work.refuse(InputError(f"view {name!r}", "no view has this name", f"use {', '.join(VIEWS)}"))
         if (orbit := self.work.document.orbit) is not None:
             yaw, pitch = VIEWS[name]
             self.work.do(SetOrbit(replace(orbit, yaw=yaw, pitch=pitch)))
@@ -416,7 +416,7 @@ class WindowState:
         """Put a picture, or none, into a slot of the material: ``color_texture`` or ``roughness_texture``."""
         if path and any(item.mesh.uv is None for item in self._textured()):
             found = "the mesh has no texture coordinates"
-            return self.work.refuse(InputError(f"texture {path!r}", found, "unwrap it in a modeler first"))
+            return self.work.refuse(InputError(f"texture {path!r}", found, "unwrap the mesh in a modeler first"))
         if path:
             try:
                 read_encoded(path, f"texture {path!r}")
@@ -449,7 +449,13 @@ class WindowState:
         hidden = set(self.work.document.hidden) ^ {number}
         if hidden >= set(range(len(self.objects))):
             found = "it is the only one on show"
-            return self.work.refuse(InputError(f"hiding {self.name_of(number)}", found, "show another object first"))
+            return self.work.refuse(
+                InputError(
+                    f"hiding {self.name_of(number)}",
+                    found,
+                    "at least one object must stay visible: show another object first",
+                )
+            )
         return self.work.do(Hide(tuple(hidden)))
 
     def isolate(self, number: int) -> None:
@@ -461,7 +467,11 @@ class WindowState:
 
     def _require(self, number: int) -> None:
         if not 0 <= number < len(self.objects):
-            raise InputError(f"object {number}", f"the model has {len(self.objects)}", "give a number from 0 on")
+            raise InputError(
+                f"object {number}",
+                f"the model has {len(self.objects)} objects",
+                "give an object number, counted from 0",
+            )
 
     def turn_light(self, right: float, up: float) -> None:
         """Turn the light around and upwards, by degrees; it is switched on if it was off."""
@@ -484,7 +494,7 @@ class WindowState:
     def ask_file(self, kind: str, *, system: bool = True) -> None:
         """Ask for a file to read or to write: in a dialog of the system, or where it has none in the browser."""
         if kind not in QUESTIONS:
-            raise InputError(f"ask {kind!r}", "there is no such question", f"use one of {', '.join(QUESTIONS)}")
+            raise InputError(f"ask {kind!r}", "the window has no such question", f"use one of {', '.join(QUESTIONS)}")
         dialog = open_dialog(kind) if system else None
         if dialog is not None:
             self.dialogs.append((kind, dialog))
@@ -502,7 +512,7 @@ class WindowState:
     def answer(self, path: str | None = None) -> None:
         """Use the file that the browser names, or this one, and close it; else it says why not."""
         if self.browser is None:
-            raise InputError(f"answer {path!r}", "nothing is asked", "ask first")
+            raise InputError(f"answer {path!r}", "no question is open", "open a question first")
         self.browser.text = self.browser.text if path is None else path
         if (chosen := self.browser.accept()) is not None:
             kind, self.browser = self.browser.kind, None
@@ -593,7 +603,9 @@ class WindowState:
         if work.shown_bake is not None:
             work.refuse(
                 InputError(
-                    "copy a recipe", "the picture shows a baked map on the model", "clear 'show on the model' first"
+                    "copy a recipe",
+                    ("the picture shows a baked map on the model, which the copied text cannot reproduce"),
+                    "turn off 'show on the model' first",
                 )
             )
             return None
@@ -632,7 +644,7 @@ class WindowState:
         modifiers = {"ctrl": imgui.Key.mod_ctrl, "shift": imgui.Key.mod_shift, "alt": imgui.Key.mod_alt}
         keys = [modifiers.get(word) or getattr(imgui.Key, word, None) for word in name.lower().split("+")]
         if None in keys:
-            raise InputError(f"key {name!r}", "there is none of that name", "write for example escape, f1 or ctrl+z")
+            raise InputError(f"key {name!r}", "no key has this name", "write a key such as escape, f1 or ctrl+z")
         for down in (True, False):  # one after the other, in as many frames
             for key in keys:
                 self.io.add_key_event(key, down)
@@ -650,5 +662,5 @@ class WindowState:
         docking = hello_imgui.get_runner_params().docking_params
         names = [one.label for one in docking.dockable_windows if one.label != "Viewport"]
         if panel not in names:
-            raise InputError(f"panel {panel!r}", "there is none", f"use {', '.join(names)}")
+            raise InputError(f"panel {panel!r}", "no panel has this name", f"use {', '.join(names)}")
         docking.dockable_window_of_name(panel).focus_window_at_next_frame = True

@@ -124,7 +124,9 @@ class WorkerMessage:
         except OSError as error:
             size = size_text(sum(array.nbytes for array in arrays))
             found = f"{tempfile.gettempdir()} has no room for {size} of meshes and pictures ({error.strerror})"
-            raise RenderError("work of another process", found, "make room, or set TMPDIR to another folder") from error
+            raise RenderError(
+                "work of another process", found, "free some disk space, or set TMPDIR to another folder"
+            ) from error
 
     def open(self, known: Callable[[int], object] | None = None) -> Any:
         """Unpack the value, whose large arrays are read-only views of the file; `known` has the values for tokens."""
@@ -260,7 +262,7 @@ class Pool:
             if self._closed:
                 raise CancelledError from None
             found = f"its process ended with status {status}, as when the memory is full"
-            raise RenderError(task.name, found, "close other programs, or ask for less") from None
+            raise RenderError(task.name, found, "close other programs, or use smaller settings") from None
         except CancelledError:
             self._return(worker) if worker.stop() else self._end(worker)
             raise

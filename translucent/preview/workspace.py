@@ -370,7 +370,13 @@ class Workspace:
         """Write a file in the background."""
         if (other := self.lanes["write"].task) is not None:
             found = f"{other.name} is under way"
-            return self.refuse(RenderError(f"{path!r} is not written", found, "wait for it, or cancel it"))
+            return self.refuse(
+                RenderError(
+                    f"the file {path!r} has not been written yet",
+                    found,
+                    "wait until the file is written, or cancel the task",
+                )
+            )
         done = f"wrote {path}"
         self.lanes["write"].start(f"writing {Path(path).name}", work, lambda _: self.tell("info", done))
         return None

@@ -70,7 +70,9 @@ def unassociated(layer: ColorLayer) -> ColorLayer:
         If something without opacity has a color: it has no unassociated color.
     """
     if ((layer.opacity == 0) & (layer.color > 0)).any():
-        raise InputError("unassociated colors", "a step emits light, but its opacity is 0", "use associated colors")
+        raise InputError(
+            "unassociated colors", "a step of the ray emits light, although its opacity is 0", "use associated colors"
+        )
     return ColorLayer(_divided(layer.color, layer.opacity), layer.optical_depth)
 
 

@@ -287,10 +287,16 @@ def light_transmittance(scene: Scene, light: int, points: npt.ArrayLike) -> Arra
         If there is no such light, or the points are no finite array (k, 3).
     """
     if not 0 <= light < len(scene.lights):
-        raise InputError(f"light {light} of a scene", f"it has {len(scene.lights)}", "count from 0")
+        raise InputError(
+            f"light {light} of a scene", f"the scene has {len(scene.lights)} lights", "count lights from 0"
+        )
     places = np.asarray(points, dtype=np.float64)
     if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():
-        raise InputError("points in a scene", f"shape {places.shape}, or not finite", "give an array (k, 3) in metres")
+        raise InputError(
+            "points in a scene",
+            f"the array has shape {places.shape}, or contains numbers that are not finite",
+            "give an array of shape (k, 3) in metres",
+        )
     paths = LightPaths(scene, sheet_thicknesses(scene))
     from_eye = places - scene.camera.eye
     return SurfaceLight(paths).passed(from_eye, *direction_and_distance(paths.lights[light], from_eye))

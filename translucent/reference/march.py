@@ -83,7 +83,9 @@ def march(
     scheme = _Scheme(method or RayMarched(), aligned, compositing, associated, termination)
     width, height = check_size(size)
     if any(body.sheet_thickness is not None for body in scene.bodies):
-        raise InputError("ray marching", "the scene has sheets, which have no inside", "use tl.reference.render")
+        raise InputError(
+            "ray marching", "the scene has thin-walled sheets, which have no inside", "use tl.reference.render"
+        )
     paths = LightPaths(scene, (None,) * len(scene.objects))
     rays = pixel_rays(scene.camera, (width, height))
     media = crossed_media(SurfaceLight(paths), rays, scene_hits(scene, (width, height)), paths.sheets)
@@ -95,7 +97,9 @@ def march(
             scene,
             scheme.method,
             (PassSpec(PassName.MARCH, f"asked for: {scheme}"),),
-            limits=(Note(NoteKind.STEPS, f"sums over {scheme.method.steps} steps in each interval"),),
+            limits=(
+                Note(NoteKind.STEPS, f"optical depth is summed over {scheme.method.steps} steps in each interval"),
+            ),
         ),
         seconds={"total": time.perf_counter() - began},
         provenance={"backend": "reference", "numpy": np.__version__},
@@ -115,16 +119,20 @@ class _Scheme:
 
     def __post_init__(self) -> None:
         if not isinstance(self.method, Method) or not self.method.marches:
-            raise InputError(f"marching by {self.method!r}", "not a way to march", "use tl.RayMarched")
+            raise InputError(f"marching by {self.method!r}", "this is not a ray marching method", "use tl.RayMarched")
         if self.compositing not in (known := get_args(Compositing)):
-            raise InputError(f"compositing {self.compositing!r}", "not known", f"use one of {', '.join(known)}")
+            raise InputError(
+                f"compositing {self.compositing!r}", "no compositing has this name", f"use one of {', '.join(known)}"
+            )
         if not 0 <= self.termination < 1:
-            raise InputError(f"termination {self.termination}", "not in 0 to 1", "use for example 1e-3")
+            raise InputError(
+                f"termination {self.termination}", "the value must lie in 0 to 1", "use a value such as 1e-3"
+            )
         if self.termination > 0 and self.compositing != "front-to-back":
             raise InputError(
                 f"termination {self.termination} from back to front",
-                "hidden parts are known only from the front",
-                "use front-to-back",
+                "only compositing from front to back knows which parts are hidden",
+                "use front-to-back compositing",
             )
 
     def __str__(self) -> str:

@@ -405,7 +405,9 @@ def path_trace(
         depth = 2.0 * light.tracer.radius * float(light.volume.extinction.max())
     if max_events is None and depth > MAX_DEPTH:
         raise InputError(
-            "path tracing", f"media up to {depth:.0e} deep, in which a path has very many events", "give max_events"
+            "path tracing",
+            (f"the media have an optical depth of {depth:.0e}, in which a path has very many events"),
+            "limit the events of a path with max_events",
         )
     rays = pixel_rays(scene.camera, (width, height))
     surface = SurfaceLight(light)
@@ -431,7 +433,7 @@ def path_trace(
             scene,
             SignedDepth(),
             (PassSpec(PassName.PATH_TRACE, reason),),
-            limits=(Note(NoteKind.NOISE, "radiance has noise"),),
+            limits=(Note(NoteKind.NOISE, "the radiance has noise"),),
             unmodelled=_left_out(scene),
         ),
         seconds={"total": time.perf_counter() - began},
@@ -445,19 +447,30 @@ def _check(scene: Scene, paths: int, max_events: int | None) -> None:
     if scene.scatters_ambient:
         raise InputError(
             "path tracing with ambient radiance",
-            "it replaces light that paths find by themselves: that of the environment, scattered once or often",
-            "leave ambient out",
+            (
+                "ambient radiance stands for multiple scattering and for the environment, which path tracing "
+                "computes itself"
+            ),
+            "omit the ambient radiance",
         )
     if paths < 2:
-        raise InputError(f"path tracing with {paths} paths", "no spread without two", "use for example 64")
+        raise InputError(
+            f"path tracing with {paths} paths",
+            "at least two paths are needed to estimate the noise",
+            "use a value such as 64",
+        )
     if max_events is not None and max_events < 0:
-        raise InputError(f"max_events {max_events}", "below 0", "use 1 for single scattering, None for no limit")
+        raise InputError(
+            f"max_events {max_events}",
+            "the number of events must be 0 or above",
+            "use 1 for single scattering, or None for no limit",
+        )
     check_surfaces(scene, "use tl.reference.render with refraction=False", random=True)
     for body in scene.bodies:
         if body.sheet_thickness is None and not body.mesh.diagnosis.solid:
-            raise InputError(f"path tracing {body.mesh.name!r}", "not closed", "use tl.reference.render")
+            raise InputError(f"path tracing {body.mesh.name!r}", "the mesh is not closed", "use tl.reference.render")
         if body.sheet_thickness is not None and body.medium is not None and body.medium.scatters:
-            raise InputError(f"path tracing {body.mesh.name!r}", "a sheet that scatters", "use tl.reference.render")
+            raise InputError(f"path tracing {body.mesh.name!r}", "the sheet scatters light", "use tl.reference.render")
 
 
 def _left_out(scene: Scene) -> tuple[Note, ...]:

@@ -70,11 +70,15 @@ def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> Landed
         If a body is open, a surface is one that it does not know, or there are no photons.
     """
     if photons < 1:
-        raise InputError(f"{photons} photons", "no light without any", "use for example 100_000")
+        raise InputError(f"{photons} photons", "the number of photons must be above 0", "use a value such as 100_000")
     check_surfaces(scene, "use photons of the renderer", random=True)
     for body in scene.bodies:
         if body.sheet_thickness is None and not body.mesh.diagnosis.solid:
-            raise InputError(f"photons through {body.mesh.name!r}", "not closed", "close it, or declare it a sheet")
+            raise InputError(
+                f"photons through {body.mesh.name!r}",
+                "the mesh is not closed",
+                "close the mesh, or declare it a thin-walled sheet",
+            )
     rng = np.random.default_rng(seed)
     sheets = sheet_thicknesses(scene)
     # Nothing but the photons themselves carries what lights emit.

@@ -411,9 +411,13 @@ def _mean(refracted: RefractedRays, rays: Rays, paths: int) -> tuple[RefractedLi
 
 def _check(scene: Scene, bounces: int, paths: int) -> None:
     if bounces < 0:
-        raise InputError(f"{bounces} bounces", "below 0", "use for example 8")
+        raise InputError(f"{bounces} bounces", "the number of bounces must be 0 or above", "use a value such as 8")
     if paths < 2:
-        raise InputError(f"{paths} paths through rough interfaces", "no spread without two", "use for example 64")
+        raise InputError(
+            f"{paths} paths through rough interfaces",
+            "at least two paths are needed to estimate the noise",
+            "use a value such as 64",
+        )
     check_surfaces(scene, "use refraction=False")
 
 
@@ -429,13 +433,19 @@ def check_surfaces(scene: Scene, instead: str, *, random: bool = False) -> None:
             continue
         unknown = ("normal_texture", "emissive_texture", "occlusion_texture")
         if found := [name for name in unknown if getattr(surface, name) is not None]:
-            raise InputError(what, f"its surface has a {found[0]}", f"give it a surface without, or {instead}")
+            raise InputError(
+                what, f"the surface of the object has a {found[0]}", f"use a surface without this texture, or {instead}"
+            )
         if body.has_holes:
-            raise InputError(what, "its surface has holes by alpha", f"give it a surface without, or {instead}")
+            raise InputError(
+                what,
+                "the surface of the object has holes by an alpha mask",
+                f"use a surface without an alpha mask, or {instead}",
+            )
         if surface.iridescence or surface.clearcoat:
             rough = surface.clearcoat_roughness if surface.clearcoat else 0.0
             walks = random and body.sheet_thickness is None
             if max(0.0 if walks else surface.roughness, rough) > 0.0:
                 raise InputError(
-                    what, "a film or a clear coat on it that is rough", f"give it a polished one, or {instead}"
+                    what, "the object has a rough thin film or clear coat", f"use a polished one, or {instead}"
                 )

@@ -117,7 +117,9 @@ def render(
     size = check_size(size)
     check_method(method)
     if not 1e-12 <= tolerance <= 1:
-        raise InputError(f"tolerance {tolerance}", "not in 1e-12 to 1", f"use for example {TOLERANCE:g}")
+        raise InputError(
+            f"tolerance {tolerance}", "the tolerance must lie in 1e-12 to 1", f"use a value such as {TOLERANCE:g}"
+        )
     bent = bends(scene) if refraction is None else refraction
     chosen = plan(scene, method if method is not None and method.makes_sheets else None, TRACED)
     chosen = _with_own_interfaces(chosen, bent)

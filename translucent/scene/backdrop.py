@@ -53,22 +53,24 @@ class Backdrop(Frozen):
     def __post_init__(self) -> None:
         radiance, depth = _numbers("radiance", self.radiance, np.float32), _numbers("depth", self.depth, np.float64)
         if depth.ndim != 2 or depth.size == 0:
-            raise InputError("backdrop", f"depth of shape {depth.shape}", "give shape (h, w)")
+            raise InputError("backdrop", f"the depth has shape {depth.shape}", "use the shape (h, w)")
         if radiance.shape != (*depth.shape, 3):
             raise InputError(
                 "backdrop",
-                f"radiance of shape {radiance.shape} for depth of shape {depth.shape}",
-                "give (h, w, 3) for (h, w)",
+                f"the radiance has shape {radiance.shape}, and the depth has shape {depth.shape}",
+                "use the shapes (h, w, 3) and (h, w)",
             )
         if wrong := np.count_nonzero(~((radiance >= 0) & (radiance <= MAX_RADIANCE))):
             raise InputError(
-                "backdrop", f"{wrong} numbers of its radiance are not in 0 to {MAX_RADIANCE:g}", "give linear RGB"
+                "backdrop",
+                f"{wrong} numbers of the radiance are outside 0 to {MAX_RADIANCE:g}",
+                "give linear RGB radiance",
             )
         if wrong := np.count_nonzero(~(depth > 0)):
             raise InputError(
                 "backdrop",
-                f"its depth is not above 0 in {wrong} pixels",
-                "give metres along the camera's forward axis, and inf where nothing is",
+                f"the depth is not above 0 in {wrong} pixels",
+                "give metres along the camera's forward axis, and inf for pixels without a surface",
             )
         self._freeze("radiance", radiance)
         self._freeze("depth", depth)
@@ -76,7 +78,7 @@ class Backdrop(Frozen):
             coverage = np.array(self.coverage, order="C")
             if coverage.shape != depth.shape or coverage.dtype != bool:
                 found = f"coverage of shape {coverage.shape} and type {coverage.dtype}"
-                raise InputError("backdrop", found, f"give shape {depth.shape} and type bool")
+                raise InputError("backdrop", found, f"use an array of shape {depth.shape} and type bool")
             self._freeze("coverage", coverage)
         if self.ambient is not None:
             ambient = parse_radiance("ambient radiance of a backdrop", self.ambient)
@@ -100,4 +102,4 @@ def _numbers(field: str, value: npt.ArrayLike, dtype: Any) -> npt.NDArray[Any]:
         with np.errstate(over="ignore", under="ignore"):
             return np.array(value, order="C").astype(dtype)
     except (TypeError, ValueError):
-        raise InputError("backdrop", f"its {field} are not numbers", "give arrays of floats") from None
+        raise InputError("backdrop", f"the values of {field} are not numbers", "give arrays of floats") from None

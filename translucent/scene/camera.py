@@ -75,19 +75,29 @@ class Camera(Frozen):
     def __post_init__(self) -> None:
         pose = np.array(self.pose, dtype=np.float64)
         if pose.shape != (4, 4) or not np.isfinite(pose).all():
-            raise InputError("camera pose", "not a finite 4x4 matrix", "use Camera.look_at")
+            raise InputError("camera pose", "the pose must be a finite 4x4 matrix", "use Camera.look_at")
         rotation = pose[:3, :3]
         if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
-            raise InputError("camera pose", "it scales, shears or mirrors", "use Camera.look_at, or remove the scale")
+            raise InputError(
+                "camera pose",
+                "the pose scales, shears or mirrors",
+                "use Camera.look_at, or remove the scale from the matrix",
+            )
         if (self.fov_y is None) == (self.height is None):
             raise InputError(
-                "camera", "needs either fov_y or height", "give fov_y for perspective, height for orthographic"
+                "camera",
+                "a camera needs either fov_y or height",
+                "set fov_y for a perspective camera, or height for an orthographic camera",
             )
         if self.fov_y is not None and not 0 < self.fov_y < 180:
-            raise InputError(f"camera fov_y {self.fov_y}", "not between 0 and 180 degrees", "give for example 45")
+            raise InputError(
+                f"camera fov_y {self.fov_y}", "the angle must lie between 0 and 180 degrees", "use a value such as 45"
+            )
         if self.height is not None and not (0 < self.height < np.inf):
             raise InputError(
-                f"camera height {self.height}", "not positive and finite", "give the view's height in metres"
+                f"camera height {self.height}",
+                "the height must be positive and finite",
+                "give the height of the view in metres",
             )
         pose.setflags(write=False)
         object.__setattr__(self, "pose", pose)
@@ -143,10 +153,16 @@ class Camera(Frozen):
             Fraction of the picture's width or height that the points take, whichever is more. Default: a small margin.
         """
         if fit is not None and not 0.0 < fit <= 1.0:
-            raise InputError(f"camera framing fit {fit}", "not above 0 and at most 1", "give for example 0.8")
+            raise InputError(
+                f"camera framing fit {fit}", "the value must be above 0 and at most 1", "use a value such as 0.8"
+            )
         framed = np.asarray(points, dtype=np.float64)
         if framed.ndim != 2 or framed.shape[1] != 3 or not len(framed):
-            raise InputError(f"camera framing points of shape {framed.shape}", "no points", "give an array (n, 3)")
+            raise InputError(
+                f"camera framing points of shape {framed.shape}",
+                "the array contains no points",
+                "give an array of shape (n, 3)",
+            )
         size = check_size(size)
         low, high = extent(framed)
         reach = float(np.linalg.norm(high - low)) or 1.0
@@ -224,7 +240,11 @@ class Camera(Frozen):
             Directions have unit length; all origins of a perspective camera are the eye.
         """
         if any(np.shape(one) not in ((), tuple(size)[::-1]) for one in offset):
-            raise InputError("offset of rays", "neither two numbers nor two arrays (h, w)", "give (right, down)")
+            raise InputError(
+                "offset of camera rays",
+                "the offset must be two numbers or two arrays of shape (h, w)",
+                "give the offset as (right, down)",
+            )
         half_width, half_height = self.half_extent(size)
         aside, above = self.center(size)
         x = ((np.arange(size[0]) + 0.5 + offset[0]) / size[0] * 2 - 1 + aside) * half_width
@@ -244,10 +264,14 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
         exact = (width, height) == tuple(size)
     except Exception:  # noqa: BLE001 - whatever may be given as a size
         raise InputError(
-            f"frame size {brief(size)}", "not (width, height)", "give two whole numbers, for example (1280, 720)"
+            f"frame size {brief(size)}",
+            "the size must be (width, height)",
+            "give two whole numbers, such as (1280, 720)",
         ) from None
     if not exact or width < 1 or height < 1:
-        raise InputError(f"frame size {brief(size)}", "not two whole numbers above 0", "give for example (1280, 720)")
+        raise InputError(
+            f"frame size {brief(size)}", "the size must be two whole numbers above 0", "use a value such as (1280, 720)"
+        )
     return width, height
 
 
@@ -286,16 +310,26 @@ def framing_directions(
 def _look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike) -> Array:
     e, t, u = (np.asarray(v, dtype=np.float64) for v in (eye, target, up))
     if any(v.shape != (3,) or not np.isfinite(v).all() for v in (e, t, u)):
-        raise InputError("camera eye, target or up", "not three finite numbers", "give (x, y, z) for each")
+        raise InputError(
+            "camera eye, target or up", "each of them must be three finite numbers", "give (x, y, z) for each of them"
+        )
     if max(np.abs(v).max() for v in (e, t, u)) > MAX_COORDINATE:
-        raise InputError("camera eye, target or up", f"a number beyond {MAX_COORDINATE:g}", "move it closer")
+        raise InputError(
+            "camera eye, target or up",
+            f"a coordinate is beyond {MAX_COORDINATE:g}",
+            "move the camera closer to the origin",
+        )
     backward = e - t
     if not (distance := float(np.linalg.norm(backward))) > 0:
-        raise InputError("camera", f"eye and target are both at {tuple(e.tolist())}", "move one of them")
+        raise InputError("camera", f"eye and target are at the same point {tuple(e.tolist())}", "move one of them")
     backward /= distance
     right = np.cross(u, backward)
     if not (length := float(np.linalg.norm(right))) > 1e-9 * float(np.linalg.norm(u)) or length == 0:
-        raise InputError("camera", f"up {tuple(u.tolist())} is along the view", "choose another up")
+        raise InputError(
+            "camera",
+            f"the up direction {tuple(u.tolist())} is parallel to the view direction",
+            "choose another up direction",
+        )
     right /= length
     pose = np.eye(4)
     pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(backward, right), backward, e
@@ -349,7 +383,9 @@ class Lens:
     def __post_init__(self) -> None:
         for name in ("diameter", "focus"):
             if not 0.0 < (value := getattr(self, name)) < math.inf:
-                raise InputError(f"lens {name} {value!r}", "not above 0 and finite", "give metres")
+                raise InputError(
+                    f"lens {name} {value!r}", "the value must be finite and above 0", "give the value in metres"
+                )
 
     def camera(self, camera: Camera, size: tuple[int, int], number: int, count: int) -> Camera:
         """Camera at one of `count` points of the aperture, for a picture of a size in pixels.

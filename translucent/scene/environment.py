@@ -79,21 +79,33 @@ class Environment(Frozen):
     def __post_init__(self) -> None:
         if self.kind not in get_args(EnvironmentKind):
             raise InputError(
-                f"environment kind {self.kind!r}", "not known", f"use one of {', '.join(get_args(EnvironmentKind))}"
+                f"environment kind {self.kind!r}",
+                "no environment has this name",
+                f"use one of {', '.join(get_args(EnvironmentKind))}",
             )
         object.__setattr__(self, "first", positive_triple("environment radiance", self.first))
         object.__setattr__(self, "second", positive_triple("environment radiance", self.second))
         if not 0 < self.tiles <= 1e6:
-            raise InputError(f"checkerboard of {self.tiles} tiles", "not in 0 to 1e6", "give for example 8")
+            raise InputError(
+                f"checkerboard of {self.tiles} tiles",
+                "the number of tiles must lie in 0 to 1e6",
+                "use a value such as 8",
+            )
         if (self.kind == "image") != (self.map is not None):
-            raise InputError(f"{self.kind} environment", "an image goes with its pixels", "use tl.Environment.image")
+            raise InputError(
+                f"{self.kind} environment", "an image environment needs its pixels", "use tl.Environment.image"
+            )
         if not np.isfinite(self.rotation):
-            raise InputError(f"rotation {self.rotation} of an environment", "not finite", "give degrees")
+            raise InputError(
+                f"rotation {self.rotation} of an environment",
+                "the rotation must be finite",
+                "give the rotation in degrees",
+            )
         if not abs(self.exposure) <= MAX_EXPOSURE:
             raise InputError(
                 f"exposure {self.exposure} of an environment",
-                f"not within {MAX_EXPOSURE:g} stops",
-                "give for example 1",
+                f"the exposure must lie within {MAX_EXPOSURE:g} stops",
+                "use a value such as 1",
             )
 
     def __repr__(self) -> str:
@@ -164,7 +176,9 @@ class Environment(Frozen):
         """Copy with another environment as the visible background; light and reflections stay."""
         if not isinstance(background, Environment):
             raise InputError(
-                f"background {brief(background)}", f"of type {type(background).__name__}", "give a tl.Environment"
+                f"background {brief(background)}",
+                f"of type {type(background).__name__}",
+                "give an object of type tl.Environment",
             )
         return dataclasses.replace(self, background=background.seen)
 

@@ -200,7 +200,7 @@ def read_linear(path: Path) -> Pixels:
     for names in ("RGB", "YYY"):
         if set(names) <= channels.keys():
             return np.stack([channels[name] for name in names], axis=-1)
-    raise InputError(what, f"channels {', '.join(channels)}", "give channels R, G and B")
+    raise InputError(what, f"the file has the channels {', '.join(channels)}", "use the channels R, G and B")
 
 
 def _read_encoded(path: Path) -> Pixels:
@@ -211,7 +211,7 @@ def _read_encoded(path: Path) -> Pixels:
     except InputError:
         raise
     except Exception as error:  # each of Pillow's decoders raises its own kinds
-        raise InputError(what, f"not an image that can be read ({shown(error)})", "check the file") from error
+        raise InputError(what, f"the file is not a readable image ({shown(error)})", "check the file") from error
     return np.asarray(srgb_to_linear(np.arange(256) / 255.0).astype(np.float32)[encoded])
 
 

@@ -44,9 +44,13 @@ class EnvironmentMap(Frozen):
             if given.dtype.kind not in "biuf":
                 given = given.astype(np.float64)
         except (TypeError, ValueError):
-            raise InputError("environment image", "its pixels are not numbers", "give an array of floats") from None
+            raise InputError("environment image", "the pixels are not numbers", "give an array of floats") from None
         if given.ndim != 3 or given.shape[2] != 3 or given.size == 0:
-            raise InputError("environment image", f"shape {given.shape}", "give linear radiance of shape (h, w, 3)")
+            raise InputError(
+                "environment image",
+                f"the array has shape {given.shape}",
+                "give linear radiance in an array of shape (h, w, 3)",
+            )
         usable, doubts = _usable(given)
         if usable.shape[1] != 2 * usable.shape[0]:
             size = f"{usable.shape[1]}x{usable.shape[0]} pixels"
@@ -173,7 +177,9 @@ def _usable(given: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float32], list[str]
         with np.errstate(under="ignore"):
             pixels[rows] = np.minimum(np.where(wrong, 0.0, values), MAX_RADIANCE)
     if not any_right:
-        raise InputError("environment image", "no pixel holds a finite radiance of 0 or above", "check how it was made")
+        raise InputError(
+            "environment image", "no pixel has a finite radiance of 0 or above", "check how this image was made"
+        )
     count = given.shape[0] * given.shape[1]
     words = (("not finite", "0"), ("below 0", "0"), (f"above {MAX_RADIANCE:g}", "that"))
     doubts = [

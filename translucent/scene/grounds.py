@@ -166,15 +166,19 @@ def _irradiance(scene: Scene, item: Object) -> Array:
     what = f"a transparent frame with the shadow catcher {item.mesh.name!r}"
     normal, thickness = _plane(item, item.mesh.vertices @ item.matrix[:3, :3].T)
     if not normal.any():
-        raise InputError(what, "it has no area", "give it a flat mesh")
+        raise InputError(what, "the mesh of the shadow catcher has no area", "use a flat mesh")
     if thickness > FLAT:
-        raise InputError(what, "it is not flat", "give it a flat mesh, or render without transparency")
+        raise InputError(
+            what, "the mesh of the shadow catcher is not flat", "use a flat mesh, or render without transparency"
+        )
     if any(not isinstance(light, DirectionalLight) for light in scene.lights):
         do = "use DirectionalLight, or render without transparency"
-        raise InputError(what, "a light falls unevenly on it", do)
+        raise InputError(what, "a light illuminates the shadow catcher unevenly", do)
     irradiance = scene.environment.irradiance_on(normal)
     for light in scene.lights:
         irradiance = irradiance + light.irradiance_on(np.zeros(3), normal)
     if not (irradiance > 0).all():
-        raise InputError(what, "no light of one of the colors falls on it", "light it from above")
+        raise InputError(
+            what, "no light of one of the colors reaches the shadow catcher", "illuminate the shadow catcher from above"
+        )
     return np.asarray(irradiance)

@@ -40,7 +40,11 @@ class PositionalLight(Frozen):
     def __post_init__(self) -> None:
         position = _vector("light position", self.position, "give (x, y, z); at infinity, use a tl.DirectionalLight")
         if (farthest := float(np.abs(position).max())) > MAX_COORDINATE:
-            raise InputError("light position", f"{farthest:.3g} m away", f"stay within {MAX_COORDINATE:g} m")
+            raise InputError(
+                "light position",
+                f"the light is {farthest:.3g} m away from the origin",
+                f"use a position within {MAX_COORDINATE:g} m",
+            )
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "intensity", positive_triple("light intensity", self.intensity))
 
@@ -137,8 +141,11 @@ class SpotLight(PositionalLight):
         if not (self.outer_cone >= NARROWEST_CONE and self.inner_cone < self.outer_cone):
             raise InputError(
                 f"light with inner_cone {self.inner_cone:g} and outer_cone {self.outer_cone:g} degrees",
-                f"the inner is not below the outer, or the outer is below {NARROWEST_CONE:g}",
-                "give 0 <= inner_cone < outer_cone <= 90",
+                (
+                    "the inner cone must be smaller than the outer cone, and the outer cone at least "
+                    f"{NARROWEST_CONE:g} degrees"
+                ),
+                "use angles with 0 <= inner_cone < outer_cone <= 90",
             )
 
     @cached_property
@@ -188,8 +195,8 @@ class SphereLight(PositionalLight):
         if not number or not 0 < self.radius <= MAX_COORDINATE:
             raise InputError(
                 f"light with radius {brief(self.radius)}",
-                f"not above 0 and up to {MAX_COORDINATE:g} m",
-                "give it in metres, or use a tl.PointLight",
+                f"the radius must be above 0 and at most {MAX_COORDINATE:g} m",
+                "give the radius in metres, or use a tl.PointLight",
             )
         object.__setattr__(self, "radius", float(self.radius))
 
@@ -309,7 +316,9 @@ def _unit(value: npt.ArrayLike) -> Array:
     if (largest := float(np.abs(direction).max())) > 0 and not 1e-100 < largest < 1e100:
         direction = direction / largest  # squares would overflow, or vanish
     if not (length := float(np.linalg.norm(direction))) > 0:
-        raise InputError("light direction", "its length is 0", "give the direction in which the light travels")
+        raise InputError(
+            "light direction", "the direction has the length 0", "give the direction in which the light travels"
+        )
     # What has unit length keeps it to the last bit, so that copies of a light have the same direction.
     direction = direction / length if abs(length - 1.0) > 1e-15 else direction.copy()
     direction.setflags(write=False)
@@ -318,7 +327,11 @@ def _unit(value: npt.ArrayLike) -> Array:
 
 def _angle(name: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 <= value <= 90:
-        raise InputError(f"light with {name} {value!r}", "not 0 to 90", "give the half angle of a cone in degrees")
+        raise InputError(
+            f"light with {name} {value!r}",
+            "the angle must lie in 0 to 90",
+            "give the half angle of the cone in degrees",
+        )
     return float(value)
 
 
@@ -328,7 +341,7 @@ def _vector(what: str, value: npt.ArrayLike, do: str = "give (x, y, z)") -> Arra
     except (TypeError, ValueError, OverflowError):
         vector = np.zeros(0)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{what} {brief(value)}", "not three finite numbers", do)
+        raise InputError(f"{what} {brief(value)}", "the value must be three finite numbers", do)
     vector.setflags(write=False)
     return vector
 
@@ -338,10 +351,14 @@ def positive_triple(what: str, value: npt.ArrayLike) -> Array:
     try:
         triple = np.broadcast_to(np.array(value, dtype=np.float64), (3,))
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what} {brief(value)}", "not one or three numbers", "give (r, g, b)") from None
+        raise InputError(
+            f"{what} {brief(value)}", "the value must be one or three numbers", "give three numbers (r, g, b)"
+        ) from None
     triple = _vector(what, triple)
     if (triple < 0).any() or (triple > MAX_RADIANCE).any():
         raise InputError(
-            f"{what} {tuple(triple.tolist())}", f"not in 0 to {MAX_RADIANCE:g}", "give values in this range"
+            f"{what} {tuple(triple.tolist())}",
+            f"the value must lie in 0 to {MAX_RADIANCE:g}",
+            "use values in this range",
         )
     return triple

@@ -90,32 +90,50 @@ class Object(Frozen):
         matrix = np.eye(4) if self.transform is None else np.array(self.transform, dtype=np.float64)
         where = f"transform of {self.mesh.name!r}"
         if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-            raise InputError(where, "not a finite 4x4 matrix", "give a 4x4 matrix for column vectors")
+            raise InputError(
+                where, "the transform must be a finite 4x4 matrix", "give a 4x4 matrix that multiplies column vectors"
+            )
         if not np.array_equal(matrix[3], (0, 0, 0, 1)):
             raise InputError(
-                where, f"last row {tuple(matrix[3].tolist())}", "give an affine matrix with last row 0 0 0 1"
+                where,
+                f"the last row of the transform is {tuple(matrix[3].tolist())}",
+                "use an affine matrix with the last row 0 0 0 1",
             )
         if np.linalg.matrix_rank(matrix[:3, :3]) < 3:
-            raise InputError(where, "it flattens the mesh (a scale of 0)", "give every axis a scale other than 0")
+            raise InputError(
+                where, "the transform flattens the mesh (a scale of 0)", "use a scale other than 0 along every axis"
+            )
         matrix.setflags(write=False)
         object.__setattr__(self, "transform", matrix)
         if (largest := float(np.abs(self.bounds).max())) > MAX_COORDINATE:
-            raise InputError(where, f"it puts the mesh {largest:.3g} m away", f"stay within {MAX_COORDINATE:g} m")
+            raise InputError(
+                where,
+                f"the transform moves the mesh {largest:.3g} m away from the origin",
+                f"keep all points within {MAX_COORDINATE:g} m",
+            )
         _require_type("priority of an object", self.priority, (int, float, np.number), "give a whole number, such as 1")
         if self.sheet_thickness is not None and not 0 < self.sheet_thickness <= MAX_COORDINATE:
             raise InputError(
                 f"sheet_thickness {self.sheet_thickness} of {self.mesh.name!r}",
-                "not above 0",
-                "give metres, for example 1e-3",
+                "the thickness must be above 0",
+                "give the thickness in metres, for example 1e-3",
             )
         object.__setattr__(self, "color", reflectance(self.color, self.mesh.name))
         if self.density is not None:
             _require_type("density of an object", self.density, get_args(Density), "use for example tl.DensityGrid")
             if self.medium is None or self.sheet_thickness is not None:
                 what = "opaque" if self.medium is None else "a sheet, which has no inside"
-                raise InputError(f"density of {self.mesh.name!r}", f"it is {what}", "give it a medium to fill, or none")
+                raise InputError(
+                    f"density of {self.mesh.name!r}",
+                    f"the object is {what}",
+                    "give the object a medium to fill, or no density",
+                )
         if self.shadow_catcher and self.medium is not None:
-            raise InputError(f"shadow_catcher {self.mesh.name!r}", "a medium fills it", "give it no medium")
+            raise InputError(
+                f"shadow_catcher {self.mesh.name!r}",
+                "a medium fills the object, but a shadow catcher must be opaque",
+                "remove the medium of the object",
+            )
         if self.surface is not None:
             self._check_surface(self.surface)
 
@@ -124,7 +142,7 @@ class Object(Frozen):
         requested = f"material of {self.mesh.name!r}"
         if self.medium is not None or self.surface is not None:
             found = f"a {'medium' if self.medium is not None else 'surface'} is given, too"
-            raise InputError(requested, found, "give the material, or medium and surface")
+            raise InputError(requested, found, "give either the material, or the medium and the surface")
         if not isinstance(material, Preset | str):
             do = 'give a preset or its name, such as "wax"; of a color, tl.showcase(mesh, color, distance)'
             raise InputError(requested, f"{type(material).__name__}", do)
@@ -137,13 +155,17 @@ class Object(Frozen):
         if self.mesh.uv is None and any(surface.textures):
             raise InputError(
                 f"surface of {self.mesh.name!r}",
-                "it has textures, and the mesh no texture coordinates",
-                "unwrap it",
+                "the surface has textures, but the mesh has no texture coordinates",
+                "unwrap the mesh",
             )
         if surface.opacity is not None and (self.medium is None or self.sheet_thickness is None):
             what = "opaque" if self.medium is None else "a solid"
             do = "give it a clear medium and a sheet_thickness, or no opacity"
-            raise InputError(f"opacity of {self.mesh.name!r}", f"it is {what}, and only thin sheets cover", do)
+            raise InputError(
+                f"opacity of {self.mesh.name!r}",
+                f"the object is {what}, and only thin-walled sheets can have an opacity",
+                do,
+            )
 
     def __repr__(self) -> str:
         return f"Object({self.mesh!r}, {self.medium!r})"
@@ -302,10 +324,12 @@ class Scene(Frozen):
         _require_type("camera of a scene", self.camera, Camera, "use tl.Camera.look_at")
         _require_type("environment of a scene", self.environment, Environment, "use tl.Environment.constant")
         if not self.objects:
-            raise InputError("scene", "it has no objects", "add a tl.Object")
+            raise InputError("scene", "the scene has no objects", "add at least one tl.Object")
         if self.overlap not in get_args(Overlap):
             raise InputError(
-                f"overlap {self.overlap!r}", "not a known policy", f"use one of {', '.join(get_args(Overlap))}"
+                f"overlap {self.overlap!r}",
+                "no overlap rule has this name",
+                f"use one of {', '.join(get_args(Overlap))}",
             )
         if (
             isinstance(self.environment_shadows, bool)
@@ -314,16 +338,16 @@ class Scene(Frozen):
         ):
             raise InputError(
                 f"environment_shadows {self.environment_shadows!r}",
-                f"not a whole number in 0 to {MOST_ENVIRONMENT_SHADOWS}",
-                "use for example 32, or 0 for none",
+                f"the number of directions must be a whole number in 0 to {MOST_ENVIRONMENT_SHADOWS}",
+                "use a value such as 32, or 0 for no shadows",
             )
         object.__setattr__(self, "ambient", parse_radiance("ambient radiance", self.ambient))
         for body in self.bodies:
             if not (self.source(body) <= MAX_EMISSION).all():
                 raise InputError(
                     f"ambient radiance in {body.mesh.name!r}",
-                    f"it scatters more than {MAX_EMISSION:g} of it for each metre",
-                    "check the unit of the scattering",
+                    f"the medium would scatter more than {MAX_EMISSION:g} of this radiance per metre",
+                    "check the unit of the scattering coefficient",
                 )
 
     def __repr__(self) -> str:
@@ -426,7 +450,7 @@ def check_scene(scene: object) -> None:
     """Raise `InputError` unless this is a scene."""
     if not isinstance(scene, Scene):
         kind = type(scene).__name__
-        raise InputError("a scene", f"it is a {kind}", "give a tl.Scene, for example tl.showcase(mesh, medium)")
+        raise InputError("a scene", f"the object is a {kind}", "give a tl.Scene, for example tl.showcase(mesh, medium)")
 
 
 Indices = npt.NDArray[np.intp]

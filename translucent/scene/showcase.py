@@ -116,7 +116,11 @@ def _body(
     if medium is None or isinstance(medium, Medium | Preset):
         if distance is not None:
             what = "no medium" if medium is None else f"a {type(medium).__name__}"
-            raise InputError(f"showcase distance {distance!r}", f"{what}, and no color", "give a color, or no distance")
+            raise InputError(
+                f"showcase distance {distance!r}",
+                f"{what}, and no color is given",
+                "give a color, or omit the distance",
+            )
         if isinstance(medium, Preset):
             return Object(mesh, material=medium)
         return Object(mesh, medium=medium or default_medium(mesh, stage))
@@ -129,7 +133,7 @@ def _body(
     if isinstance(medium, str) and (color is None or medium in presets()):
         return Object(mesh, material=medium)
     do = f"give the metres after which white light has it: showcase(mesh, {brief(medium)}, 0.02)"
-    raise InputError(f"showcase medium {brief(medium)}", "a color without a distance", do)
+    raise InputError(f"showcase medium {brief(medium)}", "a color needs a distance", do)
 
 
 def default_medium(mesh: Mesh, stage: Stage | None) -> Medium:
@@ -273,7 +277,7 @@ def objects_named(scene: Scene, name: str) -> tuple[Object, ...]:
     others = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
     do = f"use one of {', '.join(map(repr, known[:MOST_NAMES]))}{others}"
     near = close_names(name, known)
-    raise InputError(f"object {name!r}", "no object has that name", f"{did_you_mean(near)} {do}" if near else do)
+    raise InputError(f"object {name!r}", "no object has this name", f"{did_you_mean(near)} {do}" if near else do)
 
 
 def fillable(scene: Scene) -> tuple[Object, ...]:

@@ -137,7 +137,7 @@ def stage_named(name: str) -> Stage | None:
         names = (NO_STAGE, *STAGES)
         close = close_names(name, names)
         do = did_you_mean(close) if close else f"give one of {', '.join(names)}"
-        raise InputError(f"stage {name!r}", "no such stage", do)
+        raise InputError(f"stage {name!r}", "no stage has this name", do)
     return STAGES[name]
 
 
@@ -204,7 +204,7 @@ def staged(
         return scene
     if len(scene.shown) < len(scene.objects):
         do = 'make it without one, as by tl.showcase(mesh, medium, stage="none")'
-        raise InputError("a stage for a scene", "it has a ground that catches shadows", do)
+        raise InputError("a stage for a scene", "the scene already has a ground that catches shadows", do)
     axes = view_axes(scene.camera) @ _about_y(turn).T
     surface = _ground_surface(chosen, ground)
     floor = (Object(ground_mesh(scene, axes), surface=surface, shadow_catcher=True),) if surface else ()
@@ -232,7 +232,7 @@ def view_axes(camera: Camera) -> Array:
 def _about_y(degrees: float) -> Array:
     """(3, 3): turn about +Y, counterclockwise as seen from above."""
     if not np.isfinite(degrees):
-        raise InputError(f"stage turned by {degrees}", "not finite", "give degrees")
+        raise InputError(f"stage turned by {degrees}", "the angle must be finite", "give the angle in degrees")
     cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
 
@@ -327,7 +327,7 @@ def upright_turn(up: npt.ArrayLike) -> Array:
     """(3, 3): the smallest turn that makes a direction +Y."""
     axis = np.asarray(up, dtype=np.float64)
     if not (length := float(np.linalg.norm(axis))) > 0:
-        raise InputError(f"up {tuple(axis.tolist())}", "it is no direction", "give for example 0,0,1")
+        raise InputError(f"up {tuple(axis.tolist())}", "the vector is not a direction", "use a direction such as 0,0,1")
     axis = axis / length
     if axis[1] < -1.0 + 1e-12:
         return np.diag([1.0, -1.0, -1.0])

@@ -148,7 +148,9 @@ class Surface(Frozen):
                 continue
             if not isinstance(value, int | float | np.floating) or not least <= value <= most:
                 raise InputError(
-                    f"surface {field} {value!r}", f"not in {least:g} to {most:g}", "give a number in that range"
+                    f"surface {field} {value!r}",
+                    f"the value must lie in {least:g} to {most:g}",
+                    "use a number in this range",
                 )
             object.__setattr__(self, field, float(value))
         for field in ("color", "diffuse_transmission_color"):
@@ -156,7 +158,9 @@ class Surface(Frozen):
         object.__setattr__(self, "emissive", _color("emissive", self.emissive, MAX_RADIANCE))
         for field in TEXTURE_FIELDS:
             if not isinstance(value := getattr(self, field), Texture | None):
-                raise InputError(f"surface {field}", f"of type {type(value).__name__}", "use tl.Texture")
+                raise InputError(
+                    f"surface {field}", f"a texture cannot have the type {type(value).__name__}", "use a tl.Texture"
+                )
 
     @property
     def plain(self) -> bool:
@@ -191,7 +195,7 @@ def _color(field: str, color: ColorLike, most: float) -> Array:
         values = np.zeros(0)
     if values.shape != (3,) or not ((values >= 0) & (values <= most)).all():
         found = f"not three numbers in 0 to {most:g}"
-        raise InputError(f"surface {field} {color!r}", found, "give for example (1, 0.9, 0.8)")
+        raise InputError(f"surface {field} {color!r}", found, "use a color such as (1, 0.9, 0.8)")
     values.setflags(write=False)
     return values
 

@@ -49,21 +49,35 @@ class Texture(Frozen):
         try:
             pixels = np.array(self.pixels, dtype=np.float32, order="C")
         except (TypeError, ValueError):
-            raise InputError("texture", "its pixels are not numbers", "give an array (h, w, 3)") from None
+            raise InputError("texture", "the pixels are not numbers", "give an array of shape (h, w, 3)") from None
         if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or pixels.size == 0:
-            raise InputError("texture", f"pixels of shape {pixels.shape}", "give an array (h, w, 3) or (h, w, 4)")
+            raise InputError(
+                "texture", f"the pixels have the shape {pixels.shape}", "give an array of shape (h, w, 3) or (h, w, 4)"
+            )
         if wrong := np.count_nonzero(~((pixels >= 0) & (pixels <= 1))):
-            raise InputError("texture", f"{wrong} numbers are not in 0 to 1", "give linear values in that range")
+            raise InputError(
+                "texture", f"{wrong} numbers of the pixels are outside 0 to 1", "give linear values from 0 to 1"
+            )
         self._freeze("pixels", pixels)
         for field in ("scale", "offset"):
             pair = np.array(getattr(self, field), dtype=np.float64)
             if pair.shape != (2,) or not np.isfinite(pair).all():
-                raise InputError(f"texture {field} {getattr(self, field)!r}", "not two finite numbers", "give (u, v)")
+                raise InputError(
+                    f"texture {field} {getattr(self, field)!r}",
+                    "the value must be two finite numbers",
+                    "give two numbers (u, v)",
+                )
             self._freeze(field, pair)
         if not np.isfinite(self.rotation):
-            raise InputError(f"texture rotation {self.rotation!r}", "not finite", "give degrees")
+            raise InputError(
+                f"texture rotation {self.rotation!r}", "the rotation must be finite", "give the rotation in degrees"
+            )
         if len(self.wrap) != 2 or not set(self.wrap) <= set(get_args(Wrap)):
-            raise InputError(f"texture wrap {self.wrap!r}", "not two of repeat and clamp", 'give ("repeat", "repeat")')
+            raise InputError(
+                f"texture wrap {self.wrap!r}",
+                "the value must be two of the words repeat and clamp",
+                'write ("repeat", "repeat"), for example',
+            )
 
     def __repr__(self) -> str:
         return f"Texture({self.pixels.shape[1]}x{self.pixels.shape[0]})"

@@ -219,7 +219,9 @@ def fix_materials(
     """
     output, settings = Path(output), BakeSettings(size=size, rays=rays)
     if output.suffix.lower() != ".glb":
-        raise InputError(f"output {str(output)!r}", f"suffix {output.suffix!r}", "use .glb, which holds the maps, too")
+        raise InputError(
+            f"output {str(output)!r}", f"suffix {output.suffix!r}", "use .glb, which also holds the thickness maps"
+        )
     check_map_output(output)
     file = read_gltf(path, allow_outside)
     found = check_file(file)

@@ -122,7 +122,9 @@ class CausticsPass:
             textures = [self._gl.texture((PHOTON_WIDTH, BATCH // PHOTON_WIDTH), 4, dtype="f4") for _ in _LANDED]
             framebuffer = self._gl.framebuffer(textures)
         except moderngl.Error as error:
-            raise RenderError("caustics", f"OpenGL has no room for photons ({error})", "leave them out") from error
+            raise RenderError(
+                "caustics", f"OpenGL does not have enough memory for the photons ({error})", "render without caustics"
+            ) from error
         for resource in (framebuffer, *textures):
             stack.callback(resource.release)
         for texture in textures:

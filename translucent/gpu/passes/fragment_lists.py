@@ -69,8 +69,11 @@ class FragmentListsPass:
             else:
                 raise RenderError(
                     f"frame of {width}x{height} with FragmentLists",
-                    f"one row has {needed} surfaces, and this OpenGL holds {job.targets.buffers.largest // _NODE}",
-                    "use DepthPeeling",
+                    (
+                        f"one row of the picture has {needed} surfaces, but this OpenGL can store only "
+                        f"{job.targets.buffers.largest // _NODE}"
+                    ),
+                    "use the method DepthPeeling",
                 )
 
     def _nodes(self, job: FrameJob) -> moderngl.Buffer:

@@ -135,9 +135,9 @@ class LightViewsPass:
                 return found
         megabytes = job.resources.light_lists.largest / 1e6
         raise RenderError(
-            f"{len(job.scene.lights)} lights on media that scatter",
-            f"their lists do not fit into the {megabytes:.0f} MB that a shader of this OpenGL reaches",
-            "use fewer lights, or simpler bodies",
+            f"{len(job.scene.lights)} lights on scattering media",
+            (f"the sorted lists for these lights exceed the {megabytes:.0f} MB that a shader of this OpenGL can read"),
+            "use fewer lights, or meshes with fewer triangles",
         )
 
     def _look_closely(self, job: FrameJob, spec: PassSpec, side: int) -> LightLookup | None:

@@ -239,7 +239,7 @@ class PathTracer:
             framebuffer = self._gl.framebuffer(textures)
         except moderngl.Error as error:
             found = f"OpenGL has no room for the state of paths ({error})"
-            raise RenderError(f"path tracing {width}x{height}", found, "render smaller") from error
+            raise RenderError(f"path tracing {width}x{height}", found, "choose a smaller picture") from error
         for resource in (framebuffer, *textures):
             stack.callback(resource.release)
         stack.callback(self._rest.use)  # a released framebuffer must not be the bound one

@@ -43,4 +43,4 @@ def method_from_name(name: str) -> Method:
     except KeyError:
         close = difflib.get_close_matches(name.replace("_", "-").lower(), METHODS, n=1)
         do = f"did you mean {close[0]}?" if close else f"use one of {', '.join(METHODS)}"
-        raise InputError(f"method {name!r}", "not a known method", do) from None
+        raise InputError(f"method {name!r}", "no method has this name", do) from None

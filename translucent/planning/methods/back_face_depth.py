@@ -25,7 +25,9 @@ class BackFaceDepth(Method):
         """Refuse sheets."""
         if sheets := [scene.objects[i] for i in sheets_of(scene)]:
             raise InputError(
-                "BackFaceDepth", f"{object_names(sheets)} declared a sheet", "use SignedDepth or ThinLayer"
+                "BackFaceDepth",
+                f"{object_names(sheets)} declared as a thin-walled sheet",
+                "use SignedDepth or ThinLayer",
             )
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:

@@ -116,14 +116,18 @@ def check_count(what: str, value: object, most: int, *, least: int = 1, example:
     """Raise `InputError` unless a value is a whole number from `least` to `most`."""
     if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
         raise InputError(
-            f"{what} {brief(value)}", f"not a whole number in {least} to {most}", f"give for example {example}"
+            f"{what} {brief(value)}",
+            f"the value must be a whole number in {least} to {most}",
+            f"use a value such as {example}",
         )
 
 
 def check_method(method: object) -> None:
     """Raise `InputError` for what is no method; None leaves the choice to the planner."""
     if method is not None and not isinstance(method, Method):
-        raise InputError(f"method {brief(method)}", "not a thickness method", "give for example tl.SignedDepth()")
+        raise InputError(
+            f"method {brief(method)}", "this is not a thickness method", "use a method such as tl.SignedDepth()"
+        )
 
 
 #: What finds the surfaces that rays hit, by its names; and what plans call it.
@@ -136,7 +140,9 @@ EMBREE_COST = 0.5
 def check_hits(what: str, hits: str | None) -> None:
     """Raise `InputError` unless this is one of `HITS`, or None."""
     if hits is not None and hits not in HITS:
-        raise InputError(f"{what} hits {brief(hits)}", "not a known one", f"use {' or '.join(map(repr, HITS))}")
+        raise InputError(
+            f"{what} hits {brief(hits)}", "no ray caster has this name", f"use {' or '.join(map(repr, HITS))}"
+        )
 
 
 def chosen_hits(what: str, requested: str | None, software: bool, shader_storage: bool) -> tuple[str, str]:

@@ -47,7 +47,9 @@ class DepthPeeling(Method):
     def __post_init__(self) -> None:
         check_count("DepthPeeling max_layers", self.max_layers, MAX_LAYERS)
         if self.order not in (orders := ("both-ends", "front-to-back", "back-to-front")):
-            raise InputError(f"DepthPeeling order {self.order!r}", "not known", f"use one of {', '.join(orders)}")
+            raise InputError(
+                f"DepthPeeling order {self.order!r}", "no order has this name", f"use one of {', '.join(orders)}"
+            )
 
     @property
     def layer_limit(self) -> int:

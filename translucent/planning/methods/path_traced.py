@@ -61,7 +61,9 @@ class PathTraced(Method):
         check_count("PathTraced paths", self.paths, MAX_PATHS, least=2, example=64)
         if not isinstance(self.seed, int) or isinstance(self.seed, bool) or not 0 <= self.seed < 1 << 32:
             raise InputError(
-                f"PathTraced seed {self.seed!r}", "not a whole number in 0 to 2^32 - 1", "give for example 0"
+                f"PathTraced seed {self.seed!r}",
+                "the seed must be a whole number in 0 to 2^32 - 1",
+                "use a value such as 0",
             )
 
     def with_paths(self, paths: int) -> PathTraced:
@@ -72,7 +74,7 @@ class PathTraced(Method):
         """Refuse open bodies, layers, densities that vary, and sheets that scatter or are rough."""
         if scene.scatters_ambient:
             found = "it represents light that paths find anyway: light of the environment, and light scattered often"
-            raise InputError("PathTraced with ambient radiance", found, "leave ambient out")
+            raise InputError("PathTraced with ambient radiance", found, "omit the ambient radiance")
         for bodies, found, do in _refusals(scene):
             if bodies:
                 raise InputError(f"PathTraced of {object_names(bodies)}", found, do)

@@ -76,19 +76,23 @@ class RayMarched(Method):
         check_count("RayMarched steps", self.steps, MAX_STEPS)
         if self.quadrature not in (known := get_args(Quadrature)):
             raise InputError(
-                f"RayMarched quadrature {self.quadrature!r}", "not known", f"use one of {', '.join(known)}"
+                f"RayMarched quadrature {self.quadrature!r}",
+                "no quadrature has this name",
+                f"use one of {', '.join(known)}",
             )
         if self.quadrature == "gauss":
             check_count("RayMarched steps of gauss", self.steps, MAX_GAUSS_POINTS)
         if self.jitter and self.quadrature in ("jittered", "gauss"):
             raise InputError(
                 f"RayMarched quadrature {self.quadrature!r} with jitter",
-                "its samples have no fixed position in a step",
-                "leave jitter out, or use midpoint",
+                "the samples of this quadrature have no fixed position in a step",
+                "omit jitter, or use the quadrature midpoint",
             )
         if not isinstance(self.seed, int) or not 0 <= self.seed < 1 << 32:
             raise InputError(
-                f"RayMarched seed {self.seed!r}", "not a whole number in 0 to 2^32 - 1", "give for example 0"
+                f"RayMarched seed {self.seed!r}",
+                "the seed must be a whole number in 0 to 2^32 - 1",
+                "use a value such as 0",
             )
 
     @property
@@ -99,7 +103,9 @@ class RayMarched(Method):
     def check(self, scene: Scene) -> None:
         """Raise `InputError` for more Gauss-Legendre points than shaders hold."""
         if self.quadrature == "gauss" and self.steps > MAX_LIGHT_POINTS:
-            raise InputError(f"{self}", f"shaders hold {MAX_LIGHT_POINTS} Gauss-Legendre points", "use fewer steps")
+            raise InputError(
+                f"{self}", f"shaders support at most {MAX_LIGHT_POINTS} Gauss-Legendre points", "use fewer steps"
+            )
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
         """Passes: one draw of all solids, and the steps."""

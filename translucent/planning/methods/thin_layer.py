@@ -35,7 +35,11 @@ class ThinLayer(Method):
 
     def __post_init__(self) -> None:
         if not 0 < self.thickness <= MAX_COORDINATE:
-            raise InputError(f"ThinLayer thickness {self.thickness}", "not above 0", "give metres, for example 1e-3")
+            raise InputError(
+                f"ThinLayer thickness {self.thickness}",
+                "the thickness must be above 0",
+                "give the thickness in metres, for example 1e-3",
+            )
 
     @property
     def usual_thickness(self) -> float:

@@ -178,7 +178,7 @@ def whole(state: WindowState, label: str, name: str, empty: str = "") -> None:
         try:
             state.change(name, float(round(float(text))), step=True)
         except (ValueError, OverflowError):
-            error = InputError(f"{label} {text!r}", "not a number", "write for example 1920")
+            error = InputError(f"{label} {text!r}", "the text is not a number", "write a number such as 1920")
             state.work.refuse(error)
     return None
 
