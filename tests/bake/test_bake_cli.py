@@ -138,7 +138,7 @@ def test_the_medium_of_the_material_is_that_of_the_mode(run: Run, ball_glb: Path
     record = json.loads(sidecar_of(tmp_path / "t.glb").read_text())
     wanted = tl.Medium.from_color("#7b1e3a", 1.0).extinction
     np.testing.assert_allclose(record["settings"]["extinction"], wanted, rtol=1e-9)
-    refused(run(ball_glb, "-o", tmp_path / "x.glb", *mode), "mode 'transmittance'; no medium")
+    refused(run(ball_glb, "-o", tmp_path / "x.glb", *mode), "mode 'transmittance'; this mode needs a medium")
 
 
 # Errors

@@ -85,8 +85,8 @@ def test_an_open_body_is_marked_and_falls_back_to_a_sheet(method: Any, passes: l
         "marked invalid"
     )
     assert found.limits[0] == (
-        "'open box': 3 open edges (first: vertices (0, 1), (0, 3), (1, 3)): close the mesh, or declare it a thin-walled "
-        "sheet (sheet_thickness=..., --method thin-layer)"
+        "'open box': 3 open edges (first: vertices (0, 1), (0, 3), (1, 3)): close the mesh, or declare it "
+        "a thin-walled sheet (sheet_thickness=..., --method thin-layer)"
     )
     assert not found.exact
 
