@@ -418,7 +418,7 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
     [
         (["--batch", "none.csv"], "table 'none.csv'; no file has this path"),
         (["--batch", "."], "table '.'; the path is a folder"),
-        (["--batch", "empty.csv"], "table 'empty.csv'; no column 'name': the file is empty"),
+        (["--batch", "empty.csv"], "table 'empty.csv'; no column 'name': it is empty"),
         (["--batch", "head.csv"], "table 'head.csv'; the table has no rows; add at least one row"),
         (["--batch", "few.csv"], "no column 'distance': its first line says name, color"),
         (["--batch", "bytes.csv"], "not UTF-8 text"),

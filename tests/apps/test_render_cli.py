@@ -103,7 +103,7 @@ BAD_RENDER_OPTIONS = [
     (["--fov", "180"], "camera fov_y 180.0; the angle must lie between 0 and 180 degrees"),
     (["--fov", "nan"], "camera fov_y nan; the angle must lie between 0 and 180 degrees"),
     (["--fov", "wide"], "Invalid value for '--fov'"),
-    (["--samples", "0"], "samples 0; the number of samples must be a whole number in 1 to 4096"),
+    (["--samples", "0"], "samples 0; not a whole number in 1 to 4096"),
     (["--samples", "some"], "Invalid value for '--samples'"),
     (["--camera", "0"], "cube.ply is not a glTF file, so it has no cameras; use --eye"),
     (["--camera", "first"], "Invalid value for '--camera'"),

@@ -108,7 +108,7 @@ def test_a_color_can_be_written_so(written: object, linear: tuple[float, ...]) -
         (0.5, "the color has shape (), and not (3,)"),
         (((1, 1, 1),), "the color has shape (1, 3), and not (3,)"),
         ((1.0, float("nan"), 0.0), "a channel of the color is not a finite number"),
-        ((1, 2, "x"), "the parentheses must contain three numbers"),
+        ((1, 2, "x"), "a color needs three numbers"),
         (None, "shape"),
     ],
     ids=str,

@@ -109,8 +109,8 @@ def test_more_slots_than_a_ray_can_keep_apart_are_refused(method: Any) -> None:
     assert tl.plan(tl.Scene([body(medium) for medium in (*media[:-1], media[0])], CAMERA), method).ordered
     name = type(method or tl.FragmentLists()).__name__
     message = (
-        f"{name}; the scene has 17 groups of bodies (for each medium, priority and open mesh), more than the limit"
-        "bodies share media and priorities, or close them"
+        f"{name}; the scene has 17 groups of bodies (for each medium, priority and open mesh), more than the limit "
+        "of 16; use fewer different media and priorities, or close the open meshes"
     )
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
         tl.plan(tl.Scene([body(medium) for medium in media], CAMERA), method)

@@ -195,11 +195,11 @@ class BakeOptions:
 @click.argument("models", nargs=-1, required=True, metavar="MODEL...")
 @takes(BakeOptions)
 def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
-    """Bake the thickness of MODEL, a file or one of the toolkit's own meshes, into a map over its UVs.
+    """Bake the thickness of MODEL, which is a file or a built-in mesh, into a texture map over its UVs.
 
-    Values are metres; 0.2 in the map is 20 cm. A .glb gets thicknessFactor and thicknessTexture; all other content of a
-    .glb or .gltf MODEL stays. FILE.json next to each file is its record. --out-dir bakes many models, skips
-    finished ones, and goes on if one fails.
+    The values of the map are metres: 0.2 means 20 cm. A .glb output gets thicknessFactor and thicknessTexture. All
+    other content of a .glb or .gltf MODEL stays unchanged. The record of each output is written next to it, as
+    FILE.json. --out-dir bakes many models, skips finished models, and continues if one model fails.
 
     --mode scatter bakes the light that leaves the body after scattering: --mode scatter --preset wax -o candle.exr
     """
@@ -638,11 +638,13 @@ class LithophaneOptions:
 @click.argument("picture", type=click.Path(path_type=Path))
 @takes(LithophaneOptions)
 def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
-    """Make the relief of a plate that shows PICTURE before a light: thin where it is bright, thick where it is dark.
+    """Make a plate for 3D printing that shows PICTURE in front of a light: thin where PICTURE is bright, thick where it
+    is dark.
 
-    The luminance that passes goes linearly from that of the thickest place, for black, to that of the thinnest, for
-    white. The relief is then rendered before an even white light, and the difference is printed. Light is taken to go
-    straight through, so give the filament's --td, or a --color that you saw before a light at a --distance.
+    The thickest part of the plate shows black, the thinnest part shows white, and the luminance in between is
+    proportional to PICTURE. The command then renders the plate in front of a uniform white light, and prints the
+    difference from PICTURE. The command assumes that light passes straight through the plate, so give the filament's
+    --td, or a --color that you saw in front of a light at a --distance.
     """
     from translucent.bake.lithophane import check_lithophane_output, lithophane
     from translucent.media.filament import medium_of_td

@@ -31,7 +31,7 @@ _ONLY = click.option(
     epilog="Example: translucent benchmark list",
 )
 def benchmark() -> None:
-    """Thirty scenes with truth, to score any renderer of translucent things.
+    """Score any renderer on thirty scenes with translucent objects, whose true pictures are known.
 
     \b
     list     scenes, and renderers that can run on this machine
@@ -47,7 +47,7 @@ def benchmark() -> None:
 @_JSON
 @_DEBUG
 def list_scenes(as_json: bool, debug: bool) -> None:
-    """List the scenes with what each tests, and the renderers that can run on this machine."""
+    """List the scenes, the purpose of each scene, and the renderers that can run on this machine."""
     from translucent.benchmark.adapters import adapters
     from translucent.benchmark.scenes import SCENES
     from translucent.benchmark.truth import read_records
@@ -97,10 +97,10 @@ def export(folder: Path, only: str | None, debug: bool) -> None:
 @_JSON
 @_DEBUG
 def run(names: tuple[str, ...], output: Path, only: str | None, as_json: bool, debug: bool) -> None:
-    """Render the scenes by renderers that are installed here, and score them.
+    """Render the scenes with renderers that are installed on this machine, and score the pictures.
 
-    Results of each renderer are in DIR/ADAPTER/, and packed in DIR/ADAPTER.zip, the file to send. `all` stands for all
-    installed renderers.
+    The results of each renderer are written to DIR/ADAPTER/, and packed into DIR/ADAPTER.zip, which you can send to
+    others. The adapter name `all` selects all installed renderers.
     """
     from translucent.benchmark.adapters import adapter_named, adapters, run_adapter
     from translucent.benchmark.results import pack
@@ -153,10 +153,10 @@ def score(
     as_json: bool,
     debug: bool,
 ) -> None:
-    """Score pictures SCENE.exr or SCENE.npy in FOLDER: linear radiance at the size of the scene.
+    """Score the pictures SCENE.exr or SCENE.npy in FOLDER. The pictures hold linear radiance at the size of the scene.
 
-    Scores are written to FOLDER/results.json, and packed in FOLDER.zip, the file to send. Scenes without a picture are
-    not counted.
+    The scores are written to FOLDER/results.json, and packed into FOLDER.zip, which you can send to others. Scenes
+    without a picture are not counted.
     """
     from translucent.benchmark.results import floor_seconds, pack, read_results, scored, this_machine, today
     from translucent.benchmark.scenes import scene_named
@@ -208,7 +208,7 @@ def score(
 )
 @_DEBUG
 def page(places: tuple[Path, ...], output: Path, debug: bool) -> None:
-    """Write one self-contained page about results: folders of them, or .zip files."""
+    """Write one self-contained HTML page about results, which are folders or .zip files."""
     from translucent.benchmark.page import write_benchmark_page
     from translucent.benchmark.results import read_results, result_folders, scored
 
@@ -233,7 +233,7 @@ def page(places: tuple[Path, ...], output: Path, debug: bool) -> None:
 @_JSON
 @_DEBUG
 def merge(places: tuple[Path, ...], output: Path, as_json: bool, debug: bool) -> None:
-    """Join results of several renderers or machines: folders of them, or .zip files. Scores are computed anew."""
+    """Join the results of several renderers or machines, which are folders or .zip files. Scores are computed anew."""
     from translucent.benchmark.results import merge as merged
 
     with tempfile.TemporaryDirectory(prefix="translucent-benchmark-") as temporary:

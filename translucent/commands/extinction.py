@@ -136,18 +136,21 @@ class ExtinctionOptions:
 def extinction(
     context: click.Context, color: str | None, distance: str | None, given: ExtinctionOptions, as_json: bool
 ) -> None:
-    """Extinction of a medium that turns white light into COLOR after DISTANCE: sigma_t = -log(color) / distance.
+    """Compute the extinction of a medium that turns white light into COLOR after DISTANCE: sigma_t = -log(color) /
+    distance.
 
     COLOR is '#7b1e3a', 7b1e3a, teal, 'srgb(.5,.1,.2)', 'linear(.2,.6,.3)' or a pixel of an image, photo.png@120,45.
 
-    With --on MODEL and no DISTANCE, the result is the medium in which MODEL has COLOR on average, over its pixels in
-    front of white light. With a DISTANCE, --preset or --from, it is the average color of MODEL in that medium.
+    With --on MODEL and no DISTANCE, the result is the medium with which MODEL has COLOR on average, over its pixels in
+    front of white light. With --on MODEL and a DISTANCE, --preset or --from, the result is the average color of MODEL
+    filled with this medium.
 
     With --td D, the result is the gray medium of a filament with this transmission distance: translucent extinction
-    --td 4mm. Next to no light passes D, but makers differ on the fraction: --td-transmittance sets it.
+    --td 4mm. Almost no light passes a thickness of D. Makers of filament disagree on the exact fraction, which
+    --td-transmittance sets.
 
-    With --fit PHOTO, the result is the medium of plates in front of a light, with error bars. The reflection of their
-    faces is computed from --ior: translucent extinction --fit steps.jpg --white 10,10,60,60 --patch
+    With --fit PHOTO, the result is the medium of plates in front of a light, with error bars. The reflection at the
+    faces of the plates is computed from --ior: translucent extinction --fit steps.jpg --white 10,10,60,60 --patch
     90,10,400,60=1mm,2mm,4mm,8mm
     """
     from translucent.frames.appearance import appearance_of

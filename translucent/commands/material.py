@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @click.group(epilog="Example: translucent material show model.glb")
 def material() -> None:
-    """Show, replace or check the materials of a glTF file that light passes."""
+    """Show, replace or check the transmissive materials of a glTF file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +123,8 @@ class ApplyOptions:
 @click.argument("model")
 @takes(ApplyOptions)
 def apply(model: str, given: ApplyOptions, as_json: bool) -> None:
-    """Write a medium into MODEL's materials; a color keeps the index of refraction, and a preset replaces it."""
+    """Write a medium into the materials of MODEL. --color keeps the index of refraction of the file, and --preset
+    replaces it."""
     from translucent.gltf.write import write_medium
     from translucent.units import parse_length
 
@@ -170,12 +171,12 @@ class CheckOptions:
 def check(model: str, given: CheckOptions, as_json: bool) -> None:
     """Check the thickness and attenuation in MODEL, a .glb or .gltf file, against the thickness of its meshes.
 
-    Errors, warnings and notes are printed, each with what to change. For each body, the true color of the light that
-    passes is printed next to the colors that known viewers show. The exit code is 1 if there is an error (with --fix:
-    in OUTPUT), else 0.
+    The command prints errors, warnings and notes, each with a solution. For each body, the true color of the light that
+    passes is printed next to the colors that known viewers show. The exit code is 1 if MODEL has an error (with --fix:
+    if OUTPUT has an error), otherwise 0.
 
     --fix bakes thickness maps, sets metallicFactor of transmitting materials to 0 and removes doubleSided of volumes.
-    Errors of meshes, units and attenuations are only reported.
+    --fix does not correct errors of meshes, units and attenuations.
     """
     from translucent.bake.audit.check import check_materials, fix_materials
 

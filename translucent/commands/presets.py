@@ -30,11 +30,11 @@ _LISTED = ("name", "kind", "group", "regime", "colors", "diffuse_color", "source
 @common_options
 @click.pass_context
 def presets(context: click.Context, group: str | None, search: str | None, as_json: bool) -> None:
-    """List the named media: how they change light, and their colors.
+    """List the named media, with their effect on light and their colors.
 
-    The first three colors are those of white light after 1 mm, 1 cm and 10 cm in the medium. The fourth is the color of
-    a thick slab in white light, if the medium scatters. Terminals with colors also show slabs of 1, 5 and 20 mm on a
-    white and a black card. Presets of your own, .toml files that the previewer saves, come last.
+    The first three colors are the colors of white light after 1 mm, 1 cm and 10 cm in the medium. The fourth color, for
+    media that scatter, is the color of a thick slab in white light. Terminals with colors also show slabs of 1, 5 and
+    20 mm on a white card and on a black card. Your own presets, .toml files that the previewer saves, come last.
     """
     if context.invoked_subcommand is not None:
         return

@@ -187,10 +187,10 @@ class RenderOptions:
 @models_argument()
 @takes(RenderOptions)
 def render(model: str, given: RenderOptions, as_json: bool) -> None:
-    """Render a picture of MODEL, a file or one of the toolkit's own meshes, with its physical quantities.
+    """Render a picture of MODEL, which is a file or a built-in mesh, with its physical quantities.
 
-    The model stands on a ground with its shadow; see --stage. A .glb or .gltf file keeps its camera, lights and media;
-    --color, --preset or --scattering-color replaces the media. All other files hold one mesh.
+    By default, the model stands on a ground that shows its shadow; see --stage. A .glb or .gltf file keeps its camera,
+    lights and media; --color, --preset or --scattering-color replaces the media. All other files hold one mesh.
 
     Several models, each with its material: translucent render goblet:crystal wine:red_wine -o wine.png
 

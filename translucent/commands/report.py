@@ -71,11 +71,12 @@ class ReportOptions:
 @click.argument("models", nargs=-1, metavar="[MODEL...]")
 @takes(ReportOptions)
 def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None:
-    """Measure what each method costs and how wrong it is, on the toolkit's scenes and on each MODEL.
+    """Measure the speed and the error of each method, on built-in scenes and on each MODEL.
 
-    A MODEL is a file, or a mesh of the toolkit by name. --color or --preset fills it with a medium, and the report says
-    whether the error of each method would be visible. Opaque parts are not measured. Ctrl-C stops measuring, and the
-    finished scenes are written. Without -o and --compare, all numbers are printed, and no file is written.
+    A MODEL is a file or the name of a built-in mesh. --color or --preset fills each MODEL with a medium, and the report
+    states whether the error of each method would be visible. Opaque parts are not measured. Ctrl-C stops the
+    measurements, and the report contains the finished scenes. Without -o and --compare, all numbers are printed, and no
+    file is written.
     """
     from translucent.bench.judgement import agreement, compare_reports, machines_differ
     from translucent.bench.output import checked_folder, read_report, table, write_outputs

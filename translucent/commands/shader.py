@@ -102,14 +102,14 @@ process.stdout.write(JSON.stringify(answer));
 )
 @common_options
 def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Language, as_json: bool) -> None:
-    """Print the shader NAME as one text, with its constants and includes in place and without unused code.
+    """Print the shader NAME as a single text, with constants and included files inserted, and without unused code.
 
-    NAME is a file under shaders/; the file's name is enough if only one file has it. Without NAME, all shaders are
-    listed with their switches; --json adds the sets of values that each shader accepts.
+    NAME is the path of a file in shaders/, or its file name if no other file has the same name. Without NAME, the
+    command lists all shaders with their switches. --json also lists the sets of switch values that each shader accepts.
 
-    glsl is the GLSL of OpenGL 3.3, webgl2 that of WebGL2 and OpenGL ES 3.0, and vulkan that of Vulkan. Translators make
-    hlsl, msl (Metal) and wgsl (WebGPU) from the GLSL of Vulkan. They have to be installed: glslang and SPIRV-Cross, or
-    naga for wgsl.
+    The target glsl is GLSL for OpenGL 3.3, webgl2 is GLSL for WebGL2 and OpenGL ES 3.0, and vulkan is GLSL for Vulkan.
+    Translators convert the GLSL for Vulkan to hlsl, msl (Metal) and wgsl (WebGPU). These translators must be installed:
+    glslang and SPIRV-Cross, or naga for wgsl.
     """
 
     from translucent.gpu.lifting import find_shader, lift

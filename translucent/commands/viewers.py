@@ -73,10 +73,11 @@ class PreviewOptions:
 @models_argument(required=False)
 @takes(PreviewOptions)
 def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
-    """Open MODEL, a file or one of the toolkit's own meshes, in a window. Without MODEL, it opens a goblet.
+    """Open MODEL, which is a file or a built-in mesh, in a window. Without MODEL, the window shows a goblet.
 
-    With --script, the window runs the actions of the script, and closes; --screenshot saves a picture of the window. If
-    an action fails, the next ones still run; the exit code is then 2 for a wrong request, and 1 for any other failure.
+    With --script, the window runs the actions of the script, and closes. --screenshot saves a picture of the window. If
+    an action fails, the next actions still run, and the exit code is 2 for a wrong request, and 1 for any other
+    failure.
     """
     from translucent.preview.document import AUTO, Document, Look, Model
     from translucent.preview.script import Script, read_script
@@ -189,11 +190,11 @@ class PageOptions:
 @models_argument()
 @takes(PageOptions)
 def page(model: str, given: PageOptions, as_json: bool) -> None:
-    """Write MODEL, a file or one of the toolkit's own meshes, as a page that any browser with WebGL2 shows.
+    """Write MODEL, which is a file or a built-in mesh, as an HTML page for any browser with WebGL2.
 
-    The page is one file, which fetches nothing from the network. It shows the model to turn around, with the material
-    on a panel, the thickness in false colors, and a probe. It runs the passes of the renderer. Effects that it leaves
-    out are printed, and named on the page.
+    The page is one file, which fetches nothing from the network. On the page, you can turn the model, change its
+    material on a panel, show its thickness in false colors, and probe single pixels. The page runs the passes of the
+    renderer. The command prints the effects that the page leaves out, and the page lists them, too.
     """
     from translucent.files.paths import write_text_atomically
     from translucent.page.plans import plan_page, simplified, triangles
