@@ -86,7 +86,7 @@ def test_a_bright_color_is_not_touched_by_clamping(run: Run) -> None:
 def test_a_color_that_the_shell_took_for_a_comment_is_told(run: Run) -> None:
     hint = "a shell takes #... for a comment: quote it, '#7b1e3a', or leave the # out"
     assert f"Missing argument 'COLOR'. {hint[:1].upper()}{hint[1:]}" in one_error_line(run())
-    assert f"color ''; empty; {hint}" in one_error_line(run("", "1cm"))
+    assert f"color ''; the text is empty; {hint}" in one_error_line(run("", "1cm"))
 
 
 def test_a_filament_is_told_by_its_transmission_distance(run: Run) -> None:

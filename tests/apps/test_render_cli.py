@@ -281,7 +281,7 @@ class TestRendering:
             few = ("--size", "9x5", "--samples", "1", "--verbose")
             result = run("render", model, "-o", output, *few, "--interfaces", interfaces)
             assert (result.code, result.err) == (0, "")
-            assert ("leaves without bending" in result.out) == (interfaces == "front")
+            assert ("rays refract only where they enter a body" in result.out) == (interfaces == "front")
             with np.load(output) as arrays:
                 frames[interfaces] = arrays["radiance"], arrays["thickness"]
         assert (frames["screen"][0] != frames["front"][0]).any()

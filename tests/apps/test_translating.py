@@ -241,7 +241,7 @@ def test_what_a_translator_refuses_is_told_in_its_words(
     glslang()
     wrong = dataclasses.replace(lift(*STAGES["full"], "vulkan"), text="#version 450 core\nvoid main() { nothing(); }\n")
     monkeypatch.setattr(lifting, "lift", lambda *_: wrong)
-    with pytest.raises(tl.InputError, match=f"'a.frag' in (HLSL|WGSL); {said}.*; take another target"):
+    with pytest.raises(tl.InputError, match=f"'a.frag' in (HLSL|WGSL); {said}.*; choose another target"):
         translate("a.frag", {}, language)
 
 

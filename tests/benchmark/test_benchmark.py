@@ -177,10 +177,10 @@ class TestResultsOfStrangers:
         folder = unpacked(tmp_path / "a.zip", tmp_path / "out")
         assert [one.name for one in folder.iterdir()] == ["results.json"]
         assert not (tmp_path / "evil.txt").exists()
-        with pytest.raises(InputError, match="its format is not"):
+        with pytest.raises(InputError, match=r"the format of this results.json is not"):
             read_results(folder)
         (tmp_path / "b.zip").write_bytes(b"no archive")
-        with pytest.raises(InputError, match=r"not a \.zip"):
+        with pytest.raises(InputError, match=r"not a readable \.zip"):
             unpacked(tmp_path / "b.zip", tmp_path / "out2")
 
     def test_a_picture_of_another_size_or_type_says_what_to_do(self, tmp_path: Path) -> None:
@@ -191,7 +191,7 @@ class TestResultsOfStrangers:
             result = CliRunner().invoke(cli, ["benchmark", "score", str(folder)], standalone_mode=True)
             assert result.exception is not None
             failure = read_results(folder).scenes["thick-ball"].failure
-            assert ("do not crop" if number == 0 else "linear float radiance") in failure
+            assert ("do not crop" if number == 0 else "linear radiance as floats") in failure
 
 
 class TestCommand:

@@ -390,7 +390,7 @@ def test_a_picture_in_a_missing_buffer_is_an_error(tmp_path: Path) -> None:
 
 def test_a_picture_beyond_all_measure_is_refused(tmp_path: Path) -> None:
     black = png(np.zeros((7000, 7000), np.uint8))
-    with pytest.raises(tl.InputError, match=r"7000x7000 pixels need 561 MiB; .* at most 512 MiB are read; make it sm"):
+    with pytest.raises(tl.InputError, match=r"7000x7000 pixels take 561 MiB; .* at most 512 MiB are read; make it sm"):
         tl.load_scene(plate(tmp_path, base_color(), black))
 
 

@@ -386,7 +386,10 @@ def test_lists_that_no_buffer_holds_are_made_in_bands(monkeypatch: pytest.Monkey
 
 def test_a_buffer_that_opengl_cannot_hold_is_one_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Storage, "largest", property(lambda _: 1000))
-    with tl.Renderer() as renderer, pytest.raises(tl.RenderError, match=r"no room for 2 MB of surfaces.*DepthPeeling"):
+    with (
+        tl.Renderer() as renderer,
+        pytest.raises(tl.RenderError, match=r"not have enough memory for 2 MB of surface lists.*DepthPeeling"),
+    ):
         renderer.render(shells(3), (160, 120), tl.KBuffer(k=31))
 
 

@@ -108,13 +108,13 @@ class TestMaterialX:
     @pytest.mark.parametrize(
         ("old", "new", "message"),
         [
-            ("</materialx>", "", "XML is broken"),
+            ("</materialx>", "", "XML of the file is broken"),
             ('type="color3" value="0.18, 0.62, 0.35"', 'type="color3" value="0.18, 0.62"', "not three numbers"),
-            ('type="color3" value="0.18, 0.62, 0.35"', 'type="color3" nodename="x"', "comes from a node"),
+            ('type="color3" value="0.18, 0.62, 0.35"', 'type="color3" nodename="x"', "is connected to a node"),
             ('value="0.02"', 'value="deep"', "not a number"),
-            ('value="0.02"', 'value="-1"', "negative depth"),
+            ('value="0.02"', 'value="-1"', "the depth is negative"),
             ("0.18, 0.62, 0.35", "1.18, 0.62, 0.35", "outside 0..1"),
-            ("lin_rec709", "acescg", "color space 'acescg'"),
+            ("lin_rec709", "acescg", "the color space is 'acescg'"),
         ],
     )
     def test_a_bad_document_is_refused_in_one_line(self, surface: Any, old: str, new: str, message: str) -> None:
@@ -127,7 +127,7 @@ class TestMaterialX:
 
     def test_another_surface_is_refused(self, surface: Any) -> None:
         other = OPENPBR.write if surface[0] == STANDARD_SURFACE.write else STANDARD_SURFACE.write
-        with pytest.raises(tl.InputError, match="it has no <"):
+        with pytest.raises(tl.InputError, match="the file has no element <"):
             surface[1](other(JADE))
 
     def test_materialx_accepts_the_document(self, surface: Any) -> None:

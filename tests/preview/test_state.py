@@ -177,7 +177,7 @@ def test_sessions_with_the_former_switch_of_the_material_are_read(tmp_path: Path
     found = load_session(tmp_path / "a.toml")
     assert found == Document(material=Material(roughness=0.5))
     (tmp_path / "a.toml").write_text(text.replace("[material]", "[look]").replace("roughness", "exposure"))
-    with pytest.raises(tl.InputError, match="unknown key 'multiple_scattering'"):
+    with pytest.raises(tl.InputError, match="the key 'multiple_scattering' is unknown"):
         load_session(tmp_path / "a.toml")
 
 

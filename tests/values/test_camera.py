@@ -229,7 +229,7 @@ def test_a_size_is_two_whole_numbers(size: Any) -> None:
 
 @pytest.mark.parametrize("size", [(0, 3), (4, -1), (1.5, 2), (4,), (4, 3, 2), 4, None, ("a", 2), (np.nan, 2)], ids=repr)
 def test_a_frame_has_no_such_size(size: Any) -> None:
-    with pytest.raises(tl.InputError, match=re.escape(f"frame size {size!r}; not ")):
+    with pytest.raises(tl.InputError, match=re.escape(f"frame size {size!r}; the size must be ")):
         check_size(size)
 
 

@@ -138,7 +138,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(tl.InputError, match="not a NumPy array"):
         tl.DensityGrid.load(tmp_path / "text.npy")
     np.save(tmp_path / "object.npy", np.array([{}], dtype=object), allow_pickle=True)
-    with pytest.raises(tl.InputError, match="its values are of type 'object', and does not contain numbers"):
+    with pytest.raises(tl.InputError, match="its values are of type 'object', and not numbers"):
         tl.DensityGrid.load(tmp_path / "object.npy")
 
 

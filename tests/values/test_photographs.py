@@ -137,7 +137,7 @@ def test_what_is_no_line_and_photographs_that_differ_are_told() -> None:
 def test_steps_that_are_named_in_reverse_are_told(ior: float | None) -> None:
     reverse = [(where, float(d)) for (where, _), d in zip(PATCHES, STEPS[::-1], strict=True)]
     with pytest.raises(
-        tl.InputError, match=r"every channel is brighter where it is thicker.*in their order from the left"
+        tl.InputError, match=r"every channel is brighter where the plate is thicker.*in their order from the left"
     ):
         fit_photographs([Photograph(photograph(np.random.default_rng(3)), WHITE, reverse)], ior)
 
@@ -146,7 +146,9 @@ def test_steps_in_reverse_are_told_where_a_channel_is_clear() -> None:
     """Red, of noise alone, neither brightens nor darkens; named the right way round, green and blue are found."""
     clear = photograph(np.random.default_rng(3), sigma=np.array([0.0, *SIGMA[1:]]))
     reverse = [(where, float(d)) for (where, _), d in zip(PATCHES, STEPS[::-1], strict=True)]
-    with pytest.raises(tl.InputError, match=r"green and blue are brighter where it is thicker.*no channel is darker"):
+    with pytest.raises(
+        tl.InputError, match=r"green and blue are brighter where the plate is thicker.*no channel is darker"
+    ):
         fit_photographs([Photograph(clear, WHITE, reverse)])
 
 

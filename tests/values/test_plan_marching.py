@@ -80,5 +80,5 @@ def test_bodies_of_varying_density_have_slots_of_their_own() -> None:
     found = medium_slots(scene(body(), body(density=density), body(), body(density=density)))
     assert [slot.objects for slot in found] == [(0, 2), (1,), (3,)]
     crowd = [body(density=density) for _ in range(17)]
-    with pytest.raises(tl.InputError, match="17 winding numbers for each ray"):
+    with pytest.raises(tl.InputError, match="17 groups of bodies"):
         plan(scene(*crowd))

@@ -14,9 +14,7 @@ from translucent.planning.plan import plan
 
 @pytest.mark.parametrize("method", ["RayMarched", "signed-depth", tl.ThinLayer, 3])
 def test_what_is_no_method_is_refused(method: Any) -> None:
-    with pytest.raises(
-        tl.InputError, match=r"^method .*; the value must be a thickness method; give for example tl.SignedDepth\(\)"
-    ):
+    with pytest.raises(tl.InputError, match=r"^method .*; not a thickness method; give for example tl.SignedDepth\(\)"):
         plan(scene(body()), method)
 
 

@@ -121,7 +121,7 @@ def test_open_bodies_and_priorities_use_up_slots() -> None:
     ranks = [body(priority=i) for i in range(MAX_SLOTS)]
     for bodies, overlap in ((open_bodies, "union"), (ranks, "priority")):
         assert tl.plan(tl.Scene(bodies, CAMERA, overlap=overlap)).ordered  # type: ignore[arg-type]
-        with pytest.raises(tl.InputError, match="17 winding numbers"):
+        with pytest.raises(tl.InputError, match="17 groups of bodies"):
             tl.plan(tl.Scene([*bodies, body(priority=-1)], CAMERA, overlap=overlap))  # type: ignore[arg-type]
 
 
@@ -171,7 +171,10 @@ def test_the_bounds_are_those_of_the_turned_body() -> None:
 @pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.BackFaceDepth(), tl.ThinLayer(), tl.FragmentLists()])
 def test_two_media_of_one_priority_must_not_claim_one_place(method: Any) -> None:
     wine = body(WINE, OPEN, (0.5, 0, 0), priority=4)
-    message = "overlap=\"priority\"; objects 1 ('box') and 2 ('open box') may overlap, have different media, and"
+    message = (
+        "overlap=\"priority\"; objects 1 ('box') and 2 ('open box') may overlap, have different media, and both have "
+        "the priority 4; give a higher priority to the object that displaces the other"
+    )
     scene = tl.Scene([body(at=(9, 0, 0)), body(priority=4), wine], CAMERA, overlap="priority")
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
         tl.plan(scene, method)
@@ -189,12 +192,12 @@ def test_two_media_of_one_priority_must_not_claim_one_place(method: Any) -> None
 )
 def test_other_bodies_of_one_priority_are_clear(objects: list[tl.Object]) -> None:
     require_clear_priorities(tl.Scene(objects, CAMERA, overlap="priority"))
-    with pytest.raises(tl.InputError, match="both have priority 0"):
+    with pytest.raises(tl.InputError, match="both have the priority 0"):
         require_clear_priorities(tl.Scene([*objects, body(WINE)], CAMERA, overlap="priority"))
 
 
 def test_emission_alone_makes_a_contradiction() -> None:
-    with pytest.raises(tl.InputError, match="may overlap with different media, and both have priority 0"):
+    with pytest.raises(tl.InputError, match="may overlap, have different media, and both have the priority 0"):
         require_clear_priorities(tl.Scene([body(), body(FIRE)], CAMERA, overlap="priority"))
 
 

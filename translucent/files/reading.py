@@ -161,7 +161,7 @@ def require_room(requested: str, found: str, size: int, stored: int, do: str = "
     """
     if size > (allowed := max(FREE, RATIO * stored)):
         limit = f"of so small a file at most {size_text(allowed)} are read"
-        raise InputError(requested, f"{found} need {size_text(size)}; {limit}", do)
+        raise InputError(requested, f"{found} take {size_text(size)}; {limit}", do)
 
 
 def size_text(size: int) -> str:

@@ -220,9 +220,7 @@ def parse_value(what: str, key: str, parts: list[str], default: float | Array, s
         numbers = np.zeros(0)
     if numbers.shape != (1 if scalar else 3,) or not np.isfinite(numbers).all():
         kind = "a number" if scalar else "three numbers"
-        raise InputError(
-            what, f"the value of {key} is {', '.join(parts)!r}, and not of type {kind}", "correct this value"
-        )
+        raise InputError(what, f"the value of {key} is {', '.join(parts)!r}, and not {kind}", "correct this value")
     if scalar:
         return float(numbers[0])
     if space not in (*_LINEAR, _SRGB):

@@ -79,7 +79,7 @@ class RenderRequest(Flags):
                 do = f"give {', '.join(others)} or {last}" if others else f"give for example {last}"
                 if name == "interfaces" and isinstance(value, str) and value in _OLD_NAMES:
                     do = f"write interfaces=tl.{_OLD_NAMES[value]}"
-                raise InputError(f"{name} {brief(value)}", f"the value must be {what}", do)
+                raise InputError(f"{name} {brief(value)}", f"not {what}", do)
         if self.denoise and (self.transparent or self.over_backdrop):
             what = "a transparent frame" if self.transparent else "a backdrop"
             do = "leave out one of the two"
