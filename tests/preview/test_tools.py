@@ -173,7 +173,7 @@ def test_time_moves_what_the_file_animates_and_undo_goes_back(tmp_path: Path) ->
         work.close()
 
 
-def test_a_snapshot_is_right_of_the_split(work: Workspace) -> None:
+def test_a_snapshot_is_right_of_the_split(work: Workspace, quick_pictures: None) -> None:
     """The left half is what is on show, the right one what was kept."""
     view = ViewportRenderer()
     try:
