@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -195,3 +196,27 @@ def test_camera_lights_and_pictures_of_base_colors(tmp_path: Path) -> None:
     at = np.array(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st_color").Get())
     plain = tl.Texture(pixels, wrap=texture.wrap)
     np.testing.assert_allclose(plain.sample(at), texture.sample(painted.mesh.uv), atol=1e-5)
+
+
+def test_an_environment_is_a_picture_as_openexr_maps_directions(tmp_path: Path) -> None:
+    """+Z is in the middle, +X to the left of it; here -Z and the right. Rotation and exposure are in the pixels."""
+    OpenEXR = pytest.importorskip("OpenEXR", reason="the extra exr is not installed")
+    pixels = np.random.default_rng(3).uniform(0, 2, (8, 16, 3)).astype(np.float32)
+    for environment, expected in (
+        (tl.Environment.image(pixels), np.roll(pixels, 8, axis=1)),
+        (tl.Environment.image(pixels, rotation=90, exposure=1), 2 * np.roll(pixels, 4, axis=1)),
+    ):
+        scene = dataclasses.replace(scene_of(tl.Object(box(), JADE)), environment=environment)
+        path = tl.write_usd(scene, tmp_path / "stage.usda")
+        assert complaints(path) == []
+        stage = Usd.Stage.Open(str(path))
+        dome = UsdLux.DomeLight(stage.GetPrimAtPath("/World/Lights/environment"))
+        assert dome.GetTextureFormatAttr().Get() == "latlong"
+        with OpenEXR.File(str(tmp_path / dome.GetTextureFileAttr().Get().path), separate_channels=True) as read:
+            held = np.stack([read.channels()[name].pixels for name in "RGB"], axis=2)
+        np.testing.assert_allclose(held, expected, rtol=1e-5)
+    with pytest.warns(tl.TranslucentWarning, match="a checkerboard environment: it is fixed to the picture"):
+        tl.write_usd(
+            dataclasses.replace(scene, environment=tl.Environment.checkerboard((1, 1, 1), (0, 0, 0))),
+            tmp_path / "b.usda",
+        )

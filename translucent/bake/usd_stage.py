@@ -9,8 +9,11 @@ neither transmission nor volume. Textures of base colors lie beside the stage, i
 Lights have the units of UsdLux with ``normalize``: a sphere, or a point, of an intensity I in W/sr has 4 I there, since
 of its surface 4 pi r^2 one side shows pi r^2; a distant light of the angle 0 has its irradiance.
 
-Not written: other environments than constants and gradients, other textures, coats, films, dispersion, and media that
-emit or vary in density; a warning names the objects that have one of them.
+An environment is a dome. A gradient or a picture lies beside the stage (``name.environment.exr``), with directions as
+OpenEXR maps them, which UsdLux asks for.
+
+Not written: checkerboards, other textures, coats, films, dispersion, and media that emit or vary in density; a warning
+names them.
 Source: OpenUSD, UsdGeom (stage metrics, primvars, cameras), UsdLux (normalize), UsdShade.
 """
 
@@ -35,6 +38,7 @@ from translucent.files.images import write_exr
 from translucent.files.paths import require_output, write_atomically
 from translucent.geometry.normals import corner_normals
 from translucent.materials.materialx import OPENPBR, transmission_inputs
+from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, SphereLight, SpotLight
 from translucent.scene.scene import Object, Scene, object_names
 from translucent.scene.surface import Surface
@@ -54,7 +58,7 @@ def write_usd(scene: Scene, path: str | Path, thickness: Sequence[VertexThicknes
     Parameters
     ----------
     scene : Scene
-        Its objects, camera, lights, and an environment that is constant or a gradient.
+        Its objects, camera, lights and environment.
     path : path
         A .usda (text), .usdc or .usd file.
     thickness : sequence of VertexThickness
@@ -110,13 +114,9 @@ def write_usd(scene: Scene, path: str | Path, thickness: Sequence[VertexThicknes
                 _add_texture(stage, material, item, mesh, f"./{file.name}")
         _add_camera(stage, scene)
         _add_lights(stage, scene)
-        if scene.environment.kind == "gradient":
-            # All columns are alike, so that nothing depends on where the middle of a picture is.
-            height = np.cos((np.arange(_SKY_ROWS) + 0.5) * np.pi / _SKY_ROWS)
-            directions = np.stack([np.sqrt(1.0 - height**2), height, np.zeros(_SKY_ROWS)], axis=1)
-            rows = scene.environment.lighting(directions)
+        if scene.environment.kind in ("gradient", "image"):
             file = path.with_name(f"{path.stem}.environment.exr")
-            pictures[file] = np.broadcast_to(rows[:, None], (_SKY_ROWS, 2 * _SKY_ROWS, 3))
+            pictures[file] = _sky(scene.environment)
             dome = _pxr("UsdLux")[0].DomeLight.Define(stage, "/World/Lights/environment")
             dome.CreateTextureFileAttr(f"./{file.name}")
             dome.CreateTextureFormatAttr("latlong")
@@ -300,6 +300,20 @@ def _add_lights(stage: Any, scene: Scene) -> None:
         _shine(lux.DomeLight.Define(stage, "/World/Lights/environment"), radiance)
 
 
+def _sky(environment: Environment) -> Array:
+    """Radiance (h, 2 h, 3) of all directions as OpenEXR maps them: +Y up, +Z in the middle, +X to the left of it."""
+    rows = _SKY_ROWS if environment.map is None else environment.map.pixels.shape[0]
+    polar = (np.arange(rows) + 0.5)[:, None] * np.pi / rows
+    longitude = np.pi - (np.arange(2 * rows) + 0.5) * np.pi / rows
+    across = np.sin(polar)
+    directions = (
+        across * np.sin(longitude),
+        np.broadcast_to(np.cos(polar), (rows, 2 * rows)),
+        across * np.cos(longitude),
+    )
+    return environment.lighting(np.stack(directions, axis=-1))
+
+
 def _shine(light: Any, power: Array) -> None:
     """Intensity, and color below 1, of a light."""
     (gf,) = _pxr("Gf")
@@ -311,8 +325,8 @@ def _shine(light: Any, power: Array) -> None:
 def _left_out(scene: Scene) -> list[tuple[list[Object], str]]:
     """Objects with what a stage here does not hold."""
     default = Surface()
-    if scene.environment.kind not in ("constant", "gradient"):
-        found = f"an environment of type {scene.environment.kind!r}: stages here have domes of one color, and gradients"
+    if scene.environment.kind == "checkerboard":
+        found = "a checkerboard environment: it is fixed to the picture, and domes of stages surround the scene"
         warnings.warn(f"{found}; it is not written", TranslucentWarning, stacklevel=4)
     groups = [
         ([item for item in scene.objects if item.density is not None], "densities that vary"),
