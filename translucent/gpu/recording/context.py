@@ -300,6 +300,10 @@ class RecordedProgram:
     def __getitem__(self, name: str) -> RecordedUniform:
         return (self._blocks | self._merged | self.uniforms)[name]
 
+    def get(self, name: str, default: RecordedUniform | None) -> RecordedUniform | None:
+        """Uniform of this name, or the default."""
+        return (self._blocks | self._merged | self.uniforms).get(name, default)
+
     def __iter__(self) -> Iterator[str]:
         return iter([*self.uniforms, *self._blocks, *self.inputs])
 
