@@ -204,5 +204,5 @@ def test_seeds_and_refusals() -> None:
     mapped = Surface(normal_texture=Texture(np.ones((1, 1, 3))))
     with pytest.raises(InputError, match=r"normal_texture.*refraction=False"):
         path_trace(Scene([Object(unwrapped, CLEAR, surface=mapped)], CAMERA), (2, 2))
-    with pytest.raises(InputError, match="a sheet that scatters"):
+    with pytest.raises(InputError, match="the sheet scatters light"):
         path_trace(Scene([Object(BALL, Medium(1.0, 1.0, ior=1.5), sheet_thickness=0.1)], CAMERA), (2, 2))
