@@ -308,7 +308,11 @@ class Checkpoint:
         for name, array in found.items():
             own = getattr(canvas, name)
             if (array.shape, array.dtype) != (own.shape, own.dtype):
-                raise InputError(requested, f"the stored array {name} has the shape {array.shape}, and not {own.shape}", "delete the file")
+                raise InputError(
+                    requested,
+                    f"the stored array {name} has the shape {array.shape}, and not {own.shape}",
+                    "delete the file",
+                )
             setattr(canvas, name, array)
 
     def keep(self, canvas: Canvas) -> None:
