@@ -99,7 +99,7 @@ class BakeOptions:
     mode: str = option(
         "cone",
         type=click.Choice(MODES),
-        help="Definition of thickness. The mode scatter bakes scattered light instead of thickness.",
+        help="Definition of thickness, or scattered light.",
     )
     size: int = option(
         1024, metavar="N", help=(f"Number of texels along each side of the map; default with --mode scatter: {SIZE}.")
@@ -109,7 +109,7 @@ class BakeOptions:
         metavar="N",
         help=("With --mode scatter: resolution of the diffusion grid, 8 to 128; a body gets about N^3 / 4 cells."),
     )
-    rays: int = option(64, metavar="N", help="Number of rays for each point of the surface.")
+    rays: int = option(64, metavar="N", help="Rays per surface point.")
     spread: float = option(180.0, metavar="DEG", help="Full angle of the cone of rays around the inward normal.")
     weighting: str = option(
         "cosine", type=click.Choice(["cosine", "uniform"]), help="Weighting of the ray directions in the cone."

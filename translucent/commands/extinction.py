@@ -61,7 +61,7 @@ class ExtinctionOptions:
     target: str | None = option(
         names=("--as",),
         type=NamesOf("translucent.materials", "TARGETS"),
-        help="Print the material in the format of this engine.",
+        help="Print the material for this engine.",
     )
     ior: float | None = option(
         metavar="N", help=("With --as and --fit PHOTO: index of refraction. Default: the index of the medium, or 1.")
@@ -79,11 +79,8 @@ class ExtinctionOptions:
     fit: tuple[Path, ...] = option(
         (),
         metavar="FILE",
-        help=(
-            "Fit a medium to one of: a .csv file with rows distance,color[,weight]; a photograph of "
-            "plates in front of a light, with --white and --patch (repeat --fit for more exposures); a "
-            ".toml file that lists such photographs."
-        ),
+        help="Fit a medium to a .csv file with rows distance,color[,weight], to photographs of plates with "
+        "--white and --patch, or to a .toml file of such photographs.",
     )
     white: str | None = option(
         metavar="X,Y,W,H",
@@ -98,7 +95,7 @@ class ExtinctionOptions:
             "be repeated."
         ),
     )
-    preset: str | None = option(metavar="NAME", help="Use a named medium instead of a color at a distance.")
+    preset: str | None = option(metavar="NAME", help="Use a named medium.")
     source: str | None = option(
         names=("--from",),
         metavar="FILE",
@@ -106,7 +103,7 @@ class ExtinctionOptions:
     )
     td: str | None = option(
         metavar="D",
-        help=("Use the transmission distance of a filament for 3D printing instead of a color: 4mm, or 4 (in mm)."),
+        help="Transmission distance of a 3D printing filament: 4mm.",
     )
     td_transmittance: float | None = option(
         metavar="T",
@@ -146,8 +143,7 @@ def extinction(
     filled with this medium.
 
     With --td D, the result is the gray medium of a filament with this transmission distance: translucent extinction
-    --td 4mm. Almost no light passes a thickness of D. Makers of filament disagree on the exact fraction, which
-    --td-transmittance sets.
+    --td 4mm. Almost no light passes a thickness of D. --td-transmittance sets the exact fraction.
 
     With --fit PHOTO, the result is the medium of plates in front of a light, with error bars. The reflection at the
     faces of the plates is computed from --ior: translucent extinction --fit steps.jpg --white 10,10,60,60 --patch

@@ -243,7 +243,7 @@ class MediumOptions:
     color: str | None = option(
         metavar="C", help="Color that the medium transmits: '#7b1e3a', salmon, 'linear(.18,.62,.35)'."
     )
-    distance: str | None = option(metavar="D", help="Distance after which light has the color of --color: 2cm, 0.8in.")
+    distance: str | None = option(metavar="D", help="Distance after which light has this color: 2cm.")
     preset: str | None = option(metavar="NAME", help="A named medium, such as merlot.")
     clamp: bool | None = clamp_option()
 
@@ -404,7 +404,7 @@ class FileOptions:
     unit: str | None = option(
         metavar="U", help="Unit of the coordinates in the file: mm, cm, in, ... or 25mm. Default: m."
     )
-    height: str | None = option(metavar="L", help="Scale the model to this height along the +Y axis: 12cm.")
+    height: str | None = option(metavar="L", help="Scale the model to this height: 12cm.")
     longest: str | None = option(metavar="L", help="Scale the model so that its longest side has this length: 12cm.")
     allow_outside: bool = outside_option()
     draft_extensions: bool = option(
@@ -453,10 +453,7 @@ class CameraOptions:
     )
     orbit: str | None = option(
         metavar="YAW,PITCH",
-        help=(
-            "View the model from these angles in degrees: the first turns around the +Y axis (0: front, "
-            "90: +X), the second goes upwards: 30,15."
-        ),
+        help="View the model from these angles in degrees: around +Y (0: front, 90: +X), and upwards: 30,15.",
     )
     fit: float | None = option(
         type=click.FloatRange(0.0, 1.0, min_open=True),

@@ -103,7 +103,7 @@ class RenderOptions:
     output: Path = option(
         names=("-o", "--output"),
         required=True,
-        help="Output file: .png, .exr or .npz; for other outputs see --turntable and --as.",
+        help="Output file: .png, .exr or .npz.",
     )
     system: str | None = option(
         names=("--as",),
@@ -134,13 +134,13 @@ class RenderOptions:
         ),
     )
     file: FileOptions = group(FileOptions)
-    size: str = option("1280x720", metavar="WxH", help="Size of the picture in pixels, such as 1280x720.")
+    size: str = option("1280x720", metavar="WxH", help="Size of the picture.")
     camera: CameraOptions = group(CameraOptions)
     stage: str | None = stage_option()
     ground: str | None = ground_option()
     look: LookOptions = group(LookOptions)
     choices: ChoiceOptions = group(ChoiceOptions)
-    samples: int = option(16, metavar="N", help="Number of samples per pixel. More samples make edges smoother.")
+    samples: int = option(16, metavar="N", help="Number of samples per pixel.")
     denoise: bool = option(
         False,
         help=(
@@ -187,7 +187,7 @@ class RenderOptions:
 @models_argument()
 @takes(RenderOptions)
 def render(model: str, given: RenderOptions, as_json: bool) -> None:
-    """Render a picture of MODEL, which is a file or a built-in mesh, with its physical quantities.
+    """Render a picture of MODEL, which is a file or a built-in mesh.
 
     By default, the model stands on a ground that shows its shadow; see --stage. A .glb or .gltf file keeps its camera,
     lights and media; --color, --preset or --scattering-color replaces the media. All other files hold one mesh.
