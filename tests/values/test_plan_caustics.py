@@ -196,7 +196,7 @@ def test_numbers_of_photons_that_make_no_sense_are_refused(photons: Any) -> None
     ):
         tl.Caustics(photons)
     with pytest.raises(
-        tl.InputError, match=r"caustics 7; the value must be tl\.Caustics; give for example tl.Caustics"
+        tl.InputError, match=r"caustics 7; not tl\.Caustics; give for example tl.Caustics"
     ):
         plan(scene(), caustics=7)  # type: ignore[arg-type]
     with pytest.raises(tl.InputError, match="Caustics seed -1"):
