@@ -195,9 +195,7 @@ def test_numbers_of_photons_that_make_no_sense_are_refused(photons: Any) -> None
         tl.InputError, match=r"Caustics photons .*; the value must be a whole number in 0 to 1073741824"
     ):
         tl.Caustics(photons)
-    with pytest.raises(
-        tl.InputError, match=r"caustics 7; not tl\.Caustics; give for example tl.Caustics"
-    ):
+    with pytest.raises(tl.InputError, match=r"caustics 7; not tl\.Caustics; give for example tl.Caustics"):
         plan(scene(), caustics=7)  # type: ignore[arg-type]
     with pytest.raises(tl.InputError, match="Caustics seed -1"):
         tl.Caustics(seed=-1)
