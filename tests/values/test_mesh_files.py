@@ -140,8 +140,8 @@ def test_the_winding_of_a_nasty_file_is_mended_aloud(
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("empty.stl", "it has no faces"),
-        ("points_bin.ply", "it has no faces; give a triangle mesh, not points"),
+        ("empty.stl", "the mesh has no faces"),
+        ("points_bin.ply", "the mesh has no faces; use a mesh of triangles, not of points"),
         ("huge_Cray_right.obj", "a coordinate of 3.4e+38 m, beyond 1e+18 m"),
     ],
 )

@@ -200,7 +200,7 @@ def _many(checks: Checks) -> None:
         for medium, body in zip(media, objects, strict=False)
     ]
     crowd = Scene(glowing, scene.camera)
-    checks.refused("60 media that emit, whose order counts,", lambda: checks.renderer.plan(crowd), "winding numbers")
+    checks.refused("60 media that emit, whose order counts,", lambda: checks.renderer.plan(crowd), "groups of bodies")
 
 
 #: Largest error of transmittance in the rays of texels, as the report claims it.
