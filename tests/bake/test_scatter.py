@@ -83,11 +83,11 @@ def test_a_ball_gives_back_each_harmonic_as_itself() -> None:
     depth = np.array([2 / 3, 3 / 4, 16 / 15]) * free_path
     wanted = np.array([1, 2 / 3, 1 / 4]) * (1 - band * depth) / (1 + band * 2 / 3 * free_path)
     wanted *= 1 - band * (band + 1) / 256
-    # Measured: -0.1 %, -0.3 % and -0.9 %, at most 1.3 %; at resolutions of 24 and 32 up to 2.2 % and 1.5 %.
+    # Measured: -0.1 %, -0.3 % and -0.9 %, at most 1.3 %; at resolutions of 24 and 32 up to 2.2 and 1.5 %.
     np.testing.assert_allclose(shares[:, 0], wanted[BANDS], rtol=0.015)
     # Where light is absorbed, less comes back; of higher bands as well.
     assert (shares[:, 2] < 0.8 * shares[:, 0]).all()
-    # Cells as long as four free paths, with a few samples of the surface in each: measured 0.0027 at 32, and 0.0041 at 16.
+    # Cells as long as four free paths, with a few samples of the surface in each: 0.0027 at 32, 0.0041 at 16.
     rest = values - shares * basis[..., None]
     assert np.sqrt((rest**2).mean(axis=0)).max() < 0.004
 
