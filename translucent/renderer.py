@@ -248,7 +248,9 @@ class Renderer:
         if request.over_backdrop:
             _check_backdrop(backdrop, size)
         elif backdrop is not None:
-            raise InputError("a transparent frame", "the frame also has a backdrop", "omit one of the two")
+            raise InputError(
+                "a transparent frame", "the frame also has a backdrop", "omit the backdrop, or transparent=True"
+            )
         request = dataclasses.replace(request, pixels=size[0] * size[1])
         plan = self.plan_requested(scene, request)
         if request.denoise:

@@ -170,7 +170,7 @@ def test_what_bends_light_stops_it_on_its_straight_way() -> None:
         ),
         (scene(body(tl.Medium(1.0)), body(None, 3.0)), {}, "caustics; no interface of 'box' bends or mirrors light"),
         (scene(body()), {}, "caustics; no opaque object receives the light, and no other body scatters it"),
-        (scene(), {"method": tl.PathTraced()}, "omit one of the two"),
+        (scene(), {"method": tl.PathTraced()}, "omit the caustics, or choose another method"),
         (scene(), {"method": tl.ThinLayer()}, "it treats every face as a sheet, which refracts no light"),
         (
             scene(body(density=tl.LinearDensity(1, 0.0, 1.0)), body(None, 3.0)),

@@ -116,7 +116,9 @@ def check_job(job: Job) -> None:
     of_maps = [key for key in (*_OF_MAPS, "normalize", "invert", "resume") if job.get(key) or settings.get(key)]
     if job.get("vertices") and of_maps:
         raise InputError(
-            "thickness is baked per vertex", f"{of_maps[0]} applies only to thickness maps", "omit one of the two"
+            "thickness is baked per vertex",
+            f"{of_maps[0]} applies only to thickness maps",
+            f"omit {of_maps[0]}, or bake a thickness map",
         )
     if suffix == ".glb" and settings.get("tile") is not None:
         raise InputError(

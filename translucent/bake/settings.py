@@ -264,7 +264,8 @@ def job_for(name: str, job: dict[str, Any]) -> dict[str, Any]:
         do = f"write {Path(program.name).suffix}, or give a folder"
         raise InputError(f"output {str(output)!r}", f"{name} reads {Path(program.name).suffix}", do)
     if other := [key for key in ("normalize", "invert", "vertices") if job.get(key)]:
-        raise InputError(f"--for {name}", f"--{other[0]} and --for exclude each other", "omit one of the two")
+        found = f"--{other[0]} and --for exclude each other"
+        raise InputError(f"--for {name}", found, f"omit --for or --{other[0]}")
     return {**job, "output": str(output), **program.storing}
 
 

@@ -220,7 +220,9 @@ def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
     if given.usd is not None:
         if other := [name for name in named if name in _REFUSED_BY_USD]:
             raise InputError(
-                f"--usd {given.usd}", f"{_option(other[0])} cannot be combined with --usd", "omit one of the two"
+                f"--usd {given.usd}",
+                f"{_option(other[0])} cannot be combined with --usd",
+                f"omit --usd, or omit {_option(other[0])}",
             )
         if len(models) != 1:
             raise InputError(

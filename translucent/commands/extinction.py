@@ -223,7 +223,7 @@ def _check_usage(given: ExtinctionOptions, color: str | None, as_json: bool) -> 
         )
     if given.batch is not None and given.target is not None:
         raise InputError(
-            f"--as {given.target}", "--as converts a single color, but --batch converts many", "omit one of the two"
+            f"--as {given.target}", "--as converts a single color, but --batch converts many", "omit --as or --batch"
         )
     if not given.fit and (given.white is not None or given.patch):
         raise InputError(

@@ -305,7 +305,8 @@ def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pict
             raise InputError(wrong[0], found, "these two options exclude each other: omit one of them")
         return
     if given.transparent and given.opaque_with is None and given.output.suffix.lower() == ".mp4":
-        raise InputError("--transparent", "a film format cannot store a transparent background", "omit one of the two")
+        found = "a film format cannot store a transparent background"
+        raise InputError("--transparent", found, "omit --transparent, or write pictures instead of a film")
     if given.opaque_with is None:
         return
     interfaces = request.interfaces
@@ -322,7 +323,7 @@ def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pict
     }
     for requested, (clash, why) in clashes.items():
         if clash:
-            raise InputError(requested, f"--opaque-with, {why}", "omit one of the two")
+            raise InputError(requested, f"--opaque-with, {why}", f"omit --opaque-with, or omit {requested}")
 
 
 class Pictures:

@@ -85,7 +85,9 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
     measuring = models or given.quick or given.size or given.methods or given.backend or given.limit is not None
     if source is not None and not parts and (measuring or filling.color or filling.distance or filling.preset):
         raise InputError(
-            f"--from {source}", "--from measures nothing, so this option has no effect", "omit one of the two"
+            f"--from {source}",
+            "--from measures nothing, so this option has no effect",
+            "omit --from to measure, or omit MODEL, its medium and the options of a measurement",
         )
     if models and parts and "scenes" not in parts:
         do = "add scenes, or leave MODEL out"

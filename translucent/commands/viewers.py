@@ -92,7 +92,7 @@ def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
         raise InputError(
             f"--session {str(session)!r}",
             f"{model} is given, too, but a session already names its model",
-            "omit one of the two",
+            "omit MODEL, or omit --session",
         )
     if not 0.5 <= given.scale <= 4.0:
         raise InputError(f"--scale {given.scale}", "the scale must lie in 0.5 to 4", "use a value such as 2")

@@ -285,7 +285,9 @@ def _depth(patch: _Mean, white: _Mean, what: str, left_out: list[str]) -> tuple[
     if (bright & (patch.saturated <= MOST_LIMITED)).any():
         channel = int(np.flatnonzero(bright)[0])
         found = f"{CHANNELS[channel]} {patch.mean[channel]:.3g} is above the white's {white.mean[channel]:.3g}"
-        raise InputError(what, found, "choose white rectangles in which nothing covers the same light")
+        raise InputError(
+            what, found, "choose a white rectangle that shows the light behind the patches, with nothing in front of it"
+        )
     noisy = patch.variance > (MOST_ERROR * patch.mean) ** 2
     for limited, why in (
         (patch.saturated > MOST_LIMITED, "saturated"),

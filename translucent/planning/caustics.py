@@ -146,7 +146,7 @@ def check_caustics(scene: Scene, method: Method | None, lit: tuple[int, ...]) ->
             if method.follows_paths
             else "it treats every face as a sheet, which refracts no light"
         )
-        raise InputError(f"caustics with {method}", found, "omit one of the two")
+        raise InputError(f"caustics with {method}", found, "omit the caustics, or choose another method")
     _check_paths(scene, lit)
 
 
@@ -220,7 +220,7 @@ def _check_paths(scene: Scene, lit: tuple[int, ...]) -> None:
         raise InputError("caustics", found, "add a ground: tl.Object(mesh)")
     if uneven := [body for body in scene.bodies if body.density is not None]:
         found = f"the density of {object_names(uneven)} varies, and photons follow even media"
-        raise InputError("caustics", found, "omit one of the two")
+        raise InputError("caustics", found, "omit the caustics, or give these bodies the same density everywhere")
     if rough := [
         body
         for body in scene.bodies

@@ -144,8 +144,8 @@ def layer_effects(scene: Scene, *, interfaces: bool) -> list[Note]:
         )
         effects.append(Note(NoteKind.LAYERS, text))
     if emitting := object_names(scene.objects[i] for i in emitting_bodies(scene)):
-        what = "add it only where a ray first enters a body" if interfaces else "not at all"
-        effects.append(Note(NoteKind.GLOW, f"light of surfaces that emit: {emitting} {what}"))
+        where = "behind the first surface on each ray" if interfaces else "in the whole picture"
+        effects.append(Note(NoteKind.GLOW, f"light that surfaces emit is missing {where}: {emitting}"))
     if cut := object_names(item for item in scene.bodies if _wants_holes(item)):
         text = f"holes by alpha_cutoff: {cut} drawn closed, since a solid with a hole has no inside"
         effects.append(Note(NoteKind.HOLES, text))

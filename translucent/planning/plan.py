@@ -546,7 +546,8 @@ def _check_backdrop(scene: Scene, request: RenderRequest) -> None:
         )
     if isinstance(request.method, PathTraced):
         found = "the objects of a backdrop have no mesh that a path could meet"
-        raise InputError(f"{request.method} in front of a backdrop", found, "omit one of the two")
+        do = "omit the backdrop, or choose another method"
+        raise InputError(f"{request.method} in front of a backdrop", found, do)
     if request.interfaces is not None and request.interfaces.traced:
         found = "the objects of a backdrop have no mesh that a ray could meet"
         raise InputError(f"{request.interfaces} in front of a backdrop", found, "use ScreenInterfaces() instead")

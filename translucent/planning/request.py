@@ -82,8 +82,8 @@ class RenderRequest(Flags):
                 raise InputError(f"{name} {brief(value)}", f"not {what}", do)
         if self.denoise and (self.transparent or self.over_backdrop):
             what = "a transparent frame" if self.transparent else "a backdrop"
-            do = "leave out one of the two"
+            do = f"omit denoise, or omit {what.removeprefix('a ')}"
             raise InputError("denoise", f"{what}: the difference between two pictures cannot be denoised", do)
         if self.over_backdrop and self.caustics is not None:
             found = "the objects of a backdrop have no mesh that light could land on"
-            raise InputError("caustics in front of a backdrop", found, "omit one of the two")
+            raise InputError("caustics in front of a backdrop", found, "omit the caustics or the backdrop")
