@@ -76,7 +76,7 @@ class Renderer:
             raise InputError(
                 f"backend {backend!r}",
                 "a context is given, too, and it already determines the backend",
-                "give only one of the two",
+                "omit the backend or the context",
             )
         self._plans: WeakKeyDictionary[Scene, dict[RenderRequest, RenderPlan]] = WeakKeyDictionary()
         self._closed = False

@@ -39,8 +39,14 @@ def test_the_plan_of_paths_is_explained(run: Run) -> None:
     [
         (("bear", "--paths", 4), "--paths; this option applies only to --method path-traced; add --method path-traced"),
         ((*JADE, "--paths", 1), "PathTraced paths 1; the value must be a whole number in 2 to 1048576"),
-        ((*JADE, "--interfaces", "traced"), "path tracing replaces interfaces; give only one of the two"),
-        ((*JADE, "--scattering", "single"), "path tracing replaces scattering; give only one of the two"),
+        (
+            (*JADE, "--interfaces", "traced"),
+            "path tracing replaces interfaces; omit interfaces, or choose another method",
+        ),
+        (
+            (*JADE, "--scattering", "single"),
+            "path tracing replaces scattering; omit scattering, or choose another method",
+        ),
         ((*JADE, "--backend", "cpu"), "use tl.reference.path_trace(scene, size, paths), or an OpenGL backend"),
     ],
 )

@@ -132,7 +132,7 @@ def _check_high(high: Mesh | None, cage: Mesh | None, high_distance: float | Non
         raise InputError(
             "both a cage and a ray distance are set",
             "each of them determines where rays search for the detailed mesh",
-            "give only one of the two",
+            "give either the cage or the distance",
         )
 
 

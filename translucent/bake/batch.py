@@ -455,7 +455,7 @@ def bake_tiles(job: Job, progress: Progress | None = None) -> tuple[Record, Resu
         raise InputError(
             f"output {job['output']!r}",
             "--tile bakes one tile, but <UDIM> in the name bakes all tiles",
-            "use only one of the two",
+            "omit --tile, or remove <UDIM> from the name",
         )
     parts = _tiled_parts(job)
     tiles = sorted({tile for mesh, _, _ in parts for tile in tiles_of(mesh)} - {0})

@@ -108,7 +108,9 @@ class WebSession:
             told = self._page.evaluate("(order) => window.drawScene(order)", {"home": _HOME + "scene/", "size": width})
         except Exception as error:
             said = "; ".join([*self._errors[:2], str(error).splitlines()[0]])
-            raise RenderError("a browser", said, "read its script in benchmark/peers") from error
+            raise RenderError(
+                f"drawing {scene.name!r} in a browser", said, "look for the error in translucent/benchmark/peers"
+            ) from error
         values = np.frombuffer(base64.b64decode(told["pixels"]), np.float32)
         side = round((values.size / 3) ** 0.5)
         fine = values.reshape(side, side, 3)

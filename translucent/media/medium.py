@@ -72,7 +72,7 @@ class Medium(Frozen):
                 raise InputError(
                     f"medium anisotropy {self.anisotropy}",
                     f"the phase function {self.phase} already determines the anisotropy",
-                    "give only one of the two",
+                    "give either anisotropy or phase",
                 )
             object.__setattr__(self, "anisotropy", self.phase.mean_cosine)
         if not -1 < self.anisotropy < 1:

@@ -71,7 +71,7 @@ def read_own_presets(folder: Path | None = None) -> tuple[dict[str, Preset], lis
             if name in found:
                 wrong.append(
                     InputError(
-                        what, f"the preset [{name}] is also defined in another file", "rename one of the two presets"
+                        what, f"the preset [{name}] is also defined in another file", "rename one of these presets"
                     )
                 )
             found.setdefault(name, one)

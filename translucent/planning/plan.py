@@ -528,7 +528,9 @@ def _check_paths(scene: Scene, request: RenderRequest, method: PathTraced, machi
     for what, requested in (("interfaces", request.interfaces), ("scattering", request.scattering)):
         if requested is not None:
             raise InputError(
-                f"{method} with {what}={requested}", f"path tracing replaces {what}", "give only one of the two"
+                f"{method} with {what}={requested}",
+                f"path tracing replaces {what}",
+                f"omit {what}, or choose another method",
             )
     if not machine.opengl:
         found = "paths are followed by OpenGL, and this renderer works on the CPU"
