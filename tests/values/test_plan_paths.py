@@ -59,7 +59,7 @@ def test_nobody_gets_paths_unasked() -> None:
         ([body()], NoteKind.LIGHTS_LEFT_OUT, "polished interfaces refract"),
         ([body(surface=Surface(dispersion=1.0))], NoteKind.REFRACTION, "refract all colors alike"),
         ([body(surface=Surface(clearcoat=0.5, clearcoat_roughness=0.2))], NoteKind.COATS, "roughness of clear coats"),
-        ([body(surface=Surface(emissive=(1, 1, 1)))], NoteKind.GLOW, "light that surfaces emit is missing"),
+        ([body(surface=Surface(emissive=(1, 1, 1)))], NoteKind.GLOW, "light that surfaces emit: missing"),
     ],
 )
 def test_what_no_path_shows_is_told(objects: list[tl.Object], kind: NoteKind, words: str) -> None:

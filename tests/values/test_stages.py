@@ -192,7 +192,7 @@ def test_light_has_to_fall_evenly_on_a_shadow_catcher():
     flat = tl.Object(tl.Mesh([[0, 0, 0], [0, 0, 1], [1, 0, 0]], [[0, 1, 2]]), shadow_catcher=True)
     scene = tl.Scene([flat], CAMERA)
     assert page_radiance(scene) == 1
-    with pytest.raises(tl.InputError, match="a light illuminates the shadow catcher unevenly"):
+    with pytest.raises(tl.InputError, match="a light at a finite distance illuminates the shadow catcher unevenly"):
         page_radiance(dataclasses.replace(scene, lights=[tl.PointLight((0, 1, 0), 1.0)]))
     with pytest.raises(tl.InputError, match="no light of one of the colors"):
         page_radiance(dataclasses.replace(scene, environment=tl.Environment.constant((1, 1, 0))))

@@ -69,7 +69,7 @@ def hole_limits(scene: Scene, method: Method) -> list[Note]:
             )
         else:
             continue
-        notes.append(Note(NoteKind.OPEN_MESH, f"{mesh.name!r}: {text}; the method FragmentLists can find out"))
+        notes.append(Note(NoteKind.OPEN_MESH, f"{mesh.name!r}: {text}; the method FragmentLists finds such rays"))
     return notes
 
 
@@ -145,7 +145,7 @@ def layer_effects(scene: Scene, *, interfaces: bool) -> list[Note]:
         effects.append(Note(NoteKind.LAYERS, text))
     if emitting := object_names(scene.objects[i] for i in emitting_bodies(scene)):
         where = "behind the first surface on each ray" if interfaces else "in the whole picture"
-        effects.append(Note(NoteKind.GLOW, f"light that surfaces emit is missing {where}: {emitting}"))
+        effects.append(Note(NoteKind.GLOW, f"light that surfaces emit: missing {where} ({emitting})"))
     if cut := object_names(item for item in scene.bodies if _wants_holes(item)):
         text = f"holes by alpha_cutoff: {cut} drawn closed, since a solid with a hole has no inside"
         effects.append(Note(NoteKind.HOLES, text))

@@ -173,7 +173,7 @@ def _irradiance(scene: Scene, item: Object) -> Array:
         )
     if any(not isinstance(light, DirectionalLight) for light in scene.lights):
         do = "use DirectionalLight, or render without transparency"
-        raise InputError(what, "a light illuminates the shadow catcher unevenly", do)
+        raise InputError(what, "a light at a finite distance illuminates the shadow catcher unevenly", do)
     irradiance = scene.environment.irradiance_on(normal)
     for light in scene.lights:
         irradiance = irradiance + light.irradiance_on(np.zeros(3), normal)

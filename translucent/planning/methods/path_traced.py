@@ -110,7 +110,11 @@ class PathTraced(Method):
             text = f"roughness of clear coats: {object_names(rough)} have polished ones"
             notes.append(Note(NoteKind.COATS, text))
         if emitting := [body for body, surface in surfaces if surface.glows]:
-            notes.append(Note(NoteKind.GLOW, f"light that surfaces emit is missing: {object_names(emitting)}"))
+            notes.append(
+                Note(
+                    NoteKind.GLOW, f"light that surfaces emit: missing in the whole picture ({object_names(emitting)})"
+                )
+            )
         return tuple(notes)
 
 
