@@ -530,7 +530,7 @@ class _SceneFile:
                 direction = -direction_from(*map(float, values["orbit"]))
             return framing(objects, self.size, fov, up, stage, direction, values.get("fit"))
         if extra := [key for key in ("orbit", "fit") if key in values]:
-            raise InputError(extra[0], "the key eye is given, too", "use only one of the two")
+            raise InputError(extra[0], "the key eye is given, too", f"omit eye or {extra[0]}")
         bounds = np.array([item.bounds for item in objects])
         middle = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
         eye, target = ([self.factor * _coordinate(v) for v in values.get(key, ())] for key in ("eye", "target"))
