@@ -1,7 +1,8 @@
 """Render the truth of the benchmark's scenes, and test it against two other renderers.
 
 ``python tools/benchmark_truth.py [NAME ...]``: those named, else all that are missing or whose scene has changed, into
-translucent/benchmark/truth/. ``--judge`` renders the others alone, and leaves the stored pictures as they are.
+translucent/benchmark/truth/. ``--judge`` renders the others alone, and leaves the
+stored pictures as they are; ``--seconds`` gives them longer.
 
 The stored halves are random paths of `PathTraced`, for their number: the reference takes ten to fifty times as long.
 The judges are that reference (`translucent.reference.path_trace`: NumPy, float64, other code), and Mitsuba 3 (extra
@@ -15,6 +16,8 @@ import importlib
 import sys
 import time
 import warnings
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +38,7 @@ from translucent.benchmark.truth import (
     truth_path,
     write_records,
 )
+from translucent.interop.mitsuba import units_per_metre
 
 #: Noise of a half that is wanted: of clear scenes, and of those that scatter.
 WANTED, WANTED_SCATTERING = 0.028, 0.076
@@ -79,7 +83,9 @@ def means(fine: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     return fine.reshape(size[1], len(fine) // size[1], size[0], len(fine) // size[1], -1).mean(axis=(1, 3))
 
 
-def by_reference(scene: BenchmarkScene, truth: tuple[np.ndarray, np.ndarray]) -> TruthAgreement:
+def by_reference(
+    scene: BenchmarkScene, truth: tuple[np.ndarray, np.ndarray], seconds: float = JUDGE_SECONDS
+) -> TruthAgreement:
     """The float64 reference, at half the size, as long as its time allows: by random paths where media scatter or
     opaque objects are, and else by rays that take every branch (`light_over_pixels`), which have less noise.
     """
@@ -89,19 +95,21 @@ def by_reference(scene: BenchmarkScene, truth: tuple[np.ndarray, np.ndarray]) ->
     if "scattering" in scene.needs or "shadows" in scene.needs or "sheets" in scene.needs or scene.sharp:
         tl.reference.path_trace(made, (16, 16), 8, 5, spread=True)
         each = (time.process_time() - begin) / 8 * (size[0] / 16) ** 2
-        paths = int(np.clip(JUDGE_SECONDS / max(each, 1e-3), 8, 256))
+        paths = int(np.clip(seconds / max(each, 1e-3), 8, 256 * max(seconds / JUDGE_SECONDS, 1)))
         frame, error = tl.reference.path_trace(made, size, paths, 5, spread=True)
         return agreement_with("reference, random paths", paths, halved, (frame.radiance, error))
     everywhere = np.ones(size[::-1], bool)
     parts = []
-    while len(parts) < 4 or (time.process_time() - begin < JUDGE_SECONDS and len(parts) < 16):
+    while len(parts) < 4 or (time.process_time() - begin < seconds and len(parts) < 16):
         found, _ = tl.reference.light_over_pixels(made, size, everywhere, 2, 1e-5, 128, len(parts))
         parts.append(found.reshape(*size[::-1], 3))
     error = np.std(parts, axis=0, ddof=1) / np.sqrt(len(parts))
     return agreement_with("reference, all branches", 2 * len(parts), halved, (np.mean(parts, axis=0), error))
 
 
-def by_mitsuba(scene: BenchmarkScene, truth: tuple[np.ndarray, np.ndarray]) -> TruthAgreement:
+def by_mitsuba(
+    scene: BenchmarkScene, truth: tuple[np.ndarray, np.ndarray], seconds: float = JUDGE_SECONDS
+) -> TruthAgreement:
     """Mitsuba 3, in batches with seeds of their own."""
     try:
         mitsuba: Any = importlib.import_module("mitsuba")
@@ -113,7 +121,7 @@ def by_mitsuba(scene: BenchmarkScene, truth: tuple[np.ndarray, np.ndarray]) -> T
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            described = tl.to_mitsuba(made, scene.size, samples=TRIAL)
+            described = nested(made, scene.size) if made.overlap == "priority" else tl.to_mitsuba(made, scene.size)
         described["sensor"]["far_clip"] = 1e9  # of a body 2000 m away
         loaded = mitsuba.load_dict(described)
     except tl.InputError as error:
@@ -122,15 +130,72 @@ def by_mitsuba(scene: BenchmarkScene, truth: tuple[np.ndarray, np.ndarray]) -> T
     pair = [np.array(mitsuba.render(loaded, spp=TRIAL, seed=seed), np.float64) for seed in (90, 91)]
     each = (time.process_time() - begin) / (2 * TRIAL)
     noise = float(np.sqrt(((pair[0] - pair[1]) ** 2).mean() / 2) / pair[0].mean())
-    paths = int(np.clip(TRIAL * (noise / JUDGE_NOISE) ** 2, 256, JUDGE_SECONDS / max(each, 1e-4)))
+    paths = int(np.clip(TRIAL * (noise / JUDGE_NOISE) ** 2, 256, seconds / max(each, 1e-4)))
     parts = np.stack([np.array(mitsuba.render(loaded, spp=paths // BATCHES + 1, seed=s)) for s in range(BATCHES)])
     parts = parts.astype(np.float64)
     error = parts.std(axis=0, ddof=1) / np.sqrt(BATCHES)
     return agreement_with(name, paths, truth, (parts.mean(axis=0), error), EXPLAINED.get(scene.name, ""))
 
 
+def nested(made: tl.Scene, size: tuple[int, int]) -> dict[str, Any]:
+    """Bodies in each other for Mitsuba: each interface once, with the medium on either side of it.
+
+    A face belongs to its body where that body has the highest priority of all just behind the face, and not just
+    before it. `to_mitsuba` describes the rest of the scene, and each body by itself.
+    """
+    bodies = made.bodies
+    alone = [tl.to_mitsuba(replace(made, objects=[body]), size) for body in bodies]
+    units = np.array([units_per_metre(replace(made, objects=[body])) for body in bodies])
+    larger = units.min() / units
+    described = dict(alone[int(units.argmin())])
+    del described["object_0"]
+    for one, factor in zip(alone, larger, strict=True):
+        one["object_0"]["interior"]["scale"] /= factor
+    ranks = np.array([body.priority for body in bodies] + [-np.inf])
+    away = 1e-4 * made.diagonal
+    for i, body in enumerate(bodies):
+        corners = body.mesh.vertices[body.mesh.faces] @ body.matrix[:3, :3].T + body.matrix[:3, 3]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals *= away / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+        middle = corners.mean(axis=1)
+        before, behind = (winners(bodies, middle + side * normals) for side in (1.0, -1.0))
+        path = Path(alone[i]["object_0"]["filename"])
+        header, data = path.read_bytes().split(b"end_header\n", 1)
+        vertices = np.frombuffer(data, "<f4", 18 * len(corners)).reshape(-1, 3, 6) * np.float32(
+            [larger[i]] * 3 + [1] * 3
+        )
+        for other in np.unique(before):
+            kept = (behind == i) & (before == other) & (ranks[before] < body.priority)
+            if not kept.any():
+                continue
+            part = path.with_name(f"{i}-{other}.ply")
+            count = int(kept.sum())
+            faces = np.zeros(count, np.dtype([("count", "u1"), ("corners", "<i4", 3)]))
+            faces["count"], faces["corners"] = 3, np.arange(3 * count).reshape(-1, 3)
+            text = header.replace(b"vertex %d\n" % (3 * len(corners)), b"vertex %d\n" % (3 * count))
+            text = text.replace(b"face %d\n" % len(corners), b"face %d\n" % count)
+            part.write_bytes(text + b"end_header\n" + vertices[kept].tobytes() + faces.tobytes())
+            shape = {**alone[i]["object_0"], "filename": str(part)}
+            if other < len(bodies):
+                outside = bodies[other].medium
+                shape["bsdf"] = {**shape["bsdf"], "ext_ior": float(outside.ior)}
+                shape["exterior"] = alone[other]["object_0"]["interior"]
+            described[f"interface_{i}_{other}"] = shape
+    return described
+
+
+def winners(bodies: Sequence[tl.Object], points: np.ndarray) -> np.ndarray:
+    """Index of the body with the highest priority at each point; the number of bodies where there is none."""
+    found = np.full(len(points), len(bodies))
+    for i in sorted(range(len(bodies)), key=lambda i: bodies[i].priority):
+        found[[bodies[i].winding_number(point) > 0.5 for point in points]] = i
+    return found
+
+
 #: Why Mitsuba differs on a scene.
-EXPLAINED: dict[str, str] = {}
+EXPLAINED = dict.fromkeys(
+    ("frosted-ball", "frosted-pebble"), "its rough dielectrics have no scattering among facets, and lose light"
+)
 
 
 def is_current(scene: BenchmarkScene) -> bool:
@@ -146,7 +211,8 @@ def is_current(scene: BenchmarkScene) -> bool:
 @click.argument("names", nargs=-1)
 @click.option("--judge", is_flag=True, help="Leave the stored pictures; render the judges anew.")
 @click.option("--larger", default=1, help="Write pictures so many times as wide and high into out/truth/ instead.")
-def main(names: tuple[str, ...], judge: bool, larger: int) -> None:
+@click.option("--seconds", default=JUDGE_SECONDS, help="Processor time of each judge for each scene.")
+def main(names: tuple[str, ...], judge: bool, larger: int, seconds: float) -> None:
     """Render truths that are missing or out of date, or those NAMED."""
     records = read_records()
     chosen = [scene_named(name) for name in names] or [
@@ -161,9 +227,9 @@ def main(names: tuple[str, ...], judge: bool, larger: int) -> None:
                 found = stored_truth_of(scene)
                 before = records.get(scene.name)
                 spread = np.abs(found.halves[0].astype(np.float64) - found.halves[1]) / 2
-                judge_of(scene, found, spread, 0.0 if before is None else before.seconds)
+                judge_of(scene, found, spread, 0.0 if before is None else before.seconds, seconds)
                 continue
-            halves, error, paths, seconds = halves_of(renderer, scene, size, judged)
+            halves, error, paths, taken = halves_of(renderer, scene, size, judged)
             if larger > 1:
                 folder = Path("out/truth")
                 folder.mkdir(parents=True, exist_ok=True)
@@ -174,20 +240,21 @@ def main(names: tuple[str, ...], judge: bool, larger: int) -> None:
             found = TruthPicture(halves, mask, thickness, scene_parameters(scene.make()), 2 * paths)
             truth_path(scene.name).parent.mkdir(exist_ok=True)
             found.write(truth_path(scene.name))
-            judge_of(scene, found, error, seconds)
+            judge_of(scene, found, error, taken, seconds)
 
 
-def judge_of(scene: BenchmarkScene, found: TruthPicture, error: np.ndarray, seconds: float) -> None:
+def judge_of(scene: BenchmarkScene, found: TruthPicture, error: np.ndarray, taken: float, seconds: float) -> None:
     """Let the judges render a scene, and keep and print what they say of its truth with a standard error (h, w, 3)."""
-    agreements = by_reference(scene, (found.radiance, error)), by_mitsuba(scene, (found.radiance, error))
-    write_records({**read_records(), scene.name: TruthRecord(found.paths, found.noise, seconds, agreements)})
+    truth = found.radiance, error
+    agreements = by_reference(scene, truth, seconds), by_mitsuba(scene, truth, seconds)
+    write_records({**read_records(), scene.name: TruthRecord(found.paths, found.noise, taken, agreements)})
     said = "; ".join(
         f"{one.renderer}: {one.within:.1%} within 4, bias {one.bias:+.2%}, noise {one.noise:.1%}, {one.paths}"
         if one.paths
         else f"{one.renderer}: {one.explained}"
         for one in agreements
     )
-    print(f"{scene.name}: {found.paths} paths, {seconds:.0f} s, noise {found.noise:.2%}; {said}", flush=True)
+    print(f"{scene.name}: {found.paths} paths, {taken:.0f} s, noise {found.noise:.2%}; {said}", flush=True)
 
 
 if __name__ == "__main__":

@@ -239,7 +239,9 @@ def _scene_part(scene: BenchmarkScene, results: Sequence[Results]) -> ScenePart:
             said.append(f"{judge.renderer}: not compared ({judge.explained})")
             continue
         text = f"{judge.renderer}: {judge.within:.1%} of the pixels within 4 standard errors, mean {judge.bias:+.2%}"
-        said.append(text if judge.within >= AGREEING else f"{text}; {judge.explained or 'not explained'}")
+        text = f"{text}, noise of {judge.noise:.1%}"
+        why = judge.explained or ("" if judge.within >= AGREEING else "not explained")
+        said.append(f"{text}; {why}" if why else text)
     plot = _plot([(row.ratio, row.nrmse, row.color, row.name) for row in rows])
     return ScenePart(scene, _shown(truth.radiance / white), truth.noise, said, rows, others, plot)
 
