@@ -23,6 +23,7 @@ from typing import Any
 
 import click
 import numpy as np
+import trimesh
 
 import translucent as tl
 from translucent.bench.truth import scene_parameters
@@ -188,7 +189,9 @@ def winners(bodies: Sequence[tl.Object], points: np.ndarray) -> np.ndarray:
     """Index of the body with the highest priority at each point; the number of bodies where there is none."""
     found = np.full(len(points), len(bodies))
     for i in sorted(range(len(bodies)), key=lambda i: bodies[i].priority):
-        found[[bodies[i].winding_number(point) > 0.5 for point in points]] = i
+        mesh, matrix = bodies[i].mesh, np.linalg.inv(bodies[i].matrix)
+        solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+        found[solid.contains(points @ matrix[:3, :3].T + matrix[:3, 3])] = i
     return found
 
 
