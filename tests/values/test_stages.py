@@ -25,6 +25,7 @@ from translucent.scene.stages import (
     upright_turn,
     world_vertices,
 )
+from translucent.scene.studio import cove_radiance, studio_radiance
 
 SIZE = (160, 90)
 BOX = Box((-1.0, -0.5, -0.25), (1.0, 0.5, 0.25)).tessellate()
@@ -255,3 +256,11 @@ def test_far_away_the_studio_is_as_bright_as_its_backdrop() -> None:
     irradiance = environment.irradiance_on((0, 1, 0)) + np.sin(np.radians(key.elevation)) * np.array(key.irradiance)
     far = chosen.far * np.asarray(chosen.ground.color) * irradiance / np.pi
     np.testing.assert_allclose(far, environment.lighting(np.array([0.0, 0.02, -1.0])), rtol=0.06)
+
+
+def test_the_stage_of_the_studio_has_no_black_bars() -> None:
+    """Flat faces of clear bodies would mirror the dark cards that hang in the studio without a ground."""
+    azimuth, elevation = np.radians(np.mgrid[-180:180:3, -60:61:5].reshape(2, -1))
+    towards = np.stack([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), -np.cos(elevation) * np.cos(azimuth)], -1)
+    assert cove_radiance(towards).min() > 0.1
+    assert studio_radiance(towards).min() < 0.02

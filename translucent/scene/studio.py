@@ -41,16 +41,23 @@ class Panel(NamedTuple):
     softness: float = 0.03
 
 
-#: Panels of the studio, the farthest first. A camera usually looks along -Z, so +Z is behind it.
-PANELS = (
+#: Panels that shine, the farthest first. A camera usually looks along -Z, so +Z is behind it.
+LIT_PANELS = (
     Panel(0, 10, 126, 70, (0.98, 0.98, 1.0), falloff=0.4, softness=0.6),  # the backdrop, lit from below
     Panel(138, 40, 44, 36, (9.5, 9.15, 8.55), falloff=0.35),  # key light, a large soft box to the right of the camera
     Panel(-122, 22, 11, 72, (5.5, 5.8, 6.3), falloff=0.15, softness=0.08),  # rim light, a strip to the left
     Panel(97, 18, 6, 66, (4.0, 4.15, 4.4), falloff=0.15, softness=0.08),  # a narrower one on the right
     Panel(-158, 50, 26, 18, (2.6, 2.7, 2.85), falloff=0.25),  # fill light, above and behind the camera
-    Panel(-66, 4, 13, 84, (0.012, 0.012, 0.014), softness=0.1),  # dark cards: black edges that draw the shape of glass
+)
+
+#: Dark cards: black edges that draw the shape of glass.
+DARK_CARDS = (
+    Panel(-66, 4, 13, 84, (0.012, 0.012, 0.014), softness=0.1),
     Panel(66, 4, 13, 84, (0.012, 0.012, 0.014), softness=0.1),
 )
+
+#: All panels of the studio, the farthest first.
+PANELS = (*LIT_PANELS, *DARK_CARDS)
 
 #: Radiance of the room: straight down near the subject, the floor far away, the wall at the horizon, and the ceiling.
 FLOOR_NEAR, FLOOR_FAR = (0.31, 0.25, 0.20), (0.60, 0.55, 0.49)
@@ -79,16 +86,19 @@ COVE_BACKDROP = 0.56
 
 @lru_cache(maxsize=1)
 def cove_map() -> EnvironmentMap:
-    """Environment map of the studio with a darker backdrop, as bright as a ground that goes over into it; made once."""
+    """Environment map of the studio with a backdrop as bright as a ground that goes over into it, without dark cards."""
     return EnvironmentMap.from_formula(cove_radiance, STUDIO_HEIGHT)
 
 
 def cove_radiance(directions: npt.ArrayLike) -> Array:
-    """Radiance (..., 3) from unit vectors (..., 3): the studio's, with the darker backdrop."""
+    """Radiance (..., 3) from unit vectors (..., 3): the studio's, with the darker backdrop and without the dark cards.
+
+    Above a ground, flat faces of clear bodies mirror the cards as black bars.
+    """
     towards = np.asarray(directions, dtype=np.float64)
     red, green, blue = (COVE_BACKDROP * value for value in PANELS[0].radiance)
     backdrop = PANELS[0]._replace(radiance=(red, green, blue))
-    return _with_panels(_room(towards[..., 1]), towards, (backdrop, *PANELS[1:]))
+    return _with_panels(_room(towards[..., 1]), towards, (backdrop, *LIT_PANELS[1:]))
 
 
 @lru_cache(maxsize=1)
