@@ -261,6 +261,7 @@ def test_far_away_the_studio_is_as_bright_as_its_backdrop() -> None:
 def test_the_stage_of_the_studio_has_no_black_bars() -> None:
     """Flat faces of clear bodies would mirror the dark cards that hang in the studio without a ground."""
     azimuth, elevation = np.radians(np.mgrid[-180:180:3, -60:61:5].reshape(2, -1))
-    towards = np.stack([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), -np.cos(elevation) * np.cos(azimuth)], -1)
+    level = np.cos(elevation)
+    towards = np.stack([level * np.sin(azimuth), np.sin(elevation), -level * np.cos(azimuth)], axis=-1)
     assert cove_radiance(towards).min() > 0.1
     assert studio_radiance(towards).min() < 0.02

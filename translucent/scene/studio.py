@@ -86,7 +86,7 @@ COVE_BACKDROP = 0.56
 
 @lru_cache(maxsize=1)
 def cove_map() -> EnvironmentMap:
-    """Environment map of the studio with a backdrop as bright as a ground that goes over into it, without dark cards."""
+    """Environment map of the studio with a backdrop as bright as the ground before it, without dark cards."""
     return EnvironmentMap.from_formula(cove_radiance, STUDIO_HEIGHT)
 
 
