@@ -118,6 +118,9 @@ class TestMeasures:
         right = landscape()
         rng = np.random.default_rng(5)
         assert suspicions(right + 0.15 * rng.standard_normal(right.shape), truth_of(right)) == []
+        assert suspicions(right * rng.gamma(0.25, 4.0, right.shape), truth_of(right)) == [], (
+            "bright specks of few paths"
+        )
 
 
 class TestPromises:

@@ -104,17 +104,11 @@ def score_picture(picture: Array, truth: TruthPicture, thickness: Array | None =
     used = truth.mask
     one, other = (half.astype(np.float64) for half in truth.halves)
     right = truth.radiance
-    mean = max(float(right[used].mean()), 1e-12)
-    whole = _blocks(used.astype(np.float64)[..., None])[..., 0] == 1.0
-    block = math.nan
-    if whole.any():
-        parts = (_blocks(each)[whole] for each in (picture, one, other))
-        block = math.sqrt(max(noise_free_square(*parts)[0], 0.0)) / mean
     channels = np.maximum(right[used].mean(axis=0), 1e-12)
     red, green, blue = (picture[used].mean(axis=0) / channels - 1.0).tolist()
     return Score(
         nrmse=_nrmse(picture, truth),
-        block=block,
+        block=_block_error(picture, truth),
         bias=(red, green, blue),
         flip=flip(picture, right, used),
         visible=_visible(picture, right, used),
@@ -129,6 +123,16 @@ def _nrmse(picture: Array, truth: TruthPicture) -> float:
     one, other = (half.astype(np.float64)[truth.mask] for half in truth.halves)
     square, _ = noise_free_square(picture[truth.mask], one, other)
     return math.sqrt(max(square, 0.0)) / max(0.5 * float((one + other).mean()), 1e-12)
+
+
+def _block_error(picture: Array, truth: TruthPicture) -> float:
+    """nRMSE of means over blocks that lie wholly in the mask; NaN where there is none."""
+    whole = _blocks(truth.mask.astype(np.float64)[..., None])[..., 0] == 1.0
+    if not whole.any():
+        return math.nan
+    parts = (_blocks(each.astype(np.float64))[whole] for each in (picture, *truth.halves))
+    mean = max(float(truth.radiance[truth.mask].mean()), 1e-12)
+    return math.sqrt(max(noise_free_square(*parts)[0], 0.0)) / mean
 
 
 def _blocks(picture: Array) -> Array:
@@ -228,29 +232,30 @@ _SUSPECTS = (
 def suspicions(picture: Array, truth: TruthPicture) -> list[str]:
     """Most likely mistake in a picture: the one whose correction reduces the error most, and at least halves it.
 
+    Errors are those of means over blocks, so that noise is not taken for a mistake: an encoding would reduce it.
     Undone are flips, exchanged channels, transfer functions, a wrong exposure, a shift and a zoom (a crop).
     """
-    before = _nrmse(picture, truth)
-    if before < NEAR:
+    if _nrmse(picture, truth) < NEAR:
         return []
     if picture.max() <= 0.0:
         return ["black"]
-    found = [(_nrmse(one.undo(picture), truth), one.said) for one in _SUSPECTS]
+    before = _block_error(picture, truth)
+    found = [(_block_error(one.undo(picture), truth), one.said) for one in _SUSPECTS]
     used, right = truth.mask, truth.radiance
     product, square = float((picture[used] * right[used]).sum()), float((picture[used] ** 2).sum())
     if product > 0 and abs(math.log2(factor := product / square)) > STOPS:
         other = "brighter" if factor > 1 else "darker"
         stops = abs(math.log2(factor))
         said = f"exposure may be off: at {stops:.2g} stops {other} the error halves"
-        found.append((_nrmse(factor * picture, truth), said))
+        found.append((_block_error(factor * picture, truth), said))
     down, across = _best_shift(picture, right)
     if math.hypot(down, across) > SHIFTED:
         said = f"shifted by {across} pixels to the right and {down} down"
-        found.append((_nrmse(_moved(picture, down, across), truth), said.replace(f"{across} ", f"{-across} ", 1)))
+        found.append((_block_error(_moved(picture, down, across), truth), said.replace(f"{across} ", f"{-across} ", 1)))
     for zoom in ZOOMS:
         how = "smaller: more is seen" if zoom > 1 else "larger: a part is seen"
         said = f"cropped or another field of view: things are {1 / zoom:.2g} times as large, {how}"
-        found.append((_nrmse(_zoomed(picture, zoom), truth), said))
+        found.append((_block_error(_zoomed(picture, zoom), truth), said))
     after, said = min(found, key=lambda one: one[0])
     return [said] if after < SUSPICIOUS * before else []
 
