@@ -271,7 +271,8 @@ def environment_parts(
         power, rest = _map_power(environment)
         texels = _turned_texels(environment)
         towards = directions if turn is None else directions @ turn.T
-        nearest = (texels.astype(np.float32) @ towards.T.astype(np.float32)).argmax(axis=1)
+        # Not a product of matrices: the threads of BLAS would wait in busy loops for longer than the search takes.
+        nearest = np.asarray(cKDTree(towards).query(texels)[1])
         radiance = power if suns else rest
     return np.stack([np.bincount(nearest, radiance[:, channel], len(directions)) for channel in range(3)], axis=1)
 
