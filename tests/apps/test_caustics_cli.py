@@ -69,4 +69,7 @@ def test_what_makes_no_caustics_is_told(run: Run, tmp_path: Path, options: tuple
 
 def test_another_renderer_shows_none(run: Run, model: Path, tmp_path: Path) -> None:
     found = run("render", model, "-o", tmp_path / "out.png", "--caustics", 10, "--opaque-with", "pyrender")
-    assert found.err.startswith("error: --caustics; --opaque-with, which draws what light lands on; omit --opaque-with, or omit --caustics")
+    message = (
+        "error: --caustics; --opaque-with, which draws what light lands on; omit --opaque-with, or omit --caustics"
+    )
+    assert found.err.startswith(message)
