@@ -99,7 +99,7 @@ class ExtinctionOptions:
     source: str | None = option(
         names=("--from",),
         metavar="FILE",
-        help="Read the medium from a .mtlx or .usda file, or from a file that --as printed.",
+        help="Read the medium from a .mtlx or .usda file, or from the saved output of --as.",
     )
     td: str | None = option(
         metavar="D",

@@ -63,7 +63,7 @@ class ReportOptions:
     medium: MediumOptions = group(MediumOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
     backend: str | None = option(
-        metavar="B", help=("OpenGL platform: egl, window or osmesa. Default: the first that works on this machine.")
+        metavar="B", help=("OpenGL platform: egl, window or osmesa. Default: egl, or osmesa if egl does not work.")
     )
 
 

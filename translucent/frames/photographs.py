@@ -286,7 +286,7 @@ def _depth(patch: _Mean, white: _Mean, what: str, left_out: list[str]) -> tuple[
         channel = int(np.flatnonzero(bright)[0])
         found = f"{CHANNELS[channel]} {patch.mean[channel]:.3g} is above the white's {white.mean[channel]:.3g}"
         raise InputError(
-            what, found, "choose a white rectangle that shows the light behind the patches, with nothing in front of it"
+            what, found, "choose a white rectangle beside the patches, where the bare backlight is visible"
         )
     noisy = patch.variance > (MOST_ERROR * patch.mean) ** 2
     for limited, why in (
