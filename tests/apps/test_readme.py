@@ -151,7 +151,7 @@ def is_built(script: str) -> bool:
 
 
 def options_of(command: str) -> tuple[str, ...]:
-    """What is given to a verb, without the values."""
+    """Options and arguments of a command line, without their values."""
     verb, *words = shlex.split(command)
     return (verb, *sorted(word for word in words if word.startswith("--")))
 

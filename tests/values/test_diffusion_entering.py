@@ -177,7 +177,7 @@ def test_bright_parts_of_the_environment_enter_as_lamps_do(monkeypatch: pytest.M
 
 
 def test_constant_environments_have_no_rays_and_others_keep_their_flux() -> None:
-    """What all directions have alike is uniform, exactly; the rest has a direction, and nothing is lost."""
+    """The least radiance of all directions enters as uniform light; the rest enters by direction; flux is conserved."""
     medium = tl.Medium(scattering=3.0, ior=1.3)
     body = tl.Object(BALL, medium)
     geometry = lit_body(body, None, Diffusion(12).cell_size(body))

@@ -127,7 +127,7 @@ class ScenePart:
 
     @property
     def promise(self) -> str:
-        """What this toolkit promises, and whether it holds; empty without its row."""
+        """Table cell with the error that this toolkit promises, and whether it holds; empty in other rows."""
         row = self.ours
         return "" if row is None or row.result.score is None else promise_kept(self.scene, row.result.score.block)
 

@@ -14,6 +14,7 @@ import click
 
 from translucent.commands.console import echo
 from translucent.errors import InputError, RenderError, TranslucentError
+from translucent.extras import require_package
 
 if TYPE_CHECKING:
     from translucent.benchmark.results import Results
@@ -79,6 +80,7 @@ def export(folder: Path, only: str | None, debug: bool) -> None:
     """Write the scenes into FOLDER: scene.glb, scene.json and environment.exr for each, and a README."""
     from translucent.benchmark.export import export_scenes
 
+    require_package("OpenEXR", "benchmark export")
     found = export_scenes(folder, _chosen(only))
     echo(f"{len(found)} scenes in {folder}; what to do with them is in {folder / 'README.txt'}")
 
@@ -105,6 +107,7 @@ def run(names: tuple[str, ...], output: Path, only: str | None, as_json: bool, d
     from translucent.benchmark.adapters import adapter_named, adapters, run_adapter
     from translucent.benchmark.results import pack
 
+    require_package("OpenEXR", "benchmark run")
     known = [one.name for one in adapters().values() if not one.missing()] if names == ("all",) else names
     chosen = [adapter_named(name) for name in known]
     scenes = _chosen(only)
@@ -161,6 +164,7 @@ def score(
     from translucent.benchmark.results import floor_seconds, pack, read_results, scored, this_machine, today
     from translucent.benchmark.scenes import scene_named
 
+    require_package("OpenEXR", "benchmark score")
     found = read_results(folder)
     found = dataclasses.replace(
         found,
@@ -212,6 +216,7 @@ def page(places: tuple[Path, ...], output: Path, debug: bool) -> None:
     from translucent.benchmark.page import write_benchmark_page
     from translucent.benchmark.results import read_results, result_folders, scored
 
+    require_package("OpenEXR", "benchmark page")
     if output.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"page {str(output)!r}", "not an .html file", "name it for example benchmark.html")
     with tempfile.TemporaryDirectory(prefix="translucent-benchmark-") as temporary:

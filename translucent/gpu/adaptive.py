@@ -162,7 +162,7 @@ def wanted_samples(deviations: Floats, samples: int) -> float:
     found = deviations[deviations > 0].astype(np.float64)
     if not found.size:
         return 0.0
-    # Looks are at powers of two, the next of which is on average by the root of 2 more than what is wanted.
+    # Pixels stop at powers of two. On average this is sqrt(2) times the number that they need: hence the half.
     return float(samples * np.sqrt(0.5 * (found ** (2 / 3)).sum() / np.square(found).sum()))
 
 

@@ -177,10 +177,9 @@ class ShadowViews:
 
     @cached_property
     def _sky_rows(self) -> tuple[Array, Array, Array]:
-        """Of each direction of the environment: axes (k, 3, 3) of its camera, its eye (k, 3), and the place of its map
-        (k,), from 1, negative if it has ends.
+        """Axes (k, 3, 3), eyes (k, 3) and map numbers (k,) of the cameras of the environment's k directions.
 
-        Every sample of a picture needs them.
+        Numbers count from 1; they are negative if a map has ends. Every sample of a picture needs them.
         """
         origin = np.zeros(3)
         axes = np.array([view.rows(origin)[:3, :3] for view in self.sky]).reshape(-1, 3, 3)

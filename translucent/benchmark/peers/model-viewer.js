@@ -2,7 +2,7 @@
 // clamp and encode it; the .hdr as environment and skybox; no tone mapping; no shadow of its own; the camera of the scene.
 import * as THREE from "three";
 import "@google/model-viewer";
-import { topDown } from "./pixels.js";
+import { timedPicture } from "./pixels.js";
 
 const PARTS = 4;
 const element = document.createElement("model-viewer");
@@ -46,21 +46,10 @@ window.drawScene = async ({ home, size }) => {
   pose.setPosition(...eye).premultiply(model.matrixWorld);
   pose.decompose(camera.position, camera.quaternion, camera.scale);
   const side = PARTS * size;
-  const target = new THREE.WebGLRenderTarget(side, side, { type: THREE.FloatType, colorSpace: THREE.LinearSRGBColorSpace });
-  const pixels = new Float32Array(4 * side * side);
   renderer.toneMapping = THREE.NoToneMapping;
-  const draw = () => {
-    renderer.setRenderTarget(target);
+  return timedPicture(THREE, renderer, side, () => {
     renderer.setViewport(0, 0, side, side);
     renderer.clear();
     renderer.render(scene, camera);
-    renderer.readRenderTargetPixels(target, 0, 0, side, side, pixels);
-  };
-  draw();
-  const begin = performance.now();
-  draw();
-  const seconds = (performance.now() - begin) / 1000;
-  renderer.setRenderTarget(null);
-  target.dispose();
-  return { pixels: topDown(pixels, side), seconds };
+  });
 };

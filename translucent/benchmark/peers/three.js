@@ -4,7 +4,7 @@
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { EXRLoader } from "three/addons/loaders/EXRLoader.js";
-import { topDown } from "./pixels.js";
+import { timedPicture } from "./pixels.js";
 
 const PARTS = 4;
 const renderer = new THREE.WebGLRenderer({ canvas: document.getElementById("canvas"), antialias: false });
@@ -47,20 +47,8 @@ window.drawScene = async ({ home, size }) => {
   const camera = gltf.cameras[0];
   const side = PARTS * size;
   renderer.setSize(side, side, false);
-  const target = new THREE.WebGLRenderTarget(side, side, { type: THREE.FloatType, colorSpace: THREE.LinearSRGBColorSpace });
-  const pixels = new Float32Array(4 * side * side);
-  const draw = () => {
-    renderer.setRenderTarget(target);
-    renderer.render(scene, camera);
-    renderer.readRenderTargetPixels(target, 0, 0, side, side, pixels);
-  };
-  draw();
-  const begin = performance.now();
-  draw();
-  const seconds = (performance.now() - begin) / 1000;
-  renderer.setRenderTarget(null);
-  target.dispose();
+  const picture = timedPicture(THREE, renderer, side, () => renderer.render(scene, camera));
   map.dispose();
   gltf.scene.traverse((item) => item.geometry?.dispose());
-  return { pixels: topDown(pixels, side), seconds };
+  return picture;
 };
