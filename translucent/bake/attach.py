@@ -99,7 +99,7 @@ def _strange(name: str, missing: int, count: int, what: str) -> InputError:
     return InputError(
         f"attach to {name!r}",
         found,
-        ("attach to the same mesh that was baked or rendered, and state its unit with unit="),
+        "attach to the same mesh that was baked or rendered, and state its unit with unit=",
     )
 
 

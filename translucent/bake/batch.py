@@ -464,7 +464,7 @@ def bake_tiles(job: Job, progress: Progress | None = None) -> tuple[Record, Resu
         raise InputError(
             f"output {job['output']!r}",
             found,
-            ("the model has no UDIM tiles: remove <UDIM> from the name, or unwrap the model into tiles"),
+            "the model has no UDIM tiles: remove <UDIM> from the name, or unwrap the model into tiles",
         )
     results: Results = {}
     rays = 0

@@ -280,7 +280,7 @@ def _bake_gltf(job: Job, about: Record, progress: Progress | None) -> tuple[Reco
     if job.get("high") is not None and len(targets) > 1:
         raise InputError(
             f"high mesh {job['high']!r}",
-            (f"{len(targets)} objects of the model get a thickness map, but a detailed mesh belongs to one object"),
+            f"{len(targets)} objects of the model get a thickness map, but a detailed mesh belongs to one object",
             "bake these objects one by one",
         )
     if lost := left_out(builder.file(), targets):

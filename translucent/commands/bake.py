@@ -102,12 +102,12 @@ class BakeOptions:
         help="Definition of thickness, or scattered light.",
     )
     size: int = option(
-        1024, metavar="N", help=(f"Number of texels along each side of the map; default with --mode scatter: {SIZE}.")
+        1024, metavar="N", help=f"Number of texels along each side of the map; default with --mode scatter: {SIZE}."
     )
     resolution: int = option(
         32,
         metavar="N",
-        help=("With --mode scatter: resolution of the diffusion grid, 8 to 128; a body gets about N^3 / 4 cells."),
+        help="With --mode scatter: resolution of the diffusion grid, 8 to 128; a body gets about N^3 / 4 cells.",
     )
     rays: int = option(64, metavar="N", help="Rays per surface point.")
     spread: float = option(180.0, metavar="DEG", help="Full angle of the cone of rays around the inward normal.")
@@ -144,7 +144,7 @@ class BakeOptions:
     vertices: bool = option(False, help="Bake thickness per vertex, into a .ply, .glb or .npy file.")
     normalize: bool = option(False, help="Store fractions of the largest value instead of metres.")
     invert: bool = option(
-        False, help=("Store 1 - t / max for each thickness t, the translucency that some engines expect.")
+        False, help="Store 1 - t / max for each thickness t, the translucency that some engines expect."
     )
     max_escaped: str | None = option(
         metavar="%",
@@ -154,7 +154,7 @@ class BakeOptions:
         ),
     )
     resume: bool = option(
-        False, help=("Store finished parts of the bake next to the output, and continue from these parts.")
+        False, help="Store finished parts of the bake next to the output, and continue from these parts."
     )
     check: bool = option(
         False,
@@ -174,7 +174,7 @@ class BakeOptions:
     out_dir: Path | None = option(help="Bake each MODEL into this folder.")
     usd: Path | None = option(
         metavar="FILE",
-        help=("Instead of -o: write a .usda or .usdc file with meshes, OpenPBR materials, and thickness per vertex."),
+        help="Instead of -o: write a .usda or .usdc file with meshes, OpenPBR materials, and thickness per vertex.",
     )
     format: str = option("exr", type=click.Choice(FORMATS), help="Format of the files in --out-dir.")
     jobs: int | None = option(
@@ -631,7 +631,7 @@ class LithophaneOptions:
     width: str = option("100mm", metavar="W", help="Width of the plate.")
     pitch: str = option("0.25mm", metavar="P", help="Distance between neighboring points of the relief.")
     check: bool = option(
-        False, help=("Write OUTPUT.check.png, which compares the requested picture with the rendered relief.")
+        False, help="Write OUTPUT.check.png, which compares the requested picture with the rendered relief."
     )
     overwrite: bool = overwrite_option()
 

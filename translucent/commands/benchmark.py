@@ -135,14 +135,14 @@ def run(names: tuple[str, ...], output: Path, only: str | None, as_json: bool, d
 
 @benchmark.command(epilog='Example: translucent benchmark score my-pictures --name "My renderer" --version 1.2')
 @click.argument("folder", type=_FOLDER)
-@click.option("--name", help=("Name of the renderer. Default: the name in results.json, or the name of the folder."))
+@click.option("--name", help="Name of the renderer. Default: the name in results.json, or the name of the folder.")
 @click.option("--version", help="Version of the renderer.")
 @click.option("--settings", help="Settings of the renderer, such as samples.")
 @click.option("--device", help="Device that rendered the pictures, such as a graphics card.")
 @click.option(
     "--elsewhere",
     is_flag=True,
-    help=("State that the pictures were rendered on another machine, so that no reference time is measured."),
+    help="State that the pictures were rendered on another machine, so that no reference time is measured.",
 )
 @_JSON
 @_DEBUG

@@ -55,7 +55,7 @@ MOST_THIN_SHARE = 0.5
 class ExtinctionOptions:
     """Options of ``translucent extinction``."""
 
-    unit: str = option("m", help=("Unit of distances that are given without a unit, and of the coordinates of MODEL."))
+    unit: str = option("m", help="Unit of distances that are given without a unit, and of the coordinates of MODEL.")
     unit_out: str = option("m", metavar="U", help="Also print the extinction per this unit of length.")
     clamp: bool | None = clamp_option()
     target: str | None = option(
@@ -64,7 +64,7 @@ class ExtinctionOptions:
         help="Print the material for this engine.",
     )
     ior: float | None = option(
-        metavar="N", help=("With --as and --fit PHOTO: index of refraction. Default: the index of the medium, or 1.")
+        metavar="N", help="With --as and --fit PHOTO: index of refraction. Default: the index of the medium, or 1."
     )
     roughness: float | None = option(
         type=click.FloatRange(0.0, 1.0),
@@ -84,7 +84,7 @@ class ExtinctionOptions:
     )
     white: str | None = option(
         metavar="X,Y,W,H",
-        help=("With --fit PHOTO: a rectangle of the photograph that shows only the light, in pixels."),
+        help="With --fit PHOTO: a rectangle of the photograph that shows only the light, in pixels.",
     )
     patch: tuple[str, ...] = option(
         (),
@@ -107,15 +107,15 @@ class ExtinctionOptions:
     )
     td_transmittance: float | None = option(
         metavar="T",
-        help=("Fraction of light that is left after the transmission distance. Default: 0.1, T = 10^(-d/TD)."),
+        help="Fraction of light that is left after the transmission distance. Default: 0.1, T = 10^(-d/TD).",
     )
     model: str | None = option(
         names=("--on",),
         metavar="MODEL",
-        help=("Print the colors of the medium on this model, which is a file or a built-in mesh; see above."),
+        help="Print the colors of the medium on this model, which is a file or a built-in mesh; see above.",
     )
     eye: str | None = option(
-        metavar="X,Y,Z", help=("With --on: position of the eye, in metres. Default: the same camera as in render.")
+        metavar="X,Y,Z", help="With --on: position of the eye, in metres. Default: the same camera as in render."
     )
     overwrite: bool = overwrite_option()
     allow_outside: bool = outside_option()
@@ -234,7 +234,7 @@ def _check_usage(given: ExtinctionOptions, color: str | None, as_json: bool) -> 
     if given.fit and given.clamp:
         raise InputError(
             "--clamp",
-            ("--clamp would replace measured zeros by invented values, which would falsify the fit"),
+            "--clamp would replace measured zeros by invented values, which would falsify the fit",
             "remove the table rows that have a channel of 0",
         )
 

@@ -438,11 +438,11 @@ class CameraOptions:
     """Options that choose a camera."""
 
     camera: int | None = option(
-        metavar="N", help=("Number of a camera in the glTF file, counted from 0. Default: 0, if the file has a camera.")
+        metavar="N", help="Number of a camera in the glTF file, counted from 0. Default: 0, if the file has a camera."
     )
     eye: str | None = option(
         metavar="X,Y,Z",
-        help=("Position of the camera in metres. Default: a position from which the whole model is visible."),
+        help="Position of the camera in metres. Default: a position from which the whole model is visible.",
     )
     target: str | None = option(
         metavar="X,Y,Z", help="Point that the camera looks at. Default: the center of the model."
@@ -539,7 +539,7 @@ class LookOptions:
     )
     background: str | None = option(
         metavar="E",
-        help=("Environment that is visible behind and through the model. Accepts the same values as --environment."),
+        help="Environment that is visible behind and through the model. Accepts the same values as --environment.",
     )
     exposure: float = option(
         0.0,
@@ -617,7 +617,7 @@ class ChoiceOptions:
     )
     interface_depth: int | None = option(
         metavar="N",
-        help=("With --interfaces traced: largest number of interfaces that a ray may cross, 1 to 64. Default: 24."),
+        help="With --interfaces traced: largest number of interfaces that a ray may cross, 1 to 64. Default: 24.",
     )
     interface_forks: int | None = option(
         metavar="N",

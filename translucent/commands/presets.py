@@ -24,7 +24,7 @@ _LISTED = ("name", "kind", "group", "regime", "colors", "diffuse_color", "source
 @click.option(
     "--group",
     metavar="G",
-    help=("List only the presets of this group, such as 'stone and resin', or a part of its name."),
+    help="List only the presets of this group, such as 'stone and resin', or a part of its name.",
 )
 @click.option("--search", metavar="WORDS", help="List only presets with these words in their name, note or source.")
 @common_options

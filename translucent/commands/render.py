@@ -153,7 +153,7 @@ class RenderOptions:
     )
     transparent: bool = option(
         False,
-        help=("Make the background transparent, with an alpha channel. The ground of a stage then shows only shadows."),
+        help="Make the background transparent, with an alpha channel. The ground of a stage then shows only shadows.",
     )
     turntable: int | None = option(
         type=click.IntRange(2, 3600),

@@ -58,12 +58,12 @@ class ReportOptions:
     )
     compare: Path | None = option(
         metavar="JSON",
-        help=("Print which methods are slower or less accurate than in this report.json. The exit code is then 1."),
+        help="Print which methods are slower or less accurate than in this report.json. The exit code is then 1.",
     )
     medium: MediumOptions = group(MediumOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
     backend: str | None = option(
-        metavar="B", help=("OpenGL platform: egl, window or osmesa. Default: egl, or osmesa if egl does not work.")
+        metavar="B", help="OpenGL platform: egl, window or osmesa. Default: egl, or osmesa if egl does not work."
     )
 
 
@@ -101,7 +101,7 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
         requested = "--color" if filling.preset is None else f"--preset {filling.preset}"
         raise InputError(
             requested,
-            ("the command needs a MODEL for this medium, because the built-in scenes keep their own media"),
+            "the command needs a MODEL for this medium, because the built-in scenes keep their own media",
             "add a MODEL",
         )
     limited = False

@@ -135,7 +135,7 @@ def _check(body: Object, diffusion: Diffusion) -> None:
     if np.asarray(medium.emission).any():
         raise InputError(
             requested,
-            ("the medium emits light, which a scatter bake cannot store because it does not depend on the environment"),
+            "the medium emits light, which a scatter bake cannot store because it does not depend on the environment",
             "use a medium without emission",
         )
     if (why := diffusion.refusal(body)) is not None:

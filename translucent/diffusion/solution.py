@@ -171,7 +171,7 @@ class CellSystem:
         if failed:
             raise RenderError(
                 "diffusion in a body",
-                (f"the diffusion solver has not converged after {MOST_STEPS} steps in {len(right_side)} cells"),
+                f"the diffusion solver has not converged after {MOST_STEPS} steps in {len(right_side)} cells",
                 "render with scattering=tl.ScatteringLayer()",
             )
         return np.asarray(found), steps

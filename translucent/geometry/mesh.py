@@ -86,7 +86,7 @@ class Mesh(Frozen):
             bad = int(np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(vertices)).any(axis=1))[0])
             raise InputError(
                 f"mesh {self.name!r}",
-                (f"face {bad} = {tuple(faces[bad].tolist())} refers to points outside the {len(vertices)} vertices"),
+                f"face {bad} = {tuple(faces[bad].tolist())} refers to points outside the {len(vertices)} vertices",
                 "export the mesh again",
             )
         self._freeze("vertices", vertices)

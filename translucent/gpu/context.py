@@ -362,7 +362,7 @@ def require_own_process() -> None:
     if _opened_in not in (None, os.getpid()):
         raise RenderError(
             "OpenGL in a forked process",
-            (f"process {_opened_in} opened OpenGL before the fork, and the driver does not work after a fork"),
+            f"process {_opened_in} opened OpenGL before the fork, and the driver does not work after a fork",
             'start processes with multiprocessing.get_context("spawn")',
         )
 

@@ -429,7 +429,7 @@ def _texture(gl: moderngl.Context, count: int, pieces: Sequence[_Piece]) -> mode
     except moderngl.Error as error:
         raise RenderError(
             "ray tracing through the meshes",
-            (f"OpenGL does not have enough memory for {size_text(16 * rows * _WIDTH)} of mesh data ({error})"),
+            f"OpenGL does not have enough memory for {size_text(16 * rows * _WIDTH)} of mesh data ({error})",
             "use interfaces=tl.ScreenInterfaces(), or meshes with fewer triangles",
         ) from error
     texture.filter = moderngl.NEAREST, moderngl.NEAREST

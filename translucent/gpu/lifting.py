@@ -62,7 +62,7 @@ def _head(name: str, code: str, dialect: Dialect) -> tuple[int, list[str]]:
                 "the shader writes to buffers, which "
                 f"{('WebGL2 has none of' if dialect == 'webgl2' else 'are not translated')}"
             ),
-            ("use a method without such shaders: signed_depth for sums, peel and peel_fold for sorted intervals"),
+            "use a method without such shaders: signed_depth for sums, peel and peel_fold for sorted intervals",
         )
     if dialect == "vulkan":
         extension = "#extension GL_EXT_samplerless_texture_functions : require"

@@ -128,7 +128,7 @@ class ShadowViews:
             side //= 2
         raise RenderError(
             f"shadows of {len(lights)} lights and {len(sky)} directions of the environment",
-            (f"no texture of this OpenGL can hold all shadow maps: the largest texture is {limit} texels wide"),
+            f"no texture of this OpenGL can hold all shadow maps: the largest texture is {limit} texels wide",
             "use fewer lights or directions",
         )
 
@@ -361,7 +361,7 @@ class ShadowAtlas:
             raise RenderError(
                 "shadow maps",
                 (
-                    f"OpenGL does not have enough memory for {_TEXEL * extent[0] * extent[1] / 1000000.0:.0f} "
+                    f"OpenGL does not have enough memory for {_TEXEL * extent[0] * extent[1] / 1e6:.0f} "
                     f"MB of shadow maps ({error})"
                 ),
                 "use smaller shadow maps: shadows=tl.ShadowMaps(size=...)",

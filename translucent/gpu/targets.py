@@ -137,7 +137,7 @@ class Storage:
         except moderngl.Error as error:
             raise RenderError(
                 self._owner,
-                (f"OpenGL does not have enough memory for {size / 1000000.0:.0f} MB of surface lists ({error})"),
+                f"OpenGL does not have enough memory for {size / 1e6:.0f} MB of surface lists ({error})",
                 "use DepthPeeling, render the picture in parts, or choose a smaller picture",
             ) from error
         return self._buffers[name]

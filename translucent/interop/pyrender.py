@@ -280,7 +280,7 @@ def _require_copying(why: str, *, owned: bool, shared: bool | None) -> None:
                 f"{why}; the renderer draws in the OpenGL context of another library, which pyrender's own "
                 "context would replace"
             ),
-            ("use another renderer, or set PYOPENGL_PLATFORM for the window before anything imports pyrender"),
+            "use another renderer, or set PYOPENGL_PLATFORM for the window before anything imports pyrender",
         )
 
 

@@ -125,7 +125,7 @@ def lengths(metres: npt.ArrayLike) -> Array:
     if (below := found < 0).any():
         raise InputError(
             f"transmittance after {float(found[below].flat[0]):g} m",
-            (f"the length is below 0{('' if found.ndim == 0 else f' at {int(below.sum())} of {found.size} places')}"),
+            f"the length is below 0{('' if found.ndim == 0 else f' at {int(below.sum())} of {found.size} places')}",
             "give lengths of paths through the medium, 0 or above",
         )
     return found

@@ -68,7 +68,7 @@ class DensityGrid(Frozen):
             where = tuple(int(i) for i in np.argwhere(bad)[0])
             raise InputError(
                 "density grid",
-                (f"{int(bad.sum())} values are outside 0 to {MAX_DENSITY:g}; the first is {values[where]} at {where}"),
+                f"{int(bad.sum())} values are outside 0 to {MAX_DENSITY:g}; the first is {values[where]} at {where}",
                 "replace these values, for example by 0",
             )
         values.setflags(write=False)

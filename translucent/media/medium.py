@@ -115,7 +115,7 @@ class Medium(Frozen):
                 raise InputError(
                     f"color {color!r}" if isinstance(color, str) else f"color {tuple(triple.tolist())}",
                     f"{channel} = {value:g} is not in 0 < t <= 1",
-                    ("a channel of 0 would need an infinite extinction; use a value such as 0.001 for nearly black")
+                    "a channel of 0 would need an infinite extinction; use a value such as 0.001 for nearly black"
                     if value <= 0 and not bytes_of_color
                     else f"write {bytes_of_color!r} if these are numbers from 0 to 255"
                     if bytes_of_color

@@ -414,7 +414,7 @@ class _Entry:
             raise InputError(
                 self.where,
                 "the key 'unit' cannot be combined with 'color'",
-                ("omit 'unit': the text of 'distance' contains its own unit, and only scattering needs this key"),
+                "omit 'unit': the text of 'distance' contains its own unit, and only scattering needs this key",
             )
         self._require(_ALWAYS | _BY_COLOR | ({"unit"} if per_length else set()), given)
 

@@ -148,7 +148,7 @@ def effects_of(scene: Scene, *, bends: bool = True, mirrored: str = "the environ
 #: Note of a plan in which rays refract at the front interface alone.
 ONE_INTERFACE = Note(
     NoteKind.ONE_INTERFACE,
-    ("FrontInterface: rays refract only where they enter a body, so they leave curved bodies in wrong directions"),
+    "FrontInterface: rays refract only where they enter a body, so they leave curved bodies in wrong directions",
 )
 
 

@@ -199,7 +199,7 @@ def with_ambient(notes: Iterable[Note]) -> tuple[Note, ...]:
     """Notes of a plan in which media emit the ambient radiance that they would scatter."""
     dimmed = Note(
         NoteKind.DIMMED_AMBIENT,
-        ("shadows in ambient light: ambient light reaches every point of the media without attenuation"),
+        "shadows in ambient light: ambient light reaches every point of the media without attenuation",
     )
     return (*(note for note in notes if note.kind is not NoteKind.ONLY_REMOVES), dimmed)
 
@@ -212,7 +212,7 @@ def layers_instead(scene: Scene, refusals: Iterable[tuple[int, str]]) -> tuple[N
     return tuple(
         Note(
             NoteKind.LAYER_INSTEAD,
-            (f"diffusion in {object_names(items)}: {why}; these bodies are rendered as flat layers"),
+            f"diffusion in {object_names(items)}: {why}; these bodies are rendered as flat layers",
         )
         for why, items in reasons.items()
     )

@@ -86,7 +86,7 @@ class Diffusion(Scattering):
                 f"Diffusion resolution {brief(self.resolution)}",
                 (
                     f"at this resolution, a body would have {cells:.2g} cells and take about "
-                    f"{CELL_BYTES * cells / 1000000000.0:.0f} GB of memory"
+                    f"{CELL_BYTES * cells / 1e9:.0f} GB of memory"
                 ),
                 f"use at most {MOST_RESOLUTION}; 32 is enough for media that mainly scatter",
             )

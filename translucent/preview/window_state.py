@@ -604,7 +604,7 @@ class WindowState:
             work.refuse(
                 InputError(
                     "copy a recipe",
-                    ("the picture shows a baked map on the model, which the copied text cannot reproduce"),
+                    "the picture shows a baked map on the model, which the copied text cannot reproduce",
                     "turn off 'show on the model' first",
                 )
             )

@@ -406,7 +406,7 @@ def path_trace(
     if max_events is None and depth > MAX_DEPTH:
         raise InputError(
             "path tracing",
-            (f"the media have an optical depth of {depth:.0e}, in which a path has very many events"),
+            f"the media have an optical depth of {depth:.0e}, in which a path has very many events",
             "limit the events of a path with max_events",
         )
     rays = pixel_rays(scene.camera, (width, height))

@@ -136,7 +136,7 @@ class LightViewsPass:
         megabytes = job.resources.light_lists.largest / 1e6
         raise RenderError(
             f"{len(job.scene.lights)} lights on scattering media",
-            (f"the sorted lists for these lights exceed the {megabytes:.0f} MB that a shader of this OpenGL can read"),
+            f"the sorted lists for these lights exceed the {megabytes:.0f} MB that a shader of this OpenGL can read",
             "use fewer lights, or meshes with fewer triangles",
         )
 
