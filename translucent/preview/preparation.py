@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -106,7 +106,16 @@ def unsmoothed(plans: Sequence[RenderPlan]) -> list[Mesh]:
         for i, item in ((i, plan.scene.objects[i]) for i in step.objects)
         if step.name is PassName.INTERFACES or (step.name is PassName.OPAQUE and item.surface is not None)
     }
-    meshes = (drawn[i] for i in sorted(drawn))
+    return _large_without_normals(drawn[i] for i in sorted(drawn))
+
+
+def make_large_normals(task: Task, pool: Pool, meshes: Iterable[Mesh]) -> None:
+    """Make the `drawn_normals` of the large meshes among these in a worker process."""
+    for mesh in _large_without_normals(meshes):
+        make_normals(task, pool, mesh)
+
+
+def _large_without_normals(meshes: Iterable[Mesh]) -> list[Mesh]:
     return [mesh for mesh in meshes if len(mesh.faces) > SMOOTHED_AT_ONCE and not has_drawn_normals(mesh)]
 
 
@@ -167,8 +176,7 @@ class Compiler:
 
         def work(task: Task) -> Compiled:
             try:
-                for mesh in unsmoothed(plans):
-                    make_normals(task, self._pool, mesh)
+                make_large_normals(task, self._pool, unsmoothed(plans))
                 given = tuple(map(_quick, plans)), self.device, presents
                 return self._pool.call(task, compile_frames, *given, urgency=Urgency.PICTURE)
             except CancelledError:

@@ -25,7 +25,7 @@ from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering, choose_treatments
 from translucent.planning.shadow_maps import ShadowMaps
-from translucent.preview.preparation import untraceable
+from translucent.preview.preparation import make_large_normals, untraceable
 from translucent.preview.tasks import Task
 from translucent.preview.worker import Pool, Urgency
 from translucent.preview.workspace import Workspace
@@ -281,6 +281,7 @@ class InteractiveQuality:
 
         def solve(task: Task) -> None:
             if small is not None and self._cells_of != bodies:
+                make_large_normals(task, workspace.pool, [item.mesh for item in scene.objects])  # cells need them here
                 cache.solve(small)
                 self._cells_of = bodies
             solve_aside(task, workspace.pool, cache, plan)
