@@ -1,4 +1,5 @@
 // Irradiance on a ground by light that has diffused in bodies, and that they mirror: a lookup in the last layer of their texture.
+// It is below 0 where they keep more light of the environment from the ground than they send.
 // Points count from the center of the media. DIFFUSED: there are such bodies.
 
 #include <Lights>

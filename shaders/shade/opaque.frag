@@ -42,7 +42,7 @@ layout(location = 1) out vec4 radiance;
 #if !SURFACE && !DEPTH_ONLY
 vec3 diffuse_radiance(vec3 normal) {
     vec3 irradiance = environment_irradiance(normal) * environment_reaching(from_center, normal);
-    irradiance += ground_light(from_center, normal);
+    irradiance = max(irradiance + ground_light(from_center, normal), 0.0);
     for (int light = 0; light < light_count; ++light) {
         vec3 sent = light_irradiance_on(light, from_center, normal);
         if (sent != vec3(0.0)) { irradiance += sent * light_reaching(light, from_center, normal); }

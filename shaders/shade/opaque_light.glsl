@@ -107,7 +107,7 @@ vec3 opaque_environment(OpaqueSurface surface, OpaqueBsdf bsdf, vec3 normal, vec
     for (float side = 1.0; side >= last; side -= 2.0) {
         vec3 albedo = surface.unoccluded * (side > 0.0 ? bsdf.base : bsdf.passed);
         vec3 irradiance = environment_irradiance(side * normal) * environment_reaching(point, side * normal);
-        sum += albedo * (irradiance + ground_light(point, side * normal)) / PI;
+        sum += albedo * max(irradiance + ground_light(point, side * normal), 0.0) / PI;
     }
 #if CLEAR_COAT
     sum = (1.0 - bsdf.coated) * sum + surface.unoccluded * bsdf.coated * environment_light(direction, surface.clearcoat.y);

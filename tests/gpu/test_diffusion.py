@@ -12,6 +12,7 @@ import pytest
 
 import translucent as tl
 from translucent.assets import mesh_path
+from translucent.diffusion.cache import FieldCache
 from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.formulas.diffuse_interface import half_space_reflectance
 from translucent.geometry.solids import Box, Sphere, Torus
@@ -117,6 +118,26 @@ def test_lossless_bodies_vanish_on_a_white_ground(renderer: tl.Renderer, surface
     off = np.abs(renderer.render(scene, (64, 64), samples=4, scattering=COARSE).radiance - 1.0)
     assert np.quantile(off, 0.99) < 0.05
     assert off.mean() < 0.01
+
+
+@pytest.mark.parametrize("backend", ["opengl", "cpu"])
+def test_a_body_shadows_its_ground_without_shadow_maps(renderer: tl.Renderer, backend: str) -> None:
+    """A dark ball keeps (r / d)^2 cos of the light of an even sky from the ground, less what it reflects."""
+    corners = np.array([(-40, -0.52, -40), (-40, -0.52, 40), (40, -0.52, 40), (40, -0.52, -40)], np.float64)
+    ground = tl.Object(tl.Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]])), None, color=(0.1, 0.1, 0.1))
+    ball = tl.Object(Sphere(radius=0.5).tessellate(48), tl.Medium(absorption=400.0, scattering=20.0, ior=1.2))
+    camera, size = tl.Camera.look_at((0, 3, 4), (0, -0.52, 0.8), fov_y=20.0), (24, 16)
+    scene = tl.Scene([ball, ground], camera, environment=WHITE)
+    with tl.Renderer("cpu") as other:
+        frame = (other if backend == "cpu" else renderer).render(scene, size, scattering=COARSE)
+    assert not any("shadows of the environment" in note for note in frame.plan.unmodelled)
+    away = ~frame.coverage.astype(bool)
+    origins, directions = (part[away] for part in camera.rays(size))
+    points = origins - (origins[:, 1:2] + 0.52) / directions[:, 1:2] * directions
+    kept = 0.5**2 * 0.52 / np.linalg.norm(points, axis=1) ** 3
+    reflected = FieldCache().of(frame.plan).surfaces[0].leaving.mean() / np.pi
+    assert kept.max() > 0.4
+    np.testing.assert_allclose(frame.radiance[away, 0], 0.1 * (1.0 - kept * (1.0 - reflected)), rtol=0.05)
 
 
 def test_a_scene_that_is_turned_as_a_whole_looks_the_same(renderer: tl.Renderer) -> None:

@@ -289,8 +289,8 @@ def test_a_plan_prints_a_line_for_each_thing_to_know() -> None:
         *["limit"] * len(found.limits),
         *["not modelled"] * len(found.unmodelled),
     ]
-    text = "shadows of the environment: its light reaches opaque objects as if nothing was in the way"
-    assert lines[-1] == f"  not modelled: {text}"
+    text = "shadows of the environment: its light reaches opaque objects as if nothing was in the way, so that"
+    assert lines[-1].startswith(f"  not modelled: {text}")
     assert str(plan(scene(body()))).startswith("SignedDepth(anchored=True): exact, at about the cost of ")
 
 

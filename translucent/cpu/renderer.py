@@ -179,7 +179,9 @@ class CpuRenderer:
             raise RenderError("rendering", "the renderer has been closed", "create a new renderer")
         started = time.perf_counter()
         scene, samples = plan.scene, plan.request.samples
-        shader = Shader.of(scene, plan, self._embree_meshes(scene))
+        ground = self._fields.of(plan).ground
+        scattered = None if ground is None else ground.irradiance
+        shader = Shader.of(scene, plan, self._embree_meshes(scene), scattered)
         picture = PictureRays.of(scene.camera, size)
         arrays = _empty(picture.size)
         bent = self._bent_light(shader, picture, plan)
@@ -392,6 +394,8 @@ class CausticLight(SurfaceLight):
     caustics : Caustics
     bending : frozenset of int
         Objects that straight light of lights does not pass, since photons carry it.
+    scattered : callable, optional
+        As of `SurfaceLight`.
     """
 
     def __init__(
@@ -401,8 +405,9 @@ class CausticLight(SurfaceLight):
         meshes: Mapping[Mesh, RayCaster],
         caustics: Caustics,
         bending: frozenset[int],
+        scattered: Callable[[Array, Array], Array] | None = None,
     ) -> None:
-        super().__init__(EmbreeLightPaths(scene, sheets, meshes))
+        super().__init__(EmbreeLightPaths(scene, sheets, meshes), scattered)
         self._dark = SurfaceLight(EmbreeLightPaths(darkened(scene, bending), sheets, meshes))
         self._discs = _discs(*_landed(scene, caustics), scene)
 
@@ -509,8 +514,14 @@ class Shader:
     light: SurfaceLight
 
     @classmethod
-    def of(cls, scene: Scene, plan: RenderPlan, meshes: Mapping[Mesh, RayCaster]) -> Shader:
-        """Shader for a plan of the scene; `meshes` are all of it, ready for rays."""
+    def of(
+        cls,
+        scene: Scene,
+        plan: RenderPlan,
+        meshes: Mapping[Mesh, RayCaster],
+        scattered: Callable[[Array, Array], Array] | None = None,
+    ) -> Shader:
+        """Shader for a plan of the scene; `meshes` are all of it, `scattered` is as of `SurfaceLight`."""
         sheets = sheet_thicknesses(scene, plan.method)
         drawn = {i for step in plan.passes if step.name is PassName.THIN_LAYER_FALLBACK for i in step.objects}
         diagonals = [float(np.linalg.norm(body.bounds[1] - body.bounds[0])) for body in scene.objects]
@@ -519,9 +530,9 @@ class Shader:
             for i, metres in enumerate(sheets)
         )
         if plan.caustics is None:
-            light = SurfaceLight(EmbreeLightPaths(scene, sheets, meshes))
+            light = SurfaceLight(EmbreeLightPaths(scene, sheets, meshes), scattered)
         else:
-            light = CausticLight(scene, sheets, meshes, plan.caustics, plan.opaque_to_shadows)
+            light = CausticLight(scene, sheets, meshes, plan.caustics, plan.opaque_to_shadows, scattered)
         return cls(scene, sheets, fallback if drawn else None, light)
 
     def shade(self, rays: Rays, hits: Sequence[Hits]) -> Arrays:

@@ -214,7 +214,7 @@ class _Bent:
 def ground_map(scene: Scene, lit: Mapping[int, LitBody], surfaces: Mapping[int, DiffusionField]) -> GroundMap | None:
     """Light that bodies, by their numbers, send to the ground below them; None without one.
 
-    Where the environment reaches the ground through everything, as a scene may say, it counts for as much as it does.
+    Unless maps of the environment's shadows do it, the environment's light that the bodies keep from it is subtracted.
     """
     if not lit or (ground := ground_below(scene, sorted(lit))) is None:
         return None
@@ -228,7 +228,7 @@ def ground_map(scene: Scene, lit: Mapping[int, LitBody], surfaces: Mapping[int, 
             return sent if scene.environment_shadows else sent - radiance_without_suns(scene.environment, directions)
 
         total += points.irradiance(bounding_ball(scene.objects[i]), body.nearest, light)
-    return points.map(np.maximum(total, 0.0))
+    return points.map(total)
 
 
 def _density_place(body: Object, diffusion: Diffusion) -> Hashable:

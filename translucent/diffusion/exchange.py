@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.ndimage import convolve1d
+from scipy.ndimage import convolve1d, map_coordinates
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Integers
@@ -24,7 +24,7 @@ from translucent.diffusion.grid import box_points, plane_points
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.mesh import Mesh, Triangles, joined
 from translucent.geometry.ray_caster import RayCaster
-from translucent.scene.grounds import Mirror
+from translucent.scene.grounds import TOLERANCE, Mirror
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light, Object
 
@@ -308,7 +308,7 @@ class Exchange:
 
 @dataclass(frozen=True, eq=False)
 class GroundMap:
-    """Irradiance on a flat ground by what bodies send there, less what they keep from it, see ``ground_map.glsl``.
+    """Irradiance on a flat ground by what bodies send there, less what they keep from it, see ``ground_light.glsl``.
 
     Attributes
     ----------
@@ -331,6 +331,19 @@ class GroundMap:
     middle: Array
     axes: Array
     values: Array
+
+    def irradiance(self, points: Array, normals: Array) -> Array:
+        """(k, 3): at points (k, 3) of the world with unit normals (k, 3); 0 off the ground."""
+        reach = np.linalg.norm(self.axes[0])
+        at = (points - self.middle) @ (self.axes / reach**2).T
+        size = np.abs(at)
+        place = np.where(size > 1.0, np.sign(at) * (1.0 - 0.5 / np.maximum(size, 1.0)), 0.5 * at)
+        texel = ((0.5 + 0.5 * place) * len(self.values) - 0.5)[:, ::-1].T
+        on = (np.abs(points @ self.normal - self.height) <= TOLERANCE * reach) & (normals @ self.normal > 0.0)
+        values = [
+            map_coordinates(channel, texel, order=1, mode="nearest") for channel in np.moveaxis(self.values, -1, 0)
+        ]
+        return np.asarray(np.where(on[:, None], np.stack(values, axis=1), 0.0))
 
 
 class GroundPoints:

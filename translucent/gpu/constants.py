@@ -36,6 +36,7 @@ from translucent.formulas.tone import (
 )
 from translucent.planning.interfaces import INTERIOR_SIZE
 from translucent.planning.methods.ray_marched import LEAST_SEEN, Quadrature
+from translucent.scene.grounds import TOLERANCE
 
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
 PEEL_BATCH = 8
@@ -147,7 +148,7 @@ CONSTANTS: dict[str, str] = {
     "LEAST_ENTERING_COSINE": repr(LEAST_COSINE),
     "AZIMUTHS": repr(AZIMUTHS),
     "CLEARCOAT_IOR": repr(CLEARCOAT_IOR),
-    "GROUND_TOLERANCE": "1e-3",  # distance from its plane up to which a point is on a ground, in sizes of its map
+    "GROUND_TOLERANCE": repr(TOLERANCE),
     "FILM_CENTERS": f"vec3{FILM_CENTERS}",
     "FILM_WIDTHS": f"vec3{FILM_WIDTHS}",
     "FILM_BLUE_CENTER": repr(FILM_BLUE_CENTER),

@@ -108,7 +108,7 @@ class AlbedoBlock:
         change = np.einsum("xa,yb,zd,sabdc->sxyzc", x, y, z, coarse, optimize=True)
         if self.logarithmic:
             return np.asarray(values * (after / before) * np.exp(change))
-        return np.asarray(np.maximum(values + change, 0.0))
+        return np.asarray(values + change)
 
 
 @dataclass(frozen=True, eq=False)

@@ -222,8 +222,17 @@ def shadow_effects(scene: Scene) -> list[Note]:
     """Notes on missing shadows on opaque objects, or on a picture of them that is drawn elsewhere."""
     notes = []
     if not scene.environment_shadows and scene.environment.mean.any():
-        text = "shadows of the environment: its light reaches opaque objects as if nothing was in the way"
-        notes.append(Note(NoteKind.SHADOWS, text))
+        shadowing = [i for i, item in enumerate(scene.objects) if treatment_of(item) is Treatment.DIFFUSION]
+        ground = ground_below(scene, shadowing) if shadowing else None
+        if ground is None or len(scene.objects) > len(shadowing) + 1:
+            text = (
+                "shadows of the environment: its light reaches opaque objects as if nothing was in the way, so that a "
+                "ground is up to twice as bright beside objects that stand on it"
+            )
+            if ground is not None:
+                names = object_names([scene.objects[i] for i in shadowing])
+                text += f"; only {names} shadow {object_names([ground.ground])}"
+            notes.append(Note(NoteKind.SHADOWS, text))
     layers = [body for body in scene.bodies if body.covers]
     if layers and (scene.lights or scene.environment_shadows):
         text = f"shadows of layers: light reaches opaque objects through {object_names(layers)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -203,16 +204,22 @@ class SurfaceLight:
     ----------
     paths : LightPaths
         Through the scene. Points are in metres from the eye of its camera, along the axes of the world.
+    scattered : callable, optional
+        Irradiance (k, 3) by bodies in which light diffuses, for points (k, 3) and unit normals (k, 3) of opaque
+        objects in the world. It is below 0 where they keep more light of the environment from there than they send.
     """
 
-    def __init__(self, paths: LightPaths) -> None:
-        self.paths, self.scene = paths, paths.scene
+    def __init__(self, paths: LightPaths, scattered: Callable[[Array, Array], Array] | None = None) -> None:
+        self.paths, self.scene, self._scattered = paths, paths.scene, scattered
         # A sheet with a diffuse base does not shadow that base.
         self._before = 2.0 * SHEET_ON_OPAQUE * paths.scene.diagonal
 
     def on_opaque(self, points: Array, normals: Array) -> Array:
         """Irradiance (k, 3) at points (k, 3) of opaque objects with unit normals (k, 3)."""
-        return self._irradiance(points, normals, 0.0)
+        found = self._irradiance(points, normals, 0.0)
+        if self._scattered is None:
+            return found
+        return np.maximum(found + self._scattered(points + self.scene.camera.eye, normals), 0.0)
 
     def on_interfaces(self, points: Array, normals: Array) -> Array:
         """Irradiance (k, 3) on layers, and on diffuse bases of interfaces; parameters as for `on_opaque`."""

@@ -24,6 +24,9 @@ FLAT = 1e-6
 #: Fraction of the scene's size by which what stands on a ground may be below it, by rounding.
 SUNK = 1e-5
 
+#: Distance from its plane up to which a point is on a ground, as a fraction of the size of a map of its light.
+TOLERANCE = 1e-3
+
 
 class Mirror(NamedTuple):
     """Flat ground.

@@ -303,7 +303,8 @@ class Scene(Frozen):
         environment, which by itself lights opaque objects only. Default: none.
     environment_shadows : int
         Directions of the environment, 0 to 256, in which objects keep its light from opaque ones: the more, the
-        smoother the shadows; 32 are good to a few percent. 0: it reaches them through everything.
+        smoother the shadows; 32 are good to a few percent. 0: it reaches them through everything, but a flat ground
+        still has the shadows of bodies in which light diffuses.
     """
 
     objects: Sequence[Object]

@@ -85,7 +85,7 @@ export function changedLight(told, texels, [width, height], after, sections) {
               for (let k = 0; k < 4; k++) {
                 change += weights[k] * ((1 - u) * coarse[3 * (rows[k] + a) + c] + u * coarse[3 * (rows[k] + b) + c]);
               }
-              found[at + c] = block.logarithmic ? found[at + c] * factor[c] * Math.exp(change) : Math.max(found[at + c] + change, 0);
+              found[at + c] = block.logarithmic ? found[at + c] * factor[c] * Math.exp(change) : found[at + c] + change;
             }
           }
         }
