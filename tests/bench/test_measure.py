@@ -24,7 +24,7 @@ from translucent.bench.experiment import Experiment, Whole
 from translucent.bench.methods import CostScaling, MethodComparison, ScalingStep
 from translucent.bench.output import read_report, table, write_report
 from translucent.bench.record import HardCase, Part, Report, ShadowCase
-from translucent.bench.run import measure_all
+from translucent.bench.run import ReportRequest, measure_all
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
 from translucent.bench.truth import CaseTruth
 from translucent.geometry.solids import Box, Sphere
@@ -223,7 +223,7 @@ def test_a_case_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) ->
 
     bad = dataclasses.replace(case_of(Sphere().tessellate(24)), name="bad", scene=scene)
     small(monkeypatch, bad, case_of(Sphere().tessellate(24)))
-    report = measure_all(size=(48, 48), methods=["signed-depth"], effort=HASTE, quick=True)
+    report = measure_all(ReportRequest(size=(48, 48), methods=["signed-depth"], effort=HASTE, quick=True))
     assert report.complete
     assert report.failures == ("bad: OSError: the file is gone",)
     assert report.cases[1].rows[1].method == "SignedDepth"
@@ -239,9 +239,8 @@ def test_an_interruption_leaves_what_is_done(monkeypatch: pytest.MonkeyPatch, tm
     last = dataclasses.replace(case_of(Sphere().tessellate(24)), name="last", scene=scene)
     small(monkeypatch, case_of(Sphere().tessellate(24)), last)
     path = tmp_path / "report.json"
-    report = measure_all(
-        size=(48, 48), methods=["signed-depth"], effort=HASTE, keep=lambda part: write_report(part, path)
-    )
+    request = ReportRequest(size=(48, 48), methods=["signed-depth"], effort=HASTE)
+    report = measure_all(request, keep=lambda part: write_report(part, path))
     assert not report.complete
     assert [case.name for case in report.cases] == ["mine"]
     assert read_report(path) == report
@@ -252,11 +251,11 @@ def test_parts_are_measured_anew_and_the_rest_is_kept(monkeypatch: pytest.Monkey
     small(monkeypatch, case_of(Sphere().tessellate(24)), more=(Told("shadows", "shadows.cases", ball),))
     hard = HardCase("H01", "grazing", "exact", "as promised", passed=True)
     old = Report(PROVENANCE, hard_cases=(hard,), seconds=9.0, complete=True)
-    new = measure_all(only=["shadows"], base=old, quick=True, command="the command")
+    new = measure_all(ReportRequest(only=["shadows"], quick=True), base=old, command="the command")
     assert (new.provenance, new.seconds, new.complete, new.hard_cases) == (PROVENANCE, 9.0, True, (hard,))
     assert new.shadows.cases == (ball,)
     assert [(one.parts, one.provenance.command) for one in new.renewals] == [(("shadows",), "the command")]
-    again = measure_all(only=["shadows", "hard-cases"], base=new, quick=True)
+    again = measure_all(ReportRequest(only=["shadows", "hard-cases"], quick=True), base=new)
     assert [one.parts for one in again.renewals] == [("shadows", "hard-cases")], "nothing is left of the first"
     assert again.hard_cases == ()
     assert Report.from_json(again.to_json()) == again
@@ -273,12 +272,12 @@ def test_parts_are_measured_anew_and_the_rest_is_kept(monkeypatch: pytest.Monkey
 )
 def test_bad_arguments_are_refused_before_any_work(arguments: dict[str, object], message: str) -> None:
     with pytest.raises(tl.InputError, match=message):
-        measure_all(**arguments)  # type: ignore[arg-type]
+        measure_all(ReportRequest(**arguments))  # type: ignore[arg-type]
 
 
 def test_the_cpu_alone_cannot_be_measured() -> None:
     with pytest.raises(tl.RenderError, match="no OpenGL"):
-        measure_all(backend="cpu")
+        measure_all(ReportRequest(backend="cpu"))
 
 
 def test_methods_are_chosen_by_name_or_family() -> None:

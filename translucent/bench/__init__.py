@@ -9,15 +9,24 @@ from translucent.bench.output import read_report, write_csv, write_report
 from translucent.bench.record import Report
 
 if TYPE_CHECKING:
-    from translucent.bench.run import measure_all
+    from translucent.bench.run import ReportRequest, measure_all
 
-__all__ = ["Change", "Report", "compare_reports", "measure_all", "read_report", "write_csv", "write_report"]
+__all__ = [
+    "Change",
+    "Report",
+    "ReportRequest",
+    "compare_reports",
+    "measure_all",
+    "read_report",
+    "write_csv",
+    "write_report",
+]
 
 
 def __getattr__(name: str) -> Any:
     # Reading and comparing reports needs no OpenGL, so it does not load it.
-    if name == "measure_all":
-        from translucent.bench.run import measure_all
+    if name in ("ReportRequest", "measure_all"):
+        from translucent.bench import run
 
-        return measure_all
+        return getattr(run, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -73,24 +74,11 @@ def experiments(quick: bool, extra: Sequence[Case] = (), methods: Sequence[str] 
     )
 
 
-def measure_all(
-    extra: Sequence[Case] = (),
-    *,
-    size: Size | None = None,
-    methods: Sequence[str] = (),
-    quick: bool = False,
-    backend: str | None = None,
-    effort: Effort | None = None,
-    only: Sequence[Part] = (),
-    base: Report | None = None,
-    limit: float | None = None,
-    command: str = "tl.bench.measure_all(...)",
-    progress: Progress = lambda *_: None,
-    keep: Callable[[Report], None] = lambda _: None,
-) -> Report:
-    """Measure everything, on the cases of the toolkit and on others.
+@dataclass(frozen=True)
+class ReportRequest:
+    """What a report is to measure: scenes, methods and parts, and with how much effort.
 
-    Parameters
+    Attributes
     ----------
     extra : sequence of Case
         Scenes to measure on, before those of the toolkit.
@@ -106,6 +94,36 @@ def measure_all(
         How long to measure; default: `QUICK` or `FULL`.
     only : sequence of {"scenes", "scaling", "slabs", "shadows", "hard-cases"}
         Parts to measure; default: all.
+    """
+
+    extra: Sequence[Case] = ()
+    size: Size | None = None
+    methods: Sequence[str] = ()
+    quick: bool = False
+    backend: str | None = None
+    effort: Effort | None = None
+    only: Sequence[Part] = ()
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Parts to measure, in the order of the report."""
+        return tuple(part for part in get_args(Part) if part in self.only or not self.only)
+
+
+def measure_all(
+    request: ReportRequest,
+    *,
+    base: Report | None = None,
+    limit: float | None = None,
+    command: str = "tl.bench.measure_all(...)",
+    progress: Progress = lambda *_: None,
+    keep: Callable[[Report], None] = lambda _: None,
+) -> Report:
+    """Measure what is requested.
+
+    Parameters
+    ----------
+    request : ReportRequest
     base : Report, optional
         What else there is, measured before: these parts are renewed in it, as the report notes.
     limit : float, optional
@@ -131,12 +149,12 @@ def measure_all(
     RenderError
         If there is no OpenGL to measure.
     """
-    size = check_size(size or (QUICK_SIZE if quick else FULL_SIZE))
-    check_names(methods)
-    parts = tuple(part for part in get_args(Part) if part in only or not only)
-    with opened(backend, size, effort or (QUICK if quick else FULL)) as bench:
-        made = provenance(bench.renderer, command, quick=quick)
-        every = experiments(quick, extra, methods)
+    size = check_size(request.size or (QUICK_SIZE if request.quick else FULL_SIZE))
+    check_names(request.methods)
+    parts, effort = request.parts, request.effort or (QUICK if request.quick else FULL)
+    with opened(request.backend, size, effort) as bench:
+        made = provenance(bench.renderer, command, quick=request.quick)
+        every = experiments(request.quick, request.extra, request.methods)
         begin = time.perf_counter()
 
         def stamped(found: Report, *, complete: bool) -> Report:

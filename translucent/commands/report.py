@@ -148,7 +148,7 @@ def _measured(
         echo("preparing the report: the first measurement takes a while", err=True)
     from translucent.bench.cases import model_cases
     from translucent.bench.output import write_report
-    from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
+    from translucent.bench.run import FULL_SIZE, QUICK_SIZE, ReportRequest, measure_all
 
     pixels = read_size(given.size) if given.size is not None else QUICK_SIZE if given.quick else FULL_SIZE
     requested = SceneRequest(medium=medium, file=given.file, size=pixels)
@@ -178,12 +178,14 @@ def _measured(
                 echo(f"measuring {done + 1} of {steps}: {printable(what)}", err=True)
 
         return measure_all(
-            model_cases(scenes),
-            size=pixels,
-            methods=[] if given.methods is None else [name.strip() for name in given.methods.split(",")],
-            quick=given.quick,
-            backend=given.backend,
-            only=parts,
+            ReportRequest(
+                model_cases(scenes),
+                pixels,
+                [] if given.methods is None else [name.strip() for name in given.methods.split(",")],
+                quick=given.quick,
+                backend=given.backend,
+                only=parts,
+            ),
             base=base,
             limit=given.limit,
             command=_command(models, given),
