@@ -46,8 +46,8 @@ settings.load_profile("project")
 def pytest_collection(session: pytest.Session) -> None:
     """Have every second process of a whole run import the test files from the last one on.
 
-    All processes collect all files. In a fresh clone, each file's asserts are rewritten for that, which takes as long as
-    all else together. So two processes share this work through the cache of bytecode.
+    All processes collect all files. In a fresh clone, pytest rewrites the asserts of each file for that, which takes
+    longer than the rest. So two processes share this work through the cache of bytecode.
     """
     number = os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
     if int(number) % 2 and session.config.args_source is pytest.Config.ArgsSource.TESTPATHS:
