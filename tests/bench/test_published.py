@@ -175,7 +175,6 @@ DEFINED = {
     "docs/report-scenes.md": {"3 %", "99.9 %", "15 %"},
     "docs/report.md": {"0.1 %"},
     "docs/scenes.md": {"1.5 seconds"},
-    "docs/web.md": {"0.1 %"},
 }
 
 
