@@ -41,10 +41,9 @@ def scene_of(preset: Preset, stage: str) -> tl.Scene:
     """Ball and bear of a preset, side by side on a stage."""
     bear = np.diag([2.0, 2.0, 2.0, 1.0])
     bear[:3, 3] = 0.036, 0.0, 0.0
-    surface = tl.Surface(roughness=preset.roughness)
     objects = [
-        tl.Object(tl.load_mesh(mesh_path("sphere")), preset.medium, surface=surface),
-        tl.Object(tl.load_mesh(mesh_path("bear")), preset.medium, bear, surface=surface),
+        tl.Object(tl.load_mesh(mesh_path("sphere")), material=preset),
+        tl.Object(tl.load_mesh(mesh_path("bear")), transform=bear, material=preset),
     ]
     scene = tl.Scene(objects, framing(objects, TILE), environment_shadows=SHADOWS)
     chosen = stage_named(stage)

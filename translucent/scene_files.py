@@ -35,6 +35,7 @@ from translucent.mesh_files import load_mesh
 from translucent.scene.camera import FRAMED_FROM, Camera, direction_from
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, Light, PointLight, SphereLight, SpotLight
+from translucent.scene.patterns import patterned, uniform_scale
 from translucent.scene.scene import Object, Scene
 from translucent.scene.showcase import LIGHT_TABLE, SOLID_IOR, default_medium, filled, framing, named_environment
 from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, Stage, has_ground, stage_named, staged
@@ -294,7 +295,7 @@ def _loaded(
     own = not os.path.lexists(path) and path in mesh_names()
     stated = values.get("unit") or unit or ("m" if own else None)
     sizes = {key: factor * _length(values[key]) for key in ("height", "longest") if key in values}
-    medium, roughness = _medium_of(values)
+    medium, roughness, pattern = _medium_of(values)
     if Path(path).suffix.lower() in GLTF:
         scene: Scene = load_gltf(path, stated, allow_outside=allow_outside)
         if sizes:
@@ -324,7 +325,10 @@ def _loaded(
         of_it = item.surface if not surface else replace(item.surface or Surface(), **surface)
         mesh = replace(item.mesh, name=values["name"]) if "name" in values else item.mesh
         priority = values.get("priority", 0)
-        placed.append(replace(item, mesh=mesh, transform=matrix @ item.matrix, surface=of_it, priority=priority))
+        place = matrix @ item.matrix
+        if item.medium is not None:
+            mesh, of_it = patterned(mesh, of_it, pattern, uniform_scale(place))
+        placed.append(replace(item, mesh=mesh, transform=place, surface=of_it, priority=priority))
     return _LoadedModel(placed, medium is not None or "opaque" in values or Path(path).suffix.lower() in GLTF)
 
 
@@ -352,12 +356,12 @@ def _coordinate(value: Any) -> float:
     return metres
 
 
-def _medium_of(values: Mapping[str, Any]) -> tuple[Medium | None, float | None]:
-    """Medium and roughness of a material; None where none is stated."""
-    medium, roughness, ior = None, None, values.get("ior")
+def _medium_of(values: Mapping[str, Any]) -> tuple[Medium | None, float | None, str]:
+    """Medium, roughness and pattern of a material; None, or no text, where none is stated."""
+    medium, roughness, pattern, ior = None, None, "", values.get("ior")
     if "preset" in values:
         chosen = preset(values["preset"])
-        medium, roughness = chosen.medium, chosen.roughness or None
+        medium, roughness, pattern = chosen.medium, chosen.roughness or None, chosen.pattern
     elif "color" in values:
         length = _length(values["distance"])
         color, changed = clamp_colors(parse_color(values["color"]))
@@ -369,9 +373,9 @@ def _medium_of(values: Mapping[str, Any]) -> tuple[Medium | None, float | None]:
         length = _length(values["mean_free_path"])
         medium = scattering_medium(values["scattering_color"], length, ior=SCATTERING_IOR)
     if medium is None:
-        return None, roughness
+        return None, roughness, pattern
     medium = medium.diluted(float(values["dilute"])) if "dilute" in values else medium
-    return (medium if ior is None else replace(medium, ior=float(ior))), roughness
+    return (medium if ior is None else replace(medium, ior=float(ior))), roughness, pattern
 
 
 def _transform(values: Mapping[str, Any], factor: float) -> Array:

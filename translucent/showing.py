@@ -26,7 +26,7 @@ from translucent.mesh_files import load_mesh
 from translucent.notebook.view import view
 from translucent.page.write import title_of, write_page
 from translucent.scene.scene import Scene
-from translucent.scene.showcase import filled, showcase, with_roughness
+from translucent.scene.showcase import filled, showcase, with_pattern, with_roughness
 from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, has_ground, staged
 from translucent.scene_files import is_composed, load_composed
 from translucent.threads import import_trimesh
@@ -104,19 +104,25 @@ def _at_desk(thing: object) -> bool:
 def _scene(thing: Any, material: Preset | Medium | None, unit: str | None) -> Scene:
     """Scene of a thing, filled with a material; on a stage, if it brings no light and no camera."""
     medium = material.medium if isinstance(material, Preset) else material
-    roughness = material.roughness if isinstance(material, Preset) else None
     if isinstance(thing, Scene):
-        return thing if medium is None else with_roughness(filled(thing, medium), roughness)
+        return thing if material is None else _made_of(thing, material)
     if isinstance(thing, str | Path) and is_composed(str(thing)):
         scene: Scene = load_composed(str(thing), unit, SIZE, None if medium is None else lambda _: medium)
         return staged(scene, scene.stage) if scene.stage != NO_STAGE else scene  # type: ignore[attr-defined]
     if is_scene(thing) or (isinstance(thing, str | Path) and Path(thing).suffix.lower() in SUFFIXES):
-        scene = load_scene(thing, unit, size=SIZE)
-        if medium is not None:
-            scene = with_roughness(filled(scene, medium), roughness)
-        bare = scene.bodies and not (scene.has_camera or scene.lights or has_ground(scene))
+        loaded = load_scene(thing, unit, size=SIZE)
+        scene = loaded if material is None else _made_of(loaded, material)
+        bare = scene.bodies and not (loaded.has_camera or scene.lights or has_ground(scene))
         return staged(scene, DEFAULT_STAGE) if bare else scene
     return showcase(_mesh(thing, unit), material, SIZE)
+
+
+def _made_of(scene: Scene, material: Preset | Medium) -> Scene:
+    """Scene filled with a material, with the surface of a preset."""
+    if isinstance(material, Preset):
+        filled_with = with_roughness(filled(scene, material.medium), material.roughness)
+        return with_pattern(filled_with, material.pattern)
+    return filled(scene, material)
 
 
 def _mesh(thing: object, unit: str | None) -> Mesh:

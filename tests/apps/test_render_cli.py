@@ -507,11 +507,11 @@ def test_a_preset_brings_its_roughness_unless_one_is_given(run: Run, tmp_path: P
     assert rough in run(*command, "jade", *SMALL).out
     assert rough not in run(*command, "jade", "--roughness", "0", *SMALL).out
     assert rough in run("explain", "bear", "--preset", "jade").out
-    assert rough not in run("explain", "bear", "--preset", "marble").out
-    jade, marble = MediumOptions(preset="jade"), MediumOptions(preset="marble")
+    assert rough not in run("explain", "bear", "--preset", "amber").out
+    jade, amber = MediumOptions(preset="jade"), MediumOptions(preset="amber")
     assert [jade.surface_roughness(one) for one in (0.5, 0.0, None)] == [0.5, 0.0, 0.15]
     # A preset that says nothing of surfaces leaves a file's as they are.
-    assert (marble.surface_roughness(), MediumOptions().surface_roughness()) == (None, None)
+    assert (amber.surface_roughness(), MediumOptions().surface_roughness()) == (None, None)
 
 
 def test_the_answer_comes_first_and_advice_last(run: Run, tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ CASES: dict[str, tuple[list[str], tuple[object, ...], list[Action]]] = {
             SetField("material.distance", 4e-3),
         ],
     ),
-    "wax": (["--preset", "wax"], ("wax",), [ChoosePreset("wax")]),
+    "marble": (["--preset", "marble"], ("marble",), [ChoosePreset("marble")]),
 }
 
 

@@ -36,14 +36,14 @@ COLORS = {
     "bottle_glass": ((0.25, 0.55, 0.22), 0.01),
     "soap": ((0.85, 0.55, 0.30), 0.02),
     "crystal": ((0.93, 0.96, 0.95), 0.01),
-    "wax": ((0.86, 0.68, 0.42), 0.01),
+    "wax": ((0.97, 0.92, 0.76), 0.01),
     "sea_water": ((0.22, 0.74, 0.89), 5.0),
     "whisky": ((0.80, 0.45, 0.12), 0.03),
     "red_wine": ((0.50, 0.012, 0.03), 0.02),
     "rose_wine": ((0.90, 0.48, 0.36), 0.04),
     "white_wine": ((0.92, 0.82, 0.42), 0.06),
     "frosted_glass": ((0.93, 0.96, 0.95), 0.01),
-    "ice": ((0.94, 0.975, 0.99), 0.1),
+    "ice": ((0.86, 0.95, 0.985), 0.1),
     "paraffin": ((0.965, 0.925, 0.84), 0.01),
     "resin": ((0.95, 0.90, 0.74), 0.03),
     "beeswax": ((0.988, 0.942, 0.577), 0.001),
@@ -52,14 +52,14 @@ COLORS = {
 #: Reduced scattering per mm of those that scatter, and the roughness of their surfaces.
 SCATTERING = {
     "jade": ((0.20, 0.25, 0.22), 0.15),
-    "wax": ((1.5, 1.5, 1.5), 0.35),
+    "wax": ((0.5, 0.5, 0.5), 0.35),
     "soap": ((1.0, 1.0, 1.0), 0.3),
     "paraffin": ((1.2, 1.2, 1.2), 0.35),
     "beeswax": ((1.2, 1.2, 1.2), 0.3),
 }
 
 #: Roughness of clear ones whose surfaces are not polished.
-ROUGH = {"frosted_glass": 0.35, "ice": 0.04}
+ROUGH = {"frosted_glass": 0.35, "ice": 0.12}
 
 
 @pytest.fixture(scope="module")
@@ -162,6 +162,7 @@ def test_recipes_of_marble_and_gummy_are_these_with_another_surface_and_with_haz
     np.testing.assert_array_equal(carved.scattering, marble.scattering)
     np.testing.assert_allclose(bear.absorption, clear.absorption, rtol=1e-5)
     assert (carved.roughness, bear.medium.anisotropy, clear.medium.scatters) == (0.3, 0.8, False)
+    assert (marble.pattern, carved.pattern, tl.preset("ice").pattern) == ("veins", "", "frost")
     assert bear.regime == "single scattering"
 
 

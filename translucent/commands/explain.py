@@ -71,6 +71,7 @@ def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
         file=given.file,
         environment_shadows=given.choices.environment_shadows,
         roughness=given.medium.surface_roughness(),
+        pattern=given.medium.surface_pattern,
         stage=given.stage,
     )
     scene, request = read_scene(model, requested), given.choices.read()

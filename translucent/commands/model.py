@@ -49,14 +49,15 @@ _OBJECT = "--object"
 
 @dataclass(frozen=True)
 class NamedMedium:
-    """Medium of the objects of a name, the roughness of their surfaces, if any is requested, and whether they keep the
-    index of refraction that their file states.
+    """Medium of the objects of a name, roughness and pattern of their surfaces, if any is requested, and whether they
+    keep the index of refraction that their file states.
     """
 
     name: str
     medium: Medium
     roughness: float | None
     keeps_ior: bool = False
+    pattern: str = ""
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,8 @@ class SceneRequest:
         Directions of it that throw shadows.
     roughness : float, optional
         Of the interfaces of media.
+    pattern : str
+        On these, as a preset has it, or nothing.
     stage : str, optional
         None is the default one, where it suits what the model and the options bring with them.
     ground : str, optional
@@ -98,6 +101,7 @@ class SceneRequest:
     environment: Environment | None = None
     environment_shadows: int | None = None
     roughness: float | None = None
+    pattern: str = ""
     stage: str | None = "none"
     ground: str | None = None
     media: Sequence[NamedMedium] = ()
@@ -133,7 +137,7 @@ def files_of(model: str) -> list[str]:
 
 def read_scene(model: str, requested: SceneRequest) -> Scene:
     """The scene of a glTF file, or one mesh on show, as it is requested."""
-    from translucent.scene.showcase import framing, objects_named, with_media, with_roughness
+    from translucent.scene.showcase import framing, objects_named, with_media, with_pattern, with_roughness
     from translucent.scene.stages import staged, upright
     from translucent.scene_files import is_composed
 
@@ -159,6 +163,8 @@ def read_scene(model: str, requested: SceneRequest) -> Scene:
         scene = with_roughness(scene, one.roughness, objects_named(scene, one.name))
     for line in _textured_roughness(scene, requested):
         advise(line)
+    for pattern, among in _patterns(scene, requested):
+        scene = with_pattern(scene, pattern, among)
     if options.defining:
         scene = dataclasses.replace(scene, camera=_defined_camera(scene, options, requested.size, chosen))
     if chosen is not None:
@@ -175,6 +181,16 @@ def read_scene(model: str, requested: SceneRequest) -> Scene:
         )
     count = requested.environment_shadows
     return scene if count is None else dataclasses.replace(scene, environment_shadows=count)
+
+
+def _patterns(scene: Scene, requested: SceneRequest) -> list[tuple[str, Sequence[Object]]]:
+    """Patterns of presets, and the objects that have them."""
+    from translucent.scene.showcase import objects_named
+
+    own = [(one.pattern, objects_named(scene, one.name)) for one in requested.media]
+    apart = {id(item) for _, items in own for item in items}
+    apart |= {id(scene.objects[i]) for i in getattr(scene, "with_material", ())}
+    return [(requested.pattern, [item for item in scene.objects if id(item) not in apart]), *own]
 
 
 def _textured_roughness(scene: Scene, requested: SceneRequest) -> list[str]:
@@ -478,7 +494,13 @@ def read_objects(names: Sequence[str]) -> list[NamedMedium]:
             do = "add --preset NAME, or --color C and --distance D, behind it"
             raise InputError(f"{_OBJECT} {name!r}", "no medium is given for this object", do)
         found.append(
-            NamedMedium(name, given.changed(medium), given.surface_roughness(given.roughness), given.keeps_ior)
+            NamedMedium(
+                name,
+                given.changed(medium),
+                given.surface_roughness(given.roughness),
+                given.keeps_ior,
+                given.surface_pattern,
+            )
         )
     return found
 

@@ -282,6 +282,13 @@ class MediumOptions:
 
         return (preset(self.preset).roughness or None) if stated is None and self.preset is not None else stated
 
+    @property
+    def surface_pattern(self) -> str:
+        """Pattern of the preset's surfaces, or nothing."""
+        from translucent.media.presets import preset
+
+        return preset(self.preset).pattern if self.preset is not None else ""
+
 
 @dataclass(frozen=True, kw_only=True)
 class AnyMediumOptions(MediumOptions):

@@ -222,6 +222,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
         environment=given.look.lighting(),
         environment_shadows=given.choices.environment_shadows,
         roughness=given.medium.surface_roughness(given.look.roughness),
+        pattern=given.medium.surface_pattern,
         stage=NO_STAGE if given.opaque_with or (given.system and given.stage is None) else given.stage,
         ground=given.ground,
         media=read_objects(given.object_names),

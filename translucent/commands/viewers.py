@@ -216,6 +216,7 @@ def page(model: str, given: PageOptions, as_json: bool) -> None:
         environment=look.lighting(),
         environment_shadows=given.choices.environment_shadows,
         roughness=given.medium.surface_roughness(look.roughness),
+        pattern=given.medium.surface_pattern,
         stage=given.stage,
         ground=given.ground,
     )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from translucent.units import metres_per_unit, parse_length
 
 Kind = Literal["measured", "estimated"]
 Regime = Literal["absorbing", "single scattering", "scattering dominated"]
+PatternName = Literal["", "veins", "frost"]
 Triple = tuple[float, float, float]
 
 #: The papers that measured presets name as their source.
@@ -83,6 +84,8 @@ class Preset:
         Of a typical surface, 0 (polished) to 1, as in `Surface`; 0 also where nothing is said about it.
     group : str
         Heading under which it is listed, such as ``stone and resin``; empty if none.
+    pattern : {"", "veins", "frost"}
+        Of a typical surface; see `translucent.scene.patterns`.
     """
 
     name: str
@@ -95,6 +98,7 @@ class Preset:
     reduced: bool = False
     roughness: float = 0.0
     group: str = ""
+    pattern: PatternName = ""
 
     def _repr_html_(self) -> str:
         """Name and swatches, for notebooks: of light that passes, and of slabs on a white and a black card."""
@@ -231,6 +235,7 @@ class Preset:
             "warning": self.warning,
             "ior": self.medium.ior,
             "roughness": self.roughness,
+            "pattern": self.pattern,
             "absorption": self.absorption.tolist(),
             "scattering": self.scattering.tolist(),
             "scattering_is_reduced": self.reduced,
@@ -277,7 +282,7 @@ def _hex(linear: Array) -> str:
 
 
 _ALWAYS = {"kind", "source", "ior"}
-_OPTIONAL = {"group", "note", "aliases", "roughness"}
+_OPTIONAL = {"group", "note", "aliases", "roughness", "pattern"}
 _BY_COLOR = {"color", "distance"}
 _BY_COEFFICIENTS = {"unit", "absorption"}
 _UNREDUCED = {"scattering", "anisotropy", "phase"}
@@ -344,6 +349,7 @@ def preset_text(one: Preset) -> str:
     values |= {"emission": emission} if any(emission) else {}
     values |= {"ior": float(medium.ior)}
     values |= {"roughness": one.roughness} if one.roughness else {}
+    values |= {"pattern": one.pattern} if one.pattern else {}
     values |= {"note": one.note} if one.note else {}
     values |= {"aliases": list(one.aliases)} if one.aliases else {}
     # JSON's numbers, lists and strings are TOML's.
@@ -451,7 +457,14 @@ class _Entry:
             "reduced_scattering" in self.entry,
             self._roughness(),
             self._text("group") if "group" in self.entry else "",
+            self._pattern(),
         )
+
+    def _pattern(self) -> PatternName:
+        name = self._text("pattern") if "pattern" in self.entry else ""
+        if name not in get_args(PatternName):
+            raise self._wrong("pattern", " or ".join(f'"{one}"' for one in get_args(PatternName) if one))
+        return cast(PatternName, name)
 
     def _medium(self, anisotropy: Triple, phase: PhaseFunction | None) -> Medium:
         ior = self._number("ior", self.entry["ior"])

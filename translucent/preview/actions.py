@@ -324,7 +324,7 @@ def preset_material(material: Material, name: str) -> Material:
     found = preset(name)
     roughness = found.roughness or (0.0 if material.source == "preset" else material.roughness)
     stated: dict[str, Any] = medium_fields(found.medium) | {"source": "preset", "preset": found.name}
-    return _with_color(dataclasses.replace(material, **stated, roughness=roughness))
+    return _with_color(dataclasses.replace(material, **stated, roughness=roughness, pattern=found.pattern))
 
 
 def scattering_of(material: Material) -> tuple[Triple, float] | None:

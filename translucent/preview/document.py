@@ -17,6 +17,7 @@ import numpy.typing as npt
 from translucent.errors import InputError
 from translucent.formulas.tone import TONES
 from translucent.media.medium import MAX_COEFFICIENT, MAX_EMISSION, MAX_IOR, Medium
+from translucent.media.preset import PatternName
 from translucent.planning.flags import Flags
 from translucent.planning.methods import METHODS
 from translucent.planning.scattering import SCATTERINGS
@@ -133,6 +134,8 @@ class Material:
     color_texture, roughness_texture : str
         Files of pictures that multiply the tint of the surface (baseColorTexture) and its roughness
         (metallicRoughnessTexture, G), over the texture coordinates of the mesh; or nothing: those of the model.
+    pattern : {"", "veins", "frost"}
+        On surfaces without textures; see `translucent.scene.patterns`.
     """
 
     source: Source = one_of("file", get_args(Source))
@@ -156,6 +159,7 @@ class Material:
     thickness: float = ranged(0.001, 0.0, _LONGEST, above=True)
     color_texture: str = ""
     roughness_texture: str = ""
+    pattern: PatternName = one_of("", get_args(PatternName))
 
     @property
     def surface_values(self) -> dict[str, float]:
@@ -621,6 +625,7 @@ model.time = Time of the file's animations in seconds: nodes, skins and morph ta
     the moved meshes.
 material.color_texture = baseColorTexture (glTF): a picture (.png, .jpg) over the texture coordinates of the mesh, which
     tints what passes the surface.
+material.pattern = Pattern on surfaces without textures: veins of marble, or cracks and frost of ice.
 material.roughness_texture = metallicRoughnessTexture (glTF): a picture, the green of which multiplies the roughness.
 placed.location = How far the object is moved, in metres. Or drag its gizmo (W).
 placed.rotation = Degrees about X, then Y, then Z, around its middle. Or drag its gizmo (R).

@@ -312,6 +312,8 @@ def _medium_options(material: Material) -> tuple[list[str], list[str]]:
     fields = {"scattering": "scattering", "emission": "emission"}
     left_out = [part for name, part in fields.items() if np.any(getattr(found, name) != getattr(requested, name))]
     left_out += ["textures"] if material.color_texture or material.roughness_texture else []
+    known = preset(material.preset).pattern if material.source == "preset" else ""
+    left_out += ["the pattern"] if material.pattern != known else []
     return [*words, "--roughness", f"{material.roughness:g}"], left_out + material.unsaid
 
 
@@ -430,6 +432,11 @@ def _filling_lines(material: Material, number: int | None) -> list[str]:
     )
     if "picture_texture" in values:
         lines += ["from translucent.preview.scenes import picture_texture"]
+    if material.pattern:
+        marked = f"scene = with_pattern(scene, {material.pattern!r}{among})"
+        after = ["from translucent.scene.showcase import with_pattern", marked]
+    else:
+        after = []
     return [
         *lines,
         f"values = dict({values}, opacity=None)",
@@ -438,6 +445,7 @@ def _filling_lines(material: Material, number: int | None) -> list[str]:
         f"    if {chosen} else item",
         "    for item in scene.objects",
         "])",
+        *after,
     ]
 
 

@@ -41,7 +41,7 @@ from translucent.preview.worker import worker_renderer
 from translucent.scene.camera import Camera
 from translucent.scene.environment_files import READERS
 from translucent.scene.environment_map import texel_directions
-from translucent.scene.showcase import named_environment, showcase, with_roughness
+from translucent.scene.showcase import named_environment, showcase, with_pattern, with_roughness
 from translucent.scene.stages import DEFAULT_STAGE, STAGED_TONE, stage_named
 from translucent.version import VERSION
 
@@ -148,7 +148,9 @@ class Library:
         medium = medium_of(material)
         g = float(medium.anisotropy)
         source = f"{SAVED}, after {material.preset}" if material.preset else SAVED
-        one = Preset(name, medium, "estimated", source, "", (), (g, g, g), False, material.roughness, OWN)
+        one = Preset(
+            name, medium, "estimated", source, "", (), (g, g, g), False, material.roughness, OWN, material.pattern
+        )
         path = save_own_preset(one, self.folder)
         self._checked = -WATCH
         return path, material.unsaid
@@ -217,7 +219,7 @@ def ball_key(one: Preset) -> str:
     medium = one.medium
     triples = medium.absorption, medium.scattering, medium.emission
     values = *triples, medium.phase_function.parameters, medium.ior, one.roughness
-    return _key("ball", BALL, *(np.asarray(value, dtype=np.float64).tolist() for value in values))
+    return _key("ball", BALL, one.pattern, *(np.asarray(value, dtype=np.float64).tolist() for value in values))
 
 
 def panorama_key(path: str) -> str:
@@ -242,6 +244,7 @@ def _key(kind: str, *content: object) -> str:
 def draw_ball(one: Preset) -> Picture:
     """Draw a ball of a medium on the default stage, from so near that it fills the picture."""
     scene = with_roughness(showcase(_ball(), one.medium, BALL), one.roughness or None)
+    scene = with_pattern(scene, one.pattern)
     stage = stage_named(DEFAULT_STAGE)
     assert stage is not None
     camera = Camera.framing(scene.objects[0].mesh.vertices, BALL, stage.view)

@@ -54,6 +54,7 @@ from translucent.scene.camera import Camera, direction_from
 from translucent.scene.environment import Environment, filtered
 from translucent.scene.environment_files import READERS
 from translucent.scene.lights import DirectionalLight, PointLight, PositionalLight, SphereLight, SpotLight
+from translucent.scene.patterns import patterned, uniform_scale
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.shadow_directions import shadow_directions
 from translucent.scene.showcase import (
@@ -530,7 +531,8 @@ def _filled(item: Object, material: Material, medium: Medium) -> Object:
     if material.roughness_texture:
         found = _texture(material.roughness_texture, item, encoded=False)
         surface = dataclasses.replace(surface, roughness_texture=found)
-    return dataclasses.replace(item, medium=medium, surface=surface, sheet_thickness=None)
+    mesh, marked = patterned(item.mesh, surface, material.pattern, uniform_scale(item.matrix))
+    return dataclasses.replace(item, mesh=mesh, medium=medium, surface=marked, sheet_thickness=None)
 
 
 @lru_cache(maxsize=2)

@@ -23,6 +23,7 @@ from translucent.media.presets import preset
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment, parse_radiance
 from translucent.scene.lights import Light as Light
+from translucent.scene.patterns import patterned, uniform_scale
 from translucent.scene.surface import Surface
 
 Overlap = Literal["add", "union", "priority"]
@@ -66,7 +67,8 @@ class Object(Frozen):
         Whether an opaque object is a ground for the others, of any size. Rendered with ``transparent``, no more is
         seen of it than the shadows on it, over what the frame is put over.
     material : Preset or str, optional
-        A preset, or its name, for medium and surface together: ``tl.Object(mesh, material="wax")``.
+        A preset, or its name, for medium and surface together: ``tl.Object(mesh, material="wax")``. With a pattern,
+        as marble has, the object has the mesh with texture coordinates of that.
     """
 
     mesh: Mesh
@@ -148,7 +150,11 @@ class Object(Frozen):
             raise InputError(requested, f"{type(material).__name__}", do)
         made = preset(material) if isinstance(material, str) else material
         object.__setattr__(self, "medium", made.medium)
-        object.__setattr__(self, "surface", Surface(roughness=made.roughness) if made.roughness else None)
+        scale = 1.0 if self.transform is None else uniform_scale(self.transform)
+        surface = Surface(roughness=made.roughness) if made.roughness else None
+        mesh, surface = patterned(self.mesh, surface, made.pattern, scale)
+        object.__setattr__(self, "mesh", mesh)
+        object.__setattr__(self, "surface", surface)
 
     def _check_surface(self, surface: Surface) -> None:
         _require_type("surface of an object", surface, Surface, "use tl.Surface")

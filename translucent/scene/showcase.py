@@ -20,6 +20,7 @@ from translucent.media.preset import Preset
 from translucent.media.presets import presets
 from translucent.scene.camera import FRAMED_FROM, Camera, framing_directions
 from translucent.scene.environment import Environment
+from translucent.scene.patterns import patterned, uniform_scale
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.stages import (
     DEFAULT_STAGE,
@@ -219,6 +220,21 @@ def with_roughness(scene: AnyScene, roughness: float | None, among: Sequence[Obj
         return dataclasses.replace(item, surface=dataclasses.replace(item.surface or Surface(), roughness=roughness))
 
     return dataclasses.replace(scene, objects=[surfaced(item) for item in scene.objects])
+
+
+def with_pattern(scene: AnyScene, pattern: str, among: Sequence[Object] | None = None) -> AnyScene:
+    """Scene with a pattern of `translucent.scene.patterns` on all solids, or on some objects, that have no textures."""
+    if not pattern:
+        return scene
+    chosen = set(map(id, scene.objects if among is None else among))
+
+    def marked(item: Object) -> Object:
+        if item.medium is None or item.covers or item.sheet_thickness is not None or id(item) not in chosen:
+            return item
+        mesh, surface = patterned(item.mesh, item.surface, pattern, uniform_scale(item.matrix))
+        return item if mesh is item.mesh else dataclasses.replace(item, mesh=mesh, surface=surface)
+
+    return dataclasses.replace(scene, objects=[marked(item) for item in scene.objects])
 
 
 def with_media(scene: AnyScene, change: Callable[[Medium], Medium], among: Sequence[Object] | None = None) -> AnyScene:

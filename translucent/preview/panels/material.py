@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from translucent.materials import TARGETS, text_block
 from translucent.media.colors import parse_color
 from translucent.media.conversion import summary
 from translucent.media.medium import color_at
-from translucent.media.preset import Preset
+from translucent.media.preset import PatternName, Preset
 from translucent.media.presets import grouped, presets
 from translucent.preview.actions import Assign, Hide, SetField, scattering_of
 from translucent.preview.document import (
@@ -86,6 +86,10 @@ def material_panel(state: WindowState) -> None:
         ui.slider(state, "dispersion", "material.dispersion", 0.0, 10.0)
         for slot in ("color_texture", "roughness_texture"):
             _texture(state, slot)
+        ui.row("pattern", TIPS["material.pattern"])
+        words = [(name or "none", name) for name in get_args(PatternName)]
+        choose = partial(state.change, "material.pattern", step=True)
+        ui.combo("pattern", material.pattern or "none", words, material.pattern, choose)
         imgui.end_table()
     imgui.separator_text("Thin film and clear coat")
     if ui.begin_rows("film"):

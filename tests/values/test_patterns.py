@@ -1,0 +1,50 @@
+"""Patterns of surfaces: veins of marble, cracks and frost of ice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.errors import InputError
+from translucent.geometry.solids import Box
+from translucent.media.preset import preset_text, read_presets
+from translucent.scene.patterns import ACROSS, PATTERNS, patterned
+from translucent.scene.showcase import with_pattern
+
+BOX = Box((0, 0, 0), (0.1, 0.2, 0.3)).tessellate()
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_a_pattern_has_a_size_in_metres_and_goes_through_the_body(name: str) -> None:
+    mesh, surface = patterned(BOX, None, name)
+    assert mesh.uv is not None
+    assert surface is not None
+    np.testing.assert_allclose(PATTERNS[name].period * mesh.uv, BOX.vertices @ ACROSS.T, rtol=1e-12)
+    assert patterned(BOX, None, name)[0] is mesh  # what renderers keep of it stays
+    scaled = tl.Object(BOX, transform=np.diag([2.0, 2.0, 2.0, 1.0]), material="marble" if name == "veins" else "ice")
+    np.testing.assert_allclose(scaled.mesh.uv, 2.0 * mesh.uv, rtol=1e-12)
+    # It repeats without a seam: texels across the edge differ as neighbors do.
+    for texture in filter(None, surface.textures):
+        edge = np.abs(texture.pixels[0] - texture.pixels[-1]).mean()
+        assert 0.0 < edge < 2.0 * np.abs(np.diff(texture.pixels, axis=0)).mean()
+
+
+def test_textures_of_a_surface_stay() -> None:
+    own = tl.Surface(color_texture=tl.Texture(np.ones((1, 1, 3))))
+    assert patterned(BOX, own, "veins") == (BOX, own)
+    assert patterned(BOX, None, "") == (BOX, None)
+    with pytest.raises(InputError, match=r"no pattern has the name 'wood'; use one of veins, frost"):
+        patterned(BOX, None, "wood")
+
+
+def test_scenes_and_presets_have_patterns() -> None:
+    scene = tl.Scene([tl.Object(BOX, tl.Medium(ior=1.3)), tl.Object(BOX)], tl.Camera.framing(BOX.vertices, (8, 8)))
+    body, opaque = with_pattern(scene, "frost").objects
+    assert body.surface is not None
+    assert body.surface.transmission_texture is not None
+    assert opaque is scene.objects[1]
+    ice = tl.preset("ice")
+    assert read_presets(preset_text(ice))["ice"].pattern == ice.summary()["pattern"] == "frost"
+    with pytest.raises(InputError, match=r'"veins" or "frost"'):
+        read_presets(preset_text(ice).replace('"frost"', '"wood"'))
