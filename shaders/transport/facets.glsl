@@ -9,7 +9,7 @@ uniform float blurred_fraction;         // of the variance of microfacets, that 
 // a pixel (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), two for every other interface, from a
 // random start for each pixel and path (Jarzynski & Olano 2020, "Hash functions for GPU rendering").
 vec2 microfacet_numbers(uvec2 pixel, int depth, uint branch_code) {
-    uint state = (pixel.x * 1664525u + pixel.y * 22695477u + uint(depth / 2) * 2654435761u + branch_code * 40503u) * 747796405u + 2891336453u;
+    uint state = (pixel.x * 1664525u + pixel.y * 22695477u + uint(depth) * 2654435761u + branch_code * 40503u) * 747796405u + 2891336453u;
     state = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
     state = (state >> 22u) ^ state;
     vec2 step = depth % 2 == 0 ? vec2(0.8566749, 0.7338919) : vec2(0.6287067, 0.5385973);

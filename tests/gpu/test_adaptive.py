@@ -11,7 +11,8 @@ import pytest
 import translucent as tl
 import translucent.gpu.renderer as renderer_module
 from translucent.geometry.solids import Box, Sphere
-from translucent.gpu.adaptive import wanted_samples
+from translucent.gpu import adaptive
+from translucent.gpu.adaptive import isolated_pixels, wanted_samples
 from translucent.gpu.job import FrameJob
 from translucent.gpu.targets import read_floats
 
@@ -167,3 +168,33 @@ def test_wanted_samples_leave_the_error_of_the_same_number_everywhere() -> None:
     assert np.mean((deviations / samples) ** 2) == pytest.approx(np.mean((deviations / 16) ** 2), rel=1e-4)
     assert samples.mean() < 10.0
     assert wanted_samples(np.zeros(4, np.float32), 16) == 0.0
+
+
+def test_isolated_pixels_are_found_and_edges_are_not() -> None:
+    level = 1.0 + 0.02 * np.random.default_rng(1).uniform(-1.0, 1.0, (24, 32)).astype(np.float32)
+    level[:, 16:] *= 3.0  # an edge
+    level[8, :16] += 0.5  # a line
+    for row, column, factor in ((4, 5, 1.3), (15, 8, 0.8), (12, 25, 1.2)):
+        level[row, column] *= factor
+    level[20, 20] = 9.0
+    inside = np.ones(level.shape, bool)
+    inside[19, 20] = False
+    found = {(int(row), int(column)) for row, column in np.argwhere(isolated_pixels(level, inside))}
+    assert found == {(4, 5), (15, 8), (12, 25)}
+
+
+def test_no_pixel_of_frosted_glass_is_far_off_its_neighbors(
+    renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More samples of a few pixels bring them back, and leave the mean of the picture where it is."""
+    frosted = ball(surface=tl.Surface(roughness=0.35))
+    scene = dataclasses.replace(frosted, environment=tl.Environment.studio())
+    after = renderer.render(scene, (96, 72), samples=16)
+    with monkeypatch.context() as patch:
+        patch.setattr(adaptive, "ISOLATED", 1e9)
+        before = renderer.render(scene, (96, 72), samples=16)
+    count = [isolated_pixels(one.radiance.sum(axis=-1), one.coverage.astype(bool)).sum() for one in (before, after)]
+    assert count[0] > 10
+    assert count[1] < 0.2 * count[0]
+    means = [one.radiance[one.coverage].mean(dtype=np.float64) for one in (before, after)]
+    assert abs(means[1] / means[0] - 1.0) < 2e-3

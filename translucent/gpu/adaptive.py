@@ -32,6 +32,11 @@ MIRROR_CONTRAST = 0.01
 #: picture are all taken.
 FIRST_LOOK, MORE = 4, 2
 
+#: Of rough interfaces, a pixel is isolated that is farther from the median of the eight around it than so many spreads
+#: of the 24 around it, and from each of the eight by a fraction of that; and the least spread, as a fraction of the
+#: median. Isolated pixels have at most so many samples, in those of the picture.
+ISOLATED, ALONE, LEAST_SPREAD, MOST_AGAIN = 3.0, 0.4, 0.015, 4
+
 #: Fractions of a pixel's light that rays lose, as in open meshes, from which on it is not worth more samples: of
 #: interfaces, so that one sample of 16 makes the pixel invalid (`renderer.MOST_LOST`) whatever the others find; and of
 #: what a ground mirrors, so that as many lost by the others do.
@@ -89,7 +94,7 @@ class AdaptiveSampling:
                 self._add_opaque(job)
             clock.outside()
         job.bending = True
-        leave_out = _left_out(job)
+        leave_out = _left_out(job, mirror=job.mirror is not None, needed=_NEEDED)
         # Settled pixels are left out after these; once a few are there, each time that their number has doubled.
         most = _most(samples)
         looks = {1} | {2**i for i in range(2, most.bit_length()) if most > samples}
@@ -99,11 +104,45 @@ class AdaptiveSampling:
                 if not left:
                     break
                 clock.left = left
-            job.sample = number
-            job.place(shift)
-            run_passes(leave_out)
+            self._trace_sample(job, number, shift, run_passes, leave_out)
             clock.bent(number)
+        if samples > FIRST_LOOK and any(body.surface and body.surface.roughness > 0 for body in job.scene.bodies):
+            self._settle_isolated(job, samples, run_passes)
         job.bending = False
+
+    def _trace_sample(
+        self, job: FrameJob, number: int, shift: tuple[float, float], run_passes: Run, leave_out: tuple[PassName, ...]
+    ) -> None:
+        job.sample = number
+        job.place(shift)
+        run_passes(leave_out)
+
+    def _settle_isolated(self, job: FrameJob, samples: int, run_passes: Run) -> None:
+        """Take more samples of single pixels far off their neighbors, whose random microfacets went wrong together.
+
+        The choice by what was found takes from the mean of the picture a part of what these pixels exceed it by.
+        """
+        first, last = _most(samples), MOST_AGAIN * samples
+        # Nothing opaque is in front of these pixels, and what is behind is known.
+        leave_out = _left_out(job, mirror=False, needed=(PassName.INTERFACES, PassName.TRACED))
+        shifts = sobol_points(last)[first:]
+        for number, shift in enumerate((shifts - shifts.mean(axis=0)).tolist(), first):
+            if (number - first) % samples == 0 and not self._mark_isolated(job):
+                break
+            self._trace_sample(job, number, shift, run_passes, leave_out)
+
+    def _mark_isolated(self, job: FrameJob) -> bool:
+        """Mark the isolated pixels that show interfaces alone; returns whether there are any."""
+        light, beside = (read_floats(job.targets[name], 0, 4) for name in ("bent", "average"))
+        taken = light[..., 3]
+        inside = (taken > 0) & (beside[..., 3] == 0)
+        level = light[..., :3].sum(axis=-1) / np.where(inside, taken, 1.0)
+        found = isolated_pixels(level, inside)
+        for name in ("unsettled", "mirror_unsettled"):
+            if name == "unsettled" or job.mirror is not None:
+                job.targets[name].clear()
+        job.targets["unsettled"].color_attachments[0].write(found.astype(np.float32).tobytes())
+        return bool(found.any())
 
     def _add_opaque(self, job: FrameJob) -> None:
         self._part.bind(sampled=job.targets["opaque"].color_attachments[1])
@@ -166,6 +205,28 @@ def wanted_samples(deviations: Floats, samples: int) -> float:
     return float(samples * np.sqrt(0.5 * (found ** (2 / 3)).sum() / np.square(found).sum()))
 
 
+def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """(h, w): pixels far off their neighbors in a picture (h, w), of those all of whose neighbors are inside (h, w)."""
+    found, (height, width) = np.zeros(level.shape, bool), level.shape
+    steps = [(y, x) for y in range(-2, 3) for x in range(-2, 3) if (y, x) != (0, 0)]
+    padded = np.pad(inside, 1)
+    beside = [padded[1 + y : 1 + y + height, 1 + x : 1 + x + width] for y, x in steps if max(abs(y), abs(x)) == 1]
+    row, column = np.nonzero(inside & np.all(beside, axis=0))
+    near = np.array([level[row + y, column + x] for y, x in steps if max(abs(y), abs(x)) == 1]).reshape(8, -1)
+    own, low, high = level[row, column], near.min(axis=0), near.max(axis=0)
+    off = np.maximum(low - own, own - high)  # of those between their neighbors none is isolated
+    chosen = np.flatnonzero(off > 0.0)
+    row, column, own, off, near = row[chosen], column[chosen], own[chosen], off[chosen], near[:, chosen]
+    median = np.median(near, axis=0)
+    around = [(np.clip(row + y, 0, height - 1), np.clip(column + x, 0, width - 1)) for y, x in steps]
+    wide = np.array([np.where(inside[at], level[at], median) for at in around])
+    spread = 1.4826 * np.median(np.abs(wide - np.median(wide, axis=0)), axis=0)
+    distance = np.abs(own - median)
+    far = (distance > ISOLATED * np.maximum(spread, LEAST_SPREAD * np.abs(median))) & (off > ALONE * distance)
+    found[row[far], column[far]] = True
+    return found
+
+
 def _most(samples: int) -> int:
     """Samples of a pixel at most."""
     return MORE * samples if samples > FIRST_LOOK else samples
@@ -219,13 +280,13 @@ def _central_first(samples: int) -> list[tuple[float, float]]:
     return [(right, down) for right, down in shifts.tolist()]
 
 
-def _left_out(job: FrameJob) -> tuple[PassName, ...]:
-    """Passes of a sample that tracing its rays does not need."""
+def _left_out(job: FrameJob, *, mirror: bool, needed: tuple[PassName, ...]) -> tuple[PassName, ...]:
+    """Passes of a sample that tracing its rays does not need: from a ground's mirror image, too, or from interfaces."""
     features = job.features
     # Of what the ground mirrors, media without an interface may absorb some.
-    if job.plan.ordered or features.emits or features.scatters or not features.one_interface or job.mirror is not None:
+    if job.plan.ordered or features.emits or features.scatters or not features.one_interface or mirror:
         return _DONE
-    return tuple(step.name for step in job.plan.passes if step.name not in _NEEDED)
+    return tuple(step.name for step in job.plan.passes if step.name not in needed)
 
 
 class _Clock:
