@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 MOST_BYTES = 1_000_000
 
 PICTURE = """<!doctype html>
+<html lang="en">
 <title>translucent</title>
 <style>body {{ margin: 0 }} img {{ width: 100%; height: 100vh; object-fit: contain }}</style>
 <img src="{file}" alt="Gummy bears in three colors">
