@@ -172,6 +172,19 @@ def renderer() -> Iterator[tl.Renderer]:
         yield made
 
 
+@pytest.fixture
+def one_renderer(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """Have commands and scripts draw with the renderer of all tests: a new one for each compiles its programs anew.
+
+    It is not theirs where they name a backend, or where a machine without OpenGL is tested.
+    """
+    if "no_opengl" not in request.fixturenames:
+        own, shared = tl.Renderer, request.getfixturevalue("renderer")
+        monkeypatch.setattr(
+            tl, "Renderer", lambda backend=None: own(backend) if backend else contextlib.nullcontext(shared)
+        )
+
+
 @pytest.fixture(scope="session")
 def validate() -> Callable[[Path], dict[str, Any]]:
     """Issues that gltf-validator finds; the module is looked for from the working folder, and by NODE_PATH."""

@@ -12,6 +12,8 @@ from tests.boxes import boxes
 from tests.command_line import Run
 from translucent.gltf.file import write_gltf
 
+pytestmark = pytest.mark.usefixtures("one_renderer")
+
 GLASS = {
     "extensions": {
         "KHR_materials_transmission": {"transmissionFactor": 1.0},

@@ -6,7 +6,6 @@ import ast
 import json
 import runpy
 from collections.abc import Iterator
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +28,10 @@ def small(
     in_tmp_path: Path,
     few_shadows: None,
     coarse_light: None,
-    renderer: tl.Renderer,
+    one_renderer: None,
 ) -> None:
     """Little pictures, with few shadows and coarse light, by the one renderer that all tests share."""
     monkeypatch.setenv("EXAMPLE_WIDTH", "48")
-    monkeypatch.setattr(tl, "Renderer", lambda: nullcontext(renderer))
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)

@@ -13,6 +13,8 @@ from tests.command_line import Run
 from translucent.commands import console
 from translucent.commands.console import ProgressLine, time_text
 
+pytestmark = pytest.mark.usefixtures("one_renderer")
+
 JADE = ("bear", "--preset", "jade", "--method", "path-traced", "--size", "16x12")
 
 

@@ -7,7 +7,6 @@ import itertools
 import re
 import shlex
 from collections.abc import Callable
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -72,13 +71,9 @@ def small(
     few_shadows: None,
     coarse_light: None,
     without_processes: Callable[[], None],
-    renderer: tl.Renderer,
+    one_renderer: None,
 ) -> None:
     """One renderer, which keeps its programs, for all; few shadows, coarse light, and no processes."""
-    own = tl.Renderer
-    monkeypatch.setattr(
-        tl, "Renderer", lambda backend="auto": own("cpu") if backend == "cpu" else nullcontext(renderer)
-    )
     without_processes()
     monkeypatch.setattr(atlas, "_new_uv", new_uv)
 

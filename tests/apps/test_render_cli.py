@@ -18,7 +18,7 @@ from tests.command_line import Result, Run, one_error_line, strict_json
 from translucent.commands.options import MediumOptions
 from translucent.planning.methods import METHODS
 
-pytestmark = pytest.mark.usefixtures("few_shadows")
+pytestmark = pytest.mark.usefixtures("few_shadows", "one_renderer")
 
 GREEN = "linear(0.18,0.62,0.35)"
 

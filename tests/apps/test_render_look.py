@@ -15,7 +15,7 @@ from tests.command_line import Run, one_error_line
 from translucent.commands.options import LookOptions
 from translucent.scene.showcase import LIGHT_TABLE
 
-pytestmark = pytest.mark.usefixtures("few_shadows")
+pytestmark = pytest.mark.usefixtures("few_shadows", "one_renderer")
 
 SMALL = ("--size", "32x24", "--samples", "1")
 

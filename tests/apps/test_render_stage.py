@@ -15,6 +15,8 @@ from translucent.commands.model import SceneRequest, read_scene
 from translucent.commands.options import CameraOptions
 from translucent.scene.showcase import LIGHT_TABLE
 
+pytestmark = pytest.mark.usefixtures("one_renderer")
+
 SMALL = ("--size", "48x27", "--samples", "1")
 FEW = ("--environment-shadows", "8", "--shadow-size", "64", *SMALL)
 

@@ -18,7 +18,7 @@ from translucent.preview.exports import Recipe, command_line, python_code
 from translucent.preview.scenes import first_orbit, load, scene_of, stage_name
 from translucent.scene.touching import with_priorities
 
-pytestmark = pytest.mark.usefixtures("few_shadows")
+pytestmark = pytest.mark.usefixtures("few_shadows", "one_renderer")
 
 TEXT = "goblet:crystal wine:#7b1e3a@1cm"
 

@@ -436,8 +436,8 @@ def test_ctrl_c_leaves_nothing(many: bool, ball_glb: Path, tmp_path: Path) -> No
     where = ["--out-dir", str(folder)] if many else ["-o", str(folder / "ball.exr")]
     # Spawned processes run the script, too, but for its end.
     (tmp_path / "bake.py").write_text(TELLING)
-    # Three seconds of a core in all, in sixteen strips: what has begun ends soon, and most has not begun.
-    options = ["--rays", "128", "--size", "512"]
+    # A second of a core in all, in sixteen strips: what has begun ends soon, and most has not begun.
+    options = ["--rays", "48", "--size", "512"]
     command = [sys.executable, str(tmp_path / "bake.py"), "bake", str(ball_glb), *where, *options]
     # A shell that runs tests in the background has its children ignore what Ctrl-C sends.
     heeding = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)

@@ -152,7 +152,7 @@ def test_rough_interfaces_take_samples_where_they_are_noisy(renderer: tl.Rendere
     """The error of the picture is that of all samples, and its mean theirs."""
     scene = ball(surface=tl.Surface(roughness=0.3))
     few, every = (renderer.render(scene, SIZE, samples=16, adaptive=adaptive) for adaptive in (True, False))
-    truth = renderer.render(scene, SIZE, samples=128, adaptive=False)
+    truth = renderer.render(scene, SIZE, samples=96, adaptive=False)
     inside = every.coverage
     errors = [np.square(frame.radiance - truth.radiance, dtype=np.float64)[inside].mean() for frame in (few, every)]
     assert errors[0] < 1.1 * errors[1]

@@ -120,7 +120,7 @@ def test_no_light_is_lost(where: tuple[float, float, float], renderer: tl.Render
     box = tl.Object(Box((-4.0, -4.0, -4.0), (4.0, 4.0, 4.0)).tessellate())
     lamp, frosted = tl.PointLight(where, (1.0, 2.0, 3.0)), tl.Surface(roughness=0.3)
     objects = [ball(height=0.0, surface=frosted), tl.Object(CORE, tl.Medium(ior=1.2), priority=1), box]
-    renderer.render(scene(*objects, light=lamp, overlap="priority"), (8, 8), caustics=tl.Caustics(4_000))
+    renderer.render(scene(*objects, light=lamp, overlap="priority"), (8, 8), caustics=tl.Caustics(2_000))
     distance = float(np.linalg.norm(where))
     truth = 4.0 * np.pi if distance < 1 else 2.0 * np.pi * (1.0 - np.sqrt(1.0 - distance**-2))
     # What the facets of the ball cut off its disc; beside it a photon in a thousand is lost after many events.
@@ -173,7 +173,7 @@ def test_the_irradiance_is_that_of_the_reference(name: str, renderer: tl.Rendere
     camera, size = tl.Camera.look_at((0.5, 1.2, 3.5), (-0.4, 0, 0), fov_y=40), (48, 32)
     one = tl.Scene(one.objects, camera, one.lights, NIGHT, one.overlap)
     found = photons_in(renderer, one, size, tl.Caustics(30_000))
-    halves = [trace_photons(one, 2000, seed) for seed in range(2)]
+    halves = [trace_photons(one, 1200, seed) for seed in range(2)]
     a, b = (photon_irradiance(one, size, landed) for landed in halves)
     # Photons that land differ in power little; four standard errors.
     noise = 4.0 / np.sqrt(2.0 * min(np.count_nonzero(landed.power[:, c]) for landed in halves for c in range(3)))

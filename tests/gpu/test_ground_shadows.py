@@ -54,7 +54,9 @@ def test_a_ball_takes_its_solid_angle(renderer: tl.Renderer) -> None:
 
 def test_a_wall_takes_what_lambert_says(renderer: tl.Renderer) -> None:
     """A long wall takes (1 - cos(e)) / 2 of the irradiance, up to the elevation e of its upper edge."""
-    found, points = light_left(renderer, Box((-40, 0.001, -1.0), (40, 2.0, -0.9)).tessellate(), shadows=tl.ShadowMaps())
+    found, points = light_left(
+        renderer, Box((-40, 0.001, -1.0), (40, 2.0, -0.9)).tessellate(), shadows=tl.ShadowMaps(1024)
+    )
     beside = points[..., 2] + 0.9
     truth = np.where(beside > 0.05, 0.5 + 0.5 * beside / np.hypot(beside, 2.0), np.nan)
     rms, worst = errors_of(found, truth)

@@ -107,7 +107,7 @@ def require_normal(found: Array) -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_the_picture_is_that_of_the_reference(name: str, renderer: tl.Renderer) -> None:
     scene, paths = SCENES[name]
-    frame = renderer.render(scene, SIZE, tl.PathTraced(800))
+    frame = renderer.render(scene, SIZE, tl.PathTraced(400))
     truth, error = path_trace(scene, SIZE, paths=paths, seed=1)
     assert frame.standard_error is not None
     difference = frame.radiance - truth.radiance
@@ -166,7 +166,7 @@ def test_a_lamp_with_a_size_is_found_through_what_bends(renderer: tl.Renderer) -
     for surface in (None, FROSTED):
         glass = ball(tl.Medium(ior=1.5), surface)
         one, other = (
-            renderer.render(tl.Scene([glass, grey, *more], camera, lights, BLACK), SIZE, tl.PathTraced(1500))
+            renderer.render(tl.Scene([glass, grey, *more], camera, lights, BLACK), SIZE, tl.PathTraced(1000))
             for more, lights in (([], [lamp]), ([globe], []))
         )
         error = [np.sqrt(np.square(f.standard_error, dtype=np.float64).mean() / 64) for f in (one, other)]

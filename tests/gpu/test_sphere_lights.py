@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 
 BLACK = tl.Environment.constant((0, 0, 0))
 RADIANCE, HEIGHT, EDGE = 10.0, 4.0, (1.9, 2.0)
-COUNT = 160
+COUNT = 96
 
 
 def occluded(radius: float) -> tuple[tl.Scene, Array]:
@@ -169,7 +169,7 @@ def test_random_paths_in_smoke(renderer: tl.Renderer, follows: None) -> None:
     """Light from anywhere on the discs: against random paths of the reference with points, whose noise is 2 %."""
     light = smoke().lights[0]
     points = [tl.PointLight(one.position, one.intensity) for one in light.points(8)]  # type: ignore[union-attr]
-    found = renderer.render(smoke(), (4, 4), tl.PathTraced(8192)).radiance.mean(axis=(0, 1))
+    found = renderer.render(smoke(), (4, 4), tl.PathTraced(2048)).radiance.mean(axis=(0, 1))
     truth = tl.reference.path_trace(replace(smoke(), lights=points), (4, 4), 256)[0].radiance.mean(axis=(0, 1))
     print(found / truth - 1.0)
     np.testing.assert_allclose(found, truth, rtol=0.06)

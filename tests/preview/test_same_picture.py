@@ -39,7 +39,13 @@ CASES: dict[str, tuple[list[str], tuple[object, ...], list[Action]]] = {
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_picture_is_the_same_from_wherever_it_is_asked_for(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, few_shadows: None, coarse_light: None, case: str
+    run: Run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    few_shadows: None,
+    coarse_light: None,
+    one_renderer: None,
+    case: str,
 ) -> None:
     options, arguments, actions = CASES[case]
     sized = ("--size", f"{SIZE[0]}x{SIZE[1]}")

@@ -89,7 +89,7 @@ def test_one_event_is_single_scattering(light: Light, density: Density | None) -
     objects = [Object(BOX, media[0], density=density), Object(RING, media[1]), roof]
     scene = Scene(objects, CAMERA, [light], DARK)
     truth = render(scene, (8, 6), tolerance=1e-4)
-    frame, error = path_trace(scene, (8, 6), paths=200, max_events=1)
+    frame, error = path_trace(scene, (8, 6), paths=100, max_events=1)
     seen = (truth.radiance.min(axis=-1) > 0) & (truth.transmittance.max(axis=-1) < 0.7)
     assert seen.sum() > 15
     assert_normal(scores(frame.radiance[seen], error[seen], truth.radiance[seen]), 3 * int(seen.sum()))
