@@ -356,7 +356,8 @@ def test_color_of_a_medium_that_scatters(
     assert page.locator("#roughness").is_disabled()
     albedos = page.evaluate("({ error: viewer.page.albedos.error, found: viewer.state().media[0].albedo })")
     assert page.locator(".albedo-error").inner_text() == f"of thick parts, within {100 * albedos['error']:.2g} %"
-    assert albedos["error"] < 0.04  # on this coarse grid; light from one side enters bodies by its direction
+    # Three quarters of it come from the cells of this grid, of which a page keeps every other one: with all it is .008.
+    assert albedos["error"] < 0.035
     found = np.array(albedos["found"])
     color = [half_space_reflectance(float(one), wax.ior) for one in found]
     assert to_hex(color) == "#4aa8c0"

@@ -35,7 +35,7 @@ FIRST_LOOK, MORE = 4, 2
 #: Of rough interfaces, a pixel is isolated that is farther from the median of the eight around it than so many spreads
 #: of the 24 around it, and from each of the eight by a fraction of that; and the least spread, as a fraction of the
 #: median. Isolated pixels have at most so many samples, in those of the picture.
-ISOLATED, ALONE, LEAST_SPREAD, MOST_AGAIN = 3.0, 0.4, 0.015, 4
+ISOLATED, ALONE, LEAST_SPREAD, MOST_AGAIN = 3.0, 0.4, 0.015, 8
 
 #: Fractions of a pixel's light that rays lose, as in open meshes, from which on it is not worth more samples: of
 #: interfaces, so that one sample of 16 makes the pixel invalid (`renderer.MOST_LOST`) whatever the others find; and of
@@ -126,13 +126,17 @@ class AdaptiveSampling:
         # Nothing opaque is in front of these pixels, and what is behind is known.
         leave_out = _left_out(job, mirror=False, needed=(PassName.INTERFACES, PassName.TRACED))
         shifts = sobol_points(last)[first:]
+        left = 0
         for number, shift in enumerate((shifts - shifts.mean(axis=0)).tolist(), first):
-            if (number - first) % samples == 0 and not self._mark_isolated(job):
-                break
+            if (number - first) % samples == 0:
+                # What is still there after as many samples again is a thing of the scene.
+                before, left = left, self._mark_isolated(job)
+                if left in (0, before):
+                    break
             self._trace_sample(job, number, shift, run_passes, leave_out)
 
-    def _mark_isolated(self, job: FrameJob) -> bool:
-        """Mark the isolated pixels that show interfaces alone; returns whether there are any."""
+    def _mark_isolated(self, job: FrameJob) -> int:
+        """Mark the isolated pixels that show interfaces alone; returns how many there are."""
         light, beside = (read_floats(job.targets[name], 0, 4) for name in ("bent", "average"))
         taken = light[..., 3]
         inside = (taken > 0) & (beside[..., 3] == 0)
@@ -142,7 +146,7 @@ class AdaptiveSampling:
             if name == "unsettled" or job.mirror is not None:
                 job.targets[name].clear()
         job.targets["unsettled"].color_attachments[0].write(found.astype(np.float32).tobytes())
-        return bool(found.any())
+        return int(found.sum())
 
     def _add_opaque(self, job: FrameJob) -> None:
         self._part.bind(sampled=job.targets["opaque"].color_attachments[1])
@@ -213,9 +217,9 @@ def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> npt.NDArray
     beside = [padded[1 + y : 1 + y + height, 1 + x : 1 + x + width] for y, x in steps if max(abs(y), abs(x)) == 1]
     row, column = np.nonzero(inside & np.all(beside, axis=0))
     near = np.array([level[row + y, column + x] for y, x in steps if max(abs(y), abs(x)) == 1]).reshape(8, -1)
-    own, low, high = level[row, column], near.min(axis=0), near.max(axis=0)
-    off = np.maximum(low - own, own - high)  # of those between their neighbors none is isolated
-    chosen = np.flatnonzero(off > 0.0)
+    own = level[row, column]
+    off = np.abs(near - own).min(axis=0, initial=np.inf)
+    chosen = np.flatnonzero(off > ALONE * ISOLATED * LEAST_SPREAD * np.abs(near).min(axis=0, initial=np.inf))
     row, column, own, off, near = row[chosen], column[chosen], own[chosen], off[chosen], near[:, chosen]
     median = np.median(near, axis=0)
     around = [(np.clip(row + y, 0, height - 1), np.clip(column + x, 0, width - 1)) for y, x in steps]
