@@ -53,6 +53,9 @@ float ray_advance() {
 
 void write_walk(Walk walk, bool sound, float counted, float kept) {
     out_optical_depth = vec4(walk.optical_depth, sound ? 1.0 : 0.0);
+#if MARCH && SCATTERS_AGAIN
+    walk.emitted = max(walk.emitted + walk.turned, vec3(0.0));
+#endif
     out_emitted = vec4(walk.emitted, walk.thickness);
 #if INTERFACES
     out_layers = vec4(counted, kept, walk.inside_out, min(first_exit, maybe_exit));
@@ -79,7 +82,7 @@ void end_walk(Walk walk, float metres_per_step, float counted, float kept) {
 #if MARCH && SCATTERS_AGAIN
     if (walk.ahead_slot >= 0) {
         vec3 ahead = environment_ahead(walk.ahead_slot, ray_from(0.0).direction, walk.ahead);
-        walk.emitted = max(walk.emitted + transmittance(walk.optical_depth - walk.ahead) * ahead, vec3(0.0));
+        walk.emitted += transmittance(walk.optical_depth - walk.ahead) * ahead;
     }
 #endif
     write_walk(walk, sound && is_outside(walk), counted, kept);

@@ -24,6 +24,8 @@ struct Walk {
     float thickness;
     float inside_out;        // metres with a negative winding number, beyond what silhouettes explain
 #if MARCH && SCATTERS_AGAIN
+    vec3 turned;             // radiance as emitted, of light that events ahead do not dim
+    vec3 straight;           // depth of events ahead
     vec3 ahead;              // depth of scattering in media whose scattering ahead is followed
     int ahead_slot;          // of the last of these, or -1
 #endif
@@ -62,10 +64,17 @@ void add_segment(inout Walk walk, float metres, bool backwards) {
         ViewRay ray = ray_from(float(walk.axial_step) / float(axial_steps()));
         float weights[SLOTS] = slot_weights(walk.winding);
 #if MARCH
-        Marched march = marched(weights, ray, metres, mix.extinction, mix.emission, transmittance(walk.optical_depth));
+#if SCATTERS_AGAIN
+        vec3 before = transmittance(walk.optical_depth - walk.straight);
+#else
+        vec3 before = transmittance(walk.optical_depth);
+#endif
+        Marched march = marched(weights, ray, metres, mix.extinction, mix.emission, before);
         added = march.color;
         depth = march.depth;
 #if SCATTERS_AGAIN
+        walk.turned = backwards ? walk.turned * transmittance(depth - march.straight) + march.turned : walk.turned + before * march.turned;
+        walk.straight += march.straight;
         walk.ahead += march.ahead;
         walk.ahead_slot = max(walk.ahead_slot, march.slot);
 #endif
@@ -111,6 +120,8 @@ Walk walk_from_start(int excess[SLOTS], float misplaced) {
     walk.thickness = 0.0;
     walk.inside_out = -misplaced;
 #if MARCH && SCATTERS_AGAIN
+    walk.turned = vec3(0.0);
+    walk.straight = vec3(0.0);
     walk.ahead = vec3(0.0);
     walk.ahead_slot = -1;
 #endif

@@ -59,9 +59,9 @@ float phase_value(vec4 phase, float cos_scatter) {
     return phase.w == 0.0 ? value : value + phase.w * draine(cos_scatter, phase.y, phase.z);
 }
 
-// Phase function of light that was scattered before on its path from a light, times the probability that it was; less its
-// mean over all directions. In 1/sr. anisotropy: g, 0 to 1. By Legendre moments (2 l + 1) / 4 pi g^l (e^(-(1 - g^l) depth) - e^-depth), l > 0,
-// where the first decays by 1 - straight instead: 1 and 2 in closed form, the rest by number of events n, a Poisson number,
+// Phase function of light that was scattered ahead before on its path from a light, times the probability that it was. In
+// 1/sr. anisotropy: g, 0 to 1. By Legendre moments (2 l + 1) / 4 pi g^l (e^(-(1 - g^l) depth) - e^-depth), where those of orders
+// 0 and 1 decay by 1 - straight instead: up to 2 in closed form, the rest by number of events n, a Poisson number,
 // after which the phase function is that of g^(n + 1). depth: of scattering alone. lever: mean fraction of the way from the light at
 // which it is; as much of each deflection is seen, so before g^lever takes the place of g.
 vec3 phase_after_scattering(float cos_scatter, float anisotropy, float straight, vec3 depth, float lever) {
@@ -69,7 +69,7 @@ vec3 phase_after_scattering(float cos_scatter, float anisotropy, float straight,
     float before = pow(g, lever);
     float second = 1.5 * cos_scatter * cos_scatter - 0.5;
     vec3 none = exp(-depth);
-    vec3 sum = 3.0 * g * cos_scatter * (exp((straight - 1.0) * depth) - none)
+    vec3 sum = (1.0 + 3.0 * g * cos_scatter) * (exp((straight - 1.0) * depth) - none)
         + 5.0 * g * g * second * (exp((before * before - 1.0) * depth) - none);
     vec3 probability = none;
     float power = g;

@@ -50,24 +50,39 @@ vec2 metres_at_fraction(float fraction, int light, ViewRay ray, float metres) {
 }
 
 #if SCATTERS_AGAIN
-// One light's radiance that reaches a point of the ray and is scattered towards its beginning there, per metre, however
-// often it was scattered ahead before.
-vec3 scattered_from_light(float weights[SLOTS], int light, vec3 point, vec3 direction) {
+// Radiance per metre that is scattered towards the beginning of a ray. Events ahead dim what is peaked, as any others do; what
+// was turned from the peak has as much scattered into it by them as out of it.
+struct Scattered {
+    vec3 peaked;
+    vec3 turned;
+};
+
+// From one light at a point of the ray, however often it was scattered ahead before.
+Scattered scattered_from_light(float weights[SLOTS], int light, vec3 point, vec3 direction) {
     LightSample arriving = light_at(light, point);
-    if (arriving.irradiance == vec3(0.0)) { return vec3(0.0); }
+    if (arriving.irradiance == vec3(0.0)) { return Scattered(vec3(0.0), vec3(0.0)); }
     LightDepth path = light_depth(light, point);
     float cos_scatter = dot(arriving.towards, direction);
-    vec3 sum = transmittance(path.depth) * scattering_phase(weights, cos_scatter);
+    Scattered sum = Scattered(transmittance(path.depth) * scattering_phase(weights, cos_scatter), vec3(0.0));
     vec4 source = light_position[light];
     float metres = dot(path.behind, vec3(1.0)) / max(dot(path.ahead, vec3(1.0)), 1e-30);
     float lever = source.w == 0.0 ? 1.0 : max(1.0 - metres / max(length(point - source.xyz), 1e-30), 0.0);
     for (int slot = 0; slot < SLOTS; ++slot) {
         if (weights[slot] > 0.0 && scattered_ahead[slot].x > 0.0) {
-            vec3 again = phase_after_scattering(cos_scatter, scattered_ahead[slot].x, scattered_ahead[slot].y, path.ahead, lever);
-            sum += weights[slot] * slot_scattering[slot].rgb * transmittance(path.depth - path.ahead) * again;
+            float g = scattered_ahead[slot].x;
+            float straight = scattered_ahead[slot].y;
+            vec3 scattering = weights[slot] * slot_scattering[slot].rgb;
+            vec3 again = phase_after_scattering(cos_scatter, g, straight, path.ahead, lever);
+            sum.peaked += scattering * transmittance(path.depth - path.ahead) * again;
+            vec3 turned = scattering * transmittance(path.depth - straight * path.ahead);
+            float broad = min(phase_value(slot_phase[slot], cos_scatter), scattered_ahead[slot].w);
+            float even = (1.0 - straight + 3.0 * (g - straight) * cos_scatter) / (4.0 * PI);
+            sum.turned += turned * broad;
+            sum.peaked -= turned * (broad + straight * path.ahead * (broad - even));
         }
     }
-    return path.visible * arriving.irradiance * sum;
+    vec3 reaching = path.visible * arriving.irradiance;
+    return Scattered(reaching * sum.peaked, reaching * sum.turned);
 }
 #endif
 
@@ -75,20 +90,29 @@ struct Marched {
     vec3 color;  // at the segment's beginning
     vec3 depth;
 #if SCATTERS_AGAIN
-    vec3 ahead;  // of it, that of scattering in media whose scattering ahead is followed
-    int slot;    // of the last of these, or -1
+    vec3 turned;    // of color, by light that events ahead do not dim
+    vec3 straight;  // of depth, that by events ahead
+    vec3 ahead;     // of depth, that of scattering in media whose scattering ahead is followed
+    int slot;       // of the last of these, or -1
 #endif
 };
 
 #if SCATTERS_AGAIN
-#define NOTHING_MARCHED(depth) Marched(vec3(0.0), depth, vec3(0.0), -1)
+#define NOTHING_MARCHED(depth) Marched(vec3(0.0), depth, vec3(0.0), vec3(0.0), vec3(0.0), -1)
 #else
 #define NOTHING_MARCHED(depth) Marched(vec3(0.0), depth)
 #endif
 
+// What a source sends from a step to its beginning. at: metres of its sample, and their derivative by the fraction.
+vec3 sent_by_step(vec3 source, vec3 sigma, float begin, float end, vec2 at, vec3 fractions) {
+    return march_rule == MARCH_EXPONENTIAL
+        ? emitted_radiance(source, sigma, end - begin)
+        : source * at.y * (fractions.y - fractions.x) * transmittance(sigma * (at.x - begin));
+}
+
 // The steps of one pass: emission and all lights, for variable = -1; or with equal angles one point light, which the first
-// pass then leaves out. before: transmittance from the eye to the segment. Where that of all channels falls below
-// LEAST_SEEN, sources are not looked for: what is left out is at most this fraction of what comes from there.
+// pass then leaves out. before: transmittance from the eye to the segment, of all that is not scattered ahead. Where that of all
+// channels falls below LEAST_SEEN, sources are not looked for: what is left out is at most this fraction of what comes from there.
 Marched march_pass(float weights[SLOTS], int variable, ViewRay ray, float metres, vec3 sigma, vec3 emission, vec3 before) {
     Marched sum = NOTHING_MARCHED(vec3(0.0));
     for (int i = 0; i < march_steps; ++i) {
@@ -97,6 +121,10 @@ Marched march_pass(float weights[SLOTS], int variable, ViewRay ray, float metres
         float end = metres_at_fraction(fractions.y, variable, ray, metres).x;
         vec2 at = metres_at_fraction(fractions.z, variable, ray, metres);
         vec3 source = emission;
+#if SCATTERS_AGAIN
+        vec3 peaked = vec3(0.0);
+        vec3 straight = vec3(0.0);
+#endif
 #if VARIES
         float here[SLOTS] = weights;
         sigma = source = vec3(0.0);
@@ -107,16 +135,25 @@ Marched march_pass(float weights[SLOTS], int variable, ViewRay ray, float metres
             sigma += here[slot] * slot_extinction[slot].rgb;
             source += here[slot] * slot_emission[slot].rgb;
 #if SCATTERS_AGAIN
+            vec3 scattering = here[slot] * slot_scattering[slot].rgb;
             if (here[slot] > 0.0 && scattered_ahead[slot].x > 0.0) {
-                sum.ahead += here[slot] * (end - begin) * slot_scattering[slot].rgb;
+                sum.ahead += (end - begin) * scattering;
+                straight += scattered_ahead[slot].y * scattering;
                 sum.slot = slot;
             }
             if (here[slot] > 0.0) {
-                source += here[slot] * slot_scattering[slot].rgb * scattered_before(slot, ray.start + at.x * ray.direction, -ray.direction);
+                vec3 arriving = scattered_before(slot, ray.start + at.x * ray.direction, -ray.direction);
+                source += (1.0 - scattered_ahead[slot].y) * scattering * arriving;
             }
 #endif
         }
+#if SCATTERS_AGAIN
+        vec3 through = transmittance(sum.depth - sum.straight);
+        vec3 peak_through = transmittance(sum.depth);
+        sum.straight += straight * (end - begin);
+#else
         vec3 through = transmittance(sum.depth);
+#endif
 #else
         float here[SLOTS] = weights;
         sum.depth = sigma * begin;
@@ -130,17 +167,21 @@ Marched march_pass(float weights[SLOTS], int variable, ViewRay ray, float metres
             bool angular = march_rule == MARCH_EQUIANGULAR && light_position[light].w != 0.0;
             if (angular ? light != variable : variable >= 0) { continue; }
 #if SCATTERS_AGAIN
-            source += scattered_from_light(here, light, ray.start + at.x * ray.direction, ray.direction);
+            Scattered found = scattered_from_light(here, light, ray.start + at.x * ray.direction, ray.direction);
+            source += found.turned;
+            peaked += found.peaked;
 #else
             vec3 tau;
             vec4 lit = scattered_here(here, light, ray, at.x, tau);
             source += lit.a * lit.rgb * transmittance(tau);
 #endif
         }
-        vec3 color = march_rule == MARCH_EXPONENTIAL
-            ? emitted_radiance(source, sigma, end - begin)
-            : source * at.y * (fractions.y - fractions.x) * transmittance(sigma * (at.x - begin));
-        sum.color += through * color;
+#if SCATTERS_AGAIN
+        sum.color += peak_through * sent_by_step(peaked, sigma, begin, end, at, fractions);
+        sum.turned += through * sent_by_step(source, sigma - straight, begin, end, at, fractions);
+#else
+        sum.color += through * sent_by_step(source, sigma, begin, end, at, fractions);
+#endif
     }
     return sum;
 }
@@ -155,7 +196,8 @@ Marched marched(float weights[SLOTS], ViewRay ray, float metres, vec3 sigma, vec
 #if VARIES
         if (variable < 0) { sum.depth = pass.depth; }
 #if SCATTERS_AGAIN
-        if (variable < 0) { sum.ahead = pass.ahead; sum.slot = pass.slot; }
+        sum.turned += pass.turned;
+        if (variable < 0) { sum.straight = pass.straight; sum.ahead = pass.ahead; sum.slot = pass.slot; }
 #endif
 #endif
     }

@@ -31,10 +31,11 @@ _MOST_EVENTS, _LEAST_POWER = 128, 0.05
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentAhead:
-    """Radiance along rays by light that was scattered on its way, less its mean and gradient over all directions.
+    """Radiance along rays by light that was scattered ahead on its way.
 
-    Cells of a volume hold mean and gradient. Of order l > 1 a Legendre moment of the environment is multiplied by
-    exp(-(1 - g^l) depth) - exp(-depth): as by a Poisson number n > 0 of events, each of g^n together.
+    A Legendre moment of order l > 1 of the environment is multiplied by exp(-(1 - g^l) depth) - exp(-depth): as by a
+    Poisson number n > 0 of events, of g^n together. Of mean and gradient cells hold what has turned, and 1 - g^l is the
+    fraction here that turns there.
 
     Attributes
     ----------
@@ -51,21 +52,27 @@ class EnvironmentAhead:
 
 @lru_cache(maxsize=2)
 @np.errstate(under="ignore")
-def environment_ahead(environment: Environment, anisotropy: float) -> EnvironmentAhead | None:
-    """Find what media of a mean cosine g > 0 scatter ahead of an environment; None if it is too even to matter."""
-    if environment.kind != "image":
-        return None
+def environment_ahead(environment: Environment, anisotropy: float, straight: float) -> EnvironmentAhead | None:
+    """Find what media of a mean cosine g > 0 scatter ahead of an environment; None if it is black.
+
+    `straight` is the fraction of scattered light that counts as unscattered in cells.
+    """
     directions, angles = texel_directions(HEIGHT, WIDTH), row_solid_angles(HEIGHT, WIDTH)[:, None, None]
     fine = _means(environment)
+    if not fine.any():
+        return None
     mean = (fine * angles).sum(axis=(0, 1)) / (4.0 * np.pi)
     first = np.einsum("yxc,yxd,yxo->cd", fine, directions, np.broadcast_to(angles, (HEIGHT, WIDTH, 1))) / (4.0 * np.pi)
     gradient = 3.0 * directions @ first.T
-    deepest = _GONE / (1.0 - anisotropy**2)
+    deepest = _GONE / (1.0 - straight)
     events = [n for n in range(1, _MOST_EVENTS + 1) if anisotropy**n >= _LEAST_POWER]
+    if environment.kind != "image":
+        events, mean, gradient = [], fine, 0.0  # hardly any moment of order 2 and more
     blurred = [convolved(fine, partial(henyey_greenstein, anisotropy=anisotropy**n)) for n in events]
     found = np.zeros((DEPTHS, HEIGHT, WIDTH, 3))
     for i, depth in enumerate(deepest * (np.arange(DEPTHS) / (DEPTHS - 1)) ** 2):
         probability = np.exp(-depth)
+        found[i] = (np.exp((straight - 1.0) * depth) - probability) * (mean + gradient)
         for n, picture in zip(events, blurred, strict=True):
             probability *= depth / n
             found[i] += probability * (picture - mean - anisotropy**n * gradient)

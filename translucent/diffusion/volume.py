@@ -30,6 +30,7 @@ from translucent.diffusion.solution import CellSystem
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffusion_coefficient
 from translucent.formulas.light import cone_attenuation
+from translucent.formulas.phase import PhaseFunction
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight, SpotLight
@@ -252,14 +253,18 @@ class VolumeField:
         Of what has been scattered, and of the unscattered environment: a medium scatters sigma_s times as much of it
         into each metre of a ray. Spread beyond the body.
     gradient : tuple of 3 (x, y, z, 3) float32, or of none
-        Of a medium that scatters ahead: 3 g J / 4 pi along x, y and z, with the vector flux J of the same light. Its
-        product with the direction of travel is added to the mean: light is scattered on where it goes already.
+        Of a medium that scatters ahead: 3 g' J / 4 pi along x, y and z, with the vector flux J of the same light, and
+        the mean cosine g' of what does not count as unscattered. Its product with the direction of travel is added to
+        the mean: light is scattered on where it goes already.
     mean_cosine : float
         g of this medium; 0 without a gradient.
     straight : float
-        Fraction of scattered light that counts as unscattered here, beyond what rays find of each light themselves.
+        Fraction of scattered light that counts as unscattered here, beyond what rays find of each light themselves; 0
+        without a gradient.
     environment : EnvironmentAhead, optional
         What rays find of the environment at their end.
+    cap : float
+        See `capped`: light that scatters by less turns, and the rest goes straight on.
     """
 
     mean_radiance: npt.NDArray[np.float32]
@@ -270,6 +275,7 @@ class VolumeField:
     mean_cosine: float = 0.0
     straight: float = 0.0
     environment: EnvironmentAhead | None = None
+    cap: float = 0.0
 
     @property
     def volumes(self) -> tuple[npt.NDArray[np.float32], ...]:
@@ -295,6 +301,17 @@ class PhotonFluence:
     cells: FineCells
     fluence: Array
     stops: RayCaster | None
+
+
+def capped(phase: PhaseFunction, fraction: float) -> float:
+    """Value in 1/sr at which a phase function is cut off so that this fraction is left below."""
+    cosine, weight = np.polynomial.legendre.leggauss(256)
+    values = phase.value(cosine)
+    order = np.argsort(values)
+    values, weight = values[order], 2.0 * np.pi * weight[order]
+    # Below each value the fraction is that of the smaller ones, and this value times the rest of the weights.
+    below = np.cumsum(weight * values) + values * (weight.sum() - np.cumsum(weight))
+    return float(np.interp(fraction, below, values))
 
 
 class VolumeGrid:
@@ -382,21 +399,23 @@ class DiffusingVolume:
         moments = sky + scattered
         # Light that is scattered back more than ahead gets less deep than reduced coefficients say: what they add twice
         # is taken away, and no more than there is.
-        moments[0] = np.maximum(moments[0] + (1.0 - min(medium.anisotropy, 0.0)) * ahead, 0.0)
+        if self._ahead == 0.0:
+            moments[0] = np.maximum(moments[0] + (1.0 - min(medium.anisotropy, 0.0)) * ahead, 0.0)
         # Beyond the body each cell has what the nearest inside has, for what is interpolated at its surface.
         nearest = tuple(distance_transform_edt(~volume.inside, return_distances=False, return_indices=True))
         mean, *gradient = moments[:, *nearest] / (4.0 * np.pi)
-        gradient = [3.0 * self._ahead * part for part in gradient]
+        gradient = [3.0 * self._cosine * part for part in gradient]
         cells = volume.grid.cells
-        step = cells.step
+        step, straight = cells.step, self._peak if self._ahead > 0.0 else 0.0
         if photons is not None:
             # Rays find none of it at lights: all that is scattered the first time is here, too.
             step = photons.cells.step
-            mean = _finer(mean, photons.cells.finer) + (1.0 - medium.anisotropy) / (4.0 * np.pi) * photons.fluence
+            mean = _finer(mean, photons.cells.finer) + (1.0 - medium.anisotropy) / (1.0 - straight) / (4.0 * np.pi) * photons.fluence
             gradient = [_finer(part, photons.cells.finer) for part in gradient]
         volumes = tuple(np.ascontiguousarray(part, np.float32) for part in (mean, *gradient))
-        behind = environment_ahead(scene.environment, self._ahead) if self._ahead > 0.0 else None
-        return VolumeField(volumes[0], cells.low, step, steps, volumes[1:], self._ahead, self._peak, behind)
+        behind = environment_ahead(scene.environment, self._ahead, straight) if self._ahead > 0.0 else None
+        cap = capped(medium.phase_function, 1.0 - straight) if self._ahead > 0.0 else 0.0
+        return VolumeField(volumes[0], cells.low, step, steps, volumes[1:], self._ahead, straight, behind, cap)
 
     @property
     def _ahead(self) -> float:

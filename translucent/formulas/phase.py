@@ -131,13 +131,13 @@ def phase_after_scattering(
     depth: npt.ArrayLike,
     lever: npt.ArrayLike = 1.0,
 ) -> Array:
-    """Phase function in 1/sr, less its mean over all directions, of light that was scattered before on its path.
+    """Phase function in 1/sr of light that was scattered ahead before on its path.
 
     It is multiplied by the probability that it was. In a medium that scatters ahead, a beam at an optical depth of
     scattering has the Legendre moments exp(-(1 - g^l) depth), as long as it has turned little; the unscattered part of
     it exp(-depth) (Goudsmit & Saunderson 1940). So after one more event (2 l + 1) / 4 pi g^l times their difference is
     the moment of order l. It equals a sum over a Poisson number n of events before, after which the phase function is
-    that of g^(n + 1): orders 1 and 2 are in closed form here, and only the others are this sum.
+    that of g^(n + 1): orders up to 2 are in closed form here, and only the others are this sum.
 
     Of light that comes from a point, and is scattered by a small angle at a fraction u of its way, a fraction u of the
     angle is seen at its end. By small angles g^l = exp(-l |log g|) is then g^(u l): before, g^u takes the place of g.
@@ -149,8 +149,8 @@ def phase_after_scattering(
     anisotropy : array_like
         g, 0 to 1.
     straight : array_like
-        Fraction of scattered light that counts as unscattered in what is found of order 1 otherwise: that moment
-        decays with 1 - straight here, not with 1 - g.
+        Fraction of scattered light that counts as unscattered in what is found of orders 0 and 1 otherwise: these
+        moments decay with 1 - straight here, not with 1 - g^l.
     depth : array_like
         Optical depth of scattering before, without absorption.
     lever : array_like
@@ -162,7 +162,7 @@ def phase_after_scattering(
     second = 1.5 * cosine * cosine - 0.5
     with np.errstate(under="ignore"):
         none = np.exp(-depth)
-        total = 3.0 * g * cosine * (np.exp((kept - 1.0) * depth) - none)
+        total = (1.0 + 3.0 * g * cosine) * (np.exp((kept - 1.0) * depth) - none)
         total = total + 5.0 * g * g * second * (np.exp((before * before - 1.0) * depth) - none)
         probability, power = none, g
         for n in range(1, AHEAD_EVENTS + 1):

@@ -120,6 +120,7 @@ def slot_grids(light: DiffusedTexture | None, slots: Sequence[Slot], center: Arr
             grid[i] = *field.mean_radiance.shape[:3], light.first_layers[slot.objects[0]]
             ahead[i, :2] = field.mean_cosine, field.straight
             ahead[i, 2] = 0.0 if field.environment is None else field.environment.deepest
+            ahead[i, 3] = field.cap
     return {"scattered_low": low, "scattered_grid": grid, "scattered_ahead": ahead}
 
 
