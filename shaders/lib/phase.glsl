@@ -60,8 +60,8 @@ float phase_value(vec4 phase, float cos_scatter) {
 }
 
 // Phase function of light that was scattered ahead before on its path from a light, times the probability that it was. In
-// 1/sr. anisotropy: g, 0 to 1. By Legendre moments (2 l + 1) / 4 pi g^l (e^(-(1 - g^l) depth) - e^-depth), where those of orders
-// 0 and 1 decay by 1 - straight instead: up to 2 in closed form, the rest by number of events n, a Poisson number,
+// 1/sr. anisotropy: g, 0 to 1. By Legendre moments (2 l + 1) / 4 pi g^l (e^(-(1 - g^l) depth) - e^-depth), where those up to order
+// 2 decay by 1 - straight instead: they are in closed form, the rest by number of events n, a Poisson number,
 // after which the phase function is that of g^(n + 1). depth: of scattering alone. lever: mean fraction of the way from the light at
 // which it is; as much of each deflection is seen, so before g^lever takes the place of g.
 vec3 phase_after_scattering(float cos_scatter, float anisotropy, float straight, vec3 depth, float lever) {
@@ -69,8 +69,7 @@ vec3 phase_after_scattering(float cos_scatter, float anisotropy, float straight,
     float before = pow(g, lever);
     float second = 1.5 * cos_scatter * cos_scatter - 0.5;
     vec3 none = exp(-depth);
-    vec3 sum = (1.0 + 3.0 * g * cos_scatter) * (exp((straight - 1.0) * depth) - none)
-        + 5.0 * g * g * second * (exp((before * before - 1.0) * depth) - none);
+    vec3 sum = (1.0 + g * (3.0 * cos_scatter + 5.0 * g * second)) * (exp((straight - 1.0) * depth) - none);
     vec3 probability = none;
     float power = g;
     for (int n = 1; n <= AHEAD_EVENTS; ++n) {

@@ -76,7 +76,8 @@ Scattered scattered_from_light(float weights[SLOTS], int light, vec3 point, vec3
             sum.peaked += scattering * transmittance(path.depth - path.ahead) * again;
             vec3 turned = scattering * transmittance(path.depth - straight * path.ahead);
             float broad = min(phase_value(slot_phase[slot], cos_scatter), scattered_ahead[slot].w);
-            float even = (1.0 - straight + 3.0 * (g - straight) * cos_scatter) / (4.0 * PI);
+            float second = 1.5 * cos_scatter * cos_scatter - 0.5;
+            float even = (1.0 - straight + 3.0 * (g - straight) * cos_scatter + 5.0 * max(g * g - straight, 0.0) * second) / (4.0 * PI);
             sum.turned += turned * broad;
             sum.peaked -= turned * (broad + straight * path.ahead * (broad - even));
         }

@@ -165,11 +165,11 @@ def test_droplets_scatter_as_mie_has_it() -> None:
 @pytest.mark.parametrize("g", [0.3, 0.85])
 @pytest.mark.parametrize(("depth", "lever"), [(0.2, 1.0), (3.0, 1.0), (3.0, 0.8)])
 def test_light_that_was_scattered_ahead_has_the_moments_of_its_path(g: float, depth: float, lever: float) -> None:
-    """Legendre moment l of light scattered ahead: g^l (e^(-(1 - g^(l u)) depth) - e^-depth), lever u; g^2 for l < 2."""
+    """Legendre moment l of light scattered ahead: g^l (e^(-(1 - g^(l u)) depth) - e^-depth), lever u; g^3 for l < 3."""
     cosine, weight = np.polynomial.legendre.leggauss(400)
-    found = phase_after_scattering(cosine, g, g * g, depth, lever)
+    found = phase_after_scattering(cosine, g, g**3, depth, lever)
     moments = 2.0 * np.pi * (weight * found) @ np.polynomial.legendre.legvander(cosine, 7)
     powers = g ** np.arange(8)
-    kept = np.array([g * g, g * g, *powers[2:] ** lever])
+    kept = np.array([g**3, g**3, g**3, *powers[3:] ** lever])
     expected = powers * (np.exp((kept - 1.0) * depth) - np.exp(-depth))
     np.testing.assert_allclose(moments, expected, atol=1e-3)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from translucent.diffusion.entering import even_directions, nearest_parts
-from translucent.diffusion.volume import condensed, swept
+from translucent.diffusion.volume import ORDER, capped, condensed, moment_functions, swept
+from translucent.formulas.phase import HenyeyGreenstein, PhaseFunction, WaterDroplets
 
 STEP = 0.25
 SHAPE = (6, 5, 7)
@@ -100,3 +101,21 @@ def test_light_gets_as_far_as_it_does(depth: float) -> None:
     square = sum(axis**2 for axis in np.meshgrid(place, place, place))
     assert (found * square).sum() / found.sum() == pytest.approx(2.0 / (events * depth / STEP), rel=0.02)
     assert condensed(np.zeros(3), directions, STEP).max() == 0.0
+
+
+def test_moment_functions_add_up_to_legendre_polynomials() -> None:
+    """Of the cosine between two directions, for each order."""
+    one, other = even_directions(48), even_directions(30)
+    products = moment_functions(one)[:, :, None] * moment_functions(other)[:, None, :]
+    cosine = one @ other.T
+    for order in range(3):
+        expected = np.polynomial.legendre.Legendre.basis(order)(cosine)
+        np.testing.assert_allclose(products[order == ORDER].sum(axis=0), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("phase", [HenyeyGreenstein(0.85), WaterDroplets(1e-5)])
+@pytest.mark.parametrize("fraction", [0.1, 0.5])
+def test_a_phase_function_is_cut_off_where_a_fraction_is_left(phase: PhaseFunction, fraction: float) -> None:
+    cosine, weight = np.polynomial.legendre.leggauss(300)
+    below = np.minimum(phase.value(cosine), capped(phase, fraction))
+    assert 2.0 * np.pi * weight @ below == pytest.approx(fraction, rel=1e-3)

@@ -22,7 +22,7 @@ from translucent.scene.environment_map import convolved, row_solid_angles, texel
 #: Depths, rows and columns.
 DEPTHS, HEIGHT, WIDTH = 16, 32, 64
 
-#: Attenuation of the second Legendre moment, as an exponent, beyond which nothing is left.
+#: Attenuation of the lowest Legendre moments, as an exponent, beyond which nothing is left.
 _GONE = 4.0
 
 #: Most events on a path that differ from many, and the mean cosine after them from which on they do.
@@ -33,8 +33,8 @@ _MOST_EVENTS, _LEAST_POWER = 128, 0.05
 class EnvironmentAhead:
     """Radiance along rays by light that was scattered ahead on its way.
 
-    A Legendre moment of order l > 1 of the environment is multiplied by exp(-(1 - g^l) depth) - exp(-depth): as by a
-    Poisson number n > 0 of events, of g^n together. Of mean and gradient cells hold what has turned, and 1 - g^l is the
+    A Legendre moment of order l > 2 of the environment is multiplied by exp(-(1 - g^l) depth) - exp(-depth): as by a
+    Poisson number n > 0 of events, of g^n together. Of lower orders cells hold what has turned, and 1 - g^l is the
     fraction here that turns there.
 
     Attributes
@@ -62,20 +62,23 @@ def environment_ahead(environment: Environment, anisotropy: float, straight: flo
     if not fine.any():
         return None
     mean = (fine * angles).sum(axis=(0, 1)) / (4.0 * np.pi)
-    first = np.einsum("yxc,yxd,yxo->cd", fine, directions, np.broadcast_to(angles, (HEIGHT, WIDTH, 1))) / (4.0 * np.pi)
+    first = np.einsum("yxc,yxd->cd", fine * angles, directions) / (4.0 * np.pi)
     gradient = 3.0 * directions @ first.T
+    second = np.einsum("yxc,yxd,yxe->cde", fine * angles, directions, directions) / (4.0 * np.pi)
+    curvature = 7.5 * np.einsum("yxd,yxe,cde->yxc", directions, directions, second) - 2.5 * mean
     deepest = _GONE / (1.0 - straight)
     events = [n for n in range(1, _MOST_EVENTS + 1) if anisotropy**n >= _LEAST_POWER]
     if environment.kind != "image":
-        events, mean, gradient = [], fine, 0.0  # hardly any moment of order 2 and more
+        events, mean, gradient, curvature = [], fine, 0.0, 0.0  # hardly any moment of order 3 and more
     blurred = [convolved(fine, partial(henyey_greenstein, anisotropy=anisotropy**n)) for n in events]
     found = np.zeros((DEPTHS, HEIGHT, WIDTH, 3))
     for i, depth in enumerate(deepest * (np.arange(DEPTHS) / (DEPTHS - 1)) ** 2):
         probability = np.exp(-depth)
-        found[i] = (np.exp((straight - 1.0) * depth) - probability) * (mean + gradient)
+        found[i] = (np.exp((straight - 1.0) * depth) - probability) * (mean + gradient + curvature)
         for n, picture in zip(events, blurred, strict=True):
             probability *= depth / n
-            found[i] += probability * (picture - mean - anisotropy**n * gradient)
+            power = anisotropy**n
+            found[i] += probability * (picture - mean - power * gradient - power**2 * curvature)
     wrapped = np.concatenate([found[:, :, -1:], found, found[:, :, :1]], axis=2)
     return EnvironmentAhead(np.ascontiguousarray(wrapped.transpose(2, 1, 0, 3), np.float32), deepest)
 

@@ -2,13 +2,16 @@
 
 Discrete ordinates on a grid of cells, from a start by diffusion, which also finds what each round leaves over: a few
 rounds are enough however often light is scattered (diffusion synthetic acceleration, Alcouffe 1977; Adams & Larsen
-2002). A fraction of the scattered light counts as unscattered, so that two moments of the rest are enough, the fluence
-and the flux (delta-Eddington). What the peak of a phase function does to light of lights, rays find by themselves: see
+2002). A fraction of the scattered light counts as unscattered, so that the moments of orders 0 to 2 of the rest are
+enough (delta-M). What the peak of a phase function does to light of lights, rays find by themselves: see
 ``shaders/volume/scattered_light.glsl``.
 
 References
 ----------
-Joseph, Wiscombe & Weinman 1976, "The delta-Eddington approximation for radiative flux transfer"; Kunasz & Auer 1988,
+Wiscombe 1977, "The delta-M method: rapid yet accurate radiative flux calculations for strongly asymmetric phase
+functions"; Nakajima & Tanaka 1988, "Algorithms for radiative intensity calculations in moderately thick atmospheres
+using a truncation approximation"; Iwabuchi & Suzuki 2009, "Fast and accurate radiance calculations using truncation
+approximation for anisotropic scattering phase functions"; Kunasz & Auer 1988,
 "Short characteristic integration of radiative transfer problems"; Chandrasekhar 1950 for discrete ordinates.
 """
 
@@ -80,25 +83,41 @@ def swept_moments(
     Parameters
     ----------
     emission : (m, x, y, z, 3) float64
-        Radiance for each metre that cells send in all directions; and with m = 4 its gradient, whose product with the
-        direction of travel is added to it.
+        Radiance for each metre that cells send in all directions; and with m = 9 what each of the `moment_functions` of
+        the direction of travel adds to it.
 
     Returns
     -------
     moments : (m, x, y, z, 3) float64
-        Fluence; and with m = 4 the flux, the net power that crosses a unit of area, along x, y and z.
+        Fluence; and with m = 9 the vector flux, and the moments of order 2, see `moment_functions`.
     """
-    travel = -directions.T
-    weights = solid_angles * np.vstack([np.ones(len(directions)), travel])[: len(emission)]
+    weights = solid_angles * moment_functions(-directions)[: len(emission)]
     sums = np.zeros(emission.shape)
-    cells, sources = extinction.astype(np.float32), emission.astype(np.float32)
     for axis in range(3):
-        matter, source = np.moveaxis(cells, axis, 0), np.moveaxis(sources, axis + 1, 0)
-        found = np.moveaxis(sums, axis + 1, 0)
+        matter = np.ascontiguousarray(np.moveaxis(extinction, axis, 0), np.float32)
+        source = np.ascontiguousarray(np.moveaxis(emission, axis + 1, 0), np.float32)
+        found = np.zeros(source.shape, np.float32)
         for alike in _alike(directions, axis):
             sweep = _Sweep.along(directions[alike.numbers], axis, alike.signs, step)
             sweep.run(matter, source, found, arriving[alike.numbers], weights[:, alike.numbers])
+        sums += np.moveaxis(found, 0, axis + 1)
     return sums
+
+
+def moment_functions(directions: Array) -> Array:
+    """(9, k): functions of directions (k, 3) whose integrals are the moments of orders 0 to 2.
+
+    Those of each order l add up to its Legendre polynomial P_l of the cosine between two directions, if the products of
+    both are summed.
+    """
+    x, y, z = directions.T
+    root = np.sqrt(3.0)
+    second = root * x * y, root * y * z, root * z * x, 1.5 * z * z - 0.5, 0.5 * root * (x * x - y * y)
+    return np.stack([np.ones(len(directions)), x, y, z, *second])
+
+
+#: Order of each of `moment_functions`.
+ORDER = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2])
 
 
 def condensed(extinction: Array, directions: Array, step: float) -> Array:
@@ -162,7 +181,7 @@ class _Sweep:
         length = (step / ahead).astype(np.float32)[:, None, None, None]
         return cls(signs[0] > 0.0, (near[0], near[1]), tuple(beside), length)
 
-    def run(self, extinction: Floats, emission: Floats, sums: Array, arriving: Array, weights: Array) -> None:
+    def run(self, extinction: Floats, emission: Floats, sums: Floats, arriving: Array, weights: Array) -> None:
         """Add the weighted radiance of these directions to slices (x, m, y, z, 3) of an array."""
         count, (_, n, m, channels) = len(arriving), extinction.shape
         light = np.empty((count, n + 1, m + 1, channels), np.float32)
@@ -174,8 +193,8 @@ class _Sweep:
             sent = source[0] if len(source) == 1 else source[0] + np.tensordot(travel, source[1:], axes=1)
             # All that leaves a cell gets into those of the next slice: nothing is lost between them.
             edge, depth, sent = self._between(light), sigma * self.length, sent * self.length
-            mean, rest = _means(depth)
-            light[:, *self.here] = edge * np.exp(-depth) + sent * mean
+            through, mean, rest = _means(depth)
+            light[:, *self.here] = edge * through + sent * mean
             sums[i] += np.tensordot(weights, edge * mean + rest * sent, axes=1)
 
     def _between(self, values: Floats) -> Floats:
@@ -187,13 +206,14 @@ class _Sweep:
         return total
 
 
-def _means(depth: Floats) -> tuple[Floats, Floats]:
-    """Mean transmittance over a path, (1 - e^-x) / x, and the mean over all starting points on it."""
+def _means(depth: Floats) -> tuple[Floats, Floats, Floats]:
+    """Transmittance of a path, its mean over the path, (1 - e^-x) / x, and the mean over all starting points on it."""
+    lost = np.asarray(-np.expm1(-depth), np.float32)
     safe = np.maximum(depth, _SERIES)
-    mean = -np.expm1(-safe) / safe
     small = depth < _SERIES
-    first = np.where(small, 1.0 - depth * (0.5 - depth / 6.0), mean)
-    return first, np.where(small, 0.5 - depth * (1.0 / 6.0 - depth / 24.0), (1.0 - mean) / safe)
+    mean = np.where(small, 1.0 - depth * (0.5 - depth / 6.0), lost / safe)
+    rest = np.where(small, 0.5 - depth * (1.0 / 6.0 - depth / 24.0), (1.0 - mean) / safe)
+    return np.float32(1.0) - lost, mean, rest
 
 
 def _ends(sign: float, farther: bool) -> slice:
@@ -213,21 +233,21 @@ MIXED = 2
 #: Mean cosine of scattering from which on pictures see in which direction light goes in a volume.
 LEAST_AHEAD = 0.05
 
-#: Optical depth of a cell up to which cells keep two moments of what is scattered ahead.
-TWO_MOMENTS_DEPTH = 0.5
+#: Optical depth of a cell up to which cells keep all moments of what is scattered ahead.
+ALL_MOMENTS_DEPTH = 0.5
 
 
 def straight_fraction(anisotropy: float, cell_depth: float) -> float:
     """Fraction of scattered light that counts as unscattered, so that the rest is scattered nearly to all sides.
 
-    g^2 makes the mean cosine of the rest g / (1 + g) and its second Legendre moment 0 (delta-Eddington, see above). In
-    cells of a large scattering depth a sweep spreads light farther than to the next event: there it is g, and the rest
-    goes to all sides alike, as similarity has it.
+    g^3 makes the third Legendre moment of the rest 0 (delta-M, see above). In cells of a large scattering depth a sweep
+    spreads light farther than to the next event: there it is g, and the rest goes to all sides alike, as similarity has
+    it.
     """
     if anisotropy < LEAST_AHEAD:
         return anisotropy
-    least = 1.0 - TWO_MOMENTS_DEPTH / max(cell_depth, np.finfo(np.float64).tiny)
-    return min(max(anisotropy**2, least), anisotropy)
+    least = 1.0 - ALL_MOMENTS_DEPTH / max(cell_depth, np.finfo(np.float64).tiny)
+    return min(max(anisotropy**3, least), anisotropy)
 
 
 #: Optical depth across a cell beyond which its medium counts as no denser.
@@ -252,26 +272,26 @@ class VolumeField:
     mean_radiance : (x, y, z, 3) float32
         Of what has been scattered, and of the unscattered environment: a medium scatters sigma_s times as much of it
         into each metre of a ray. Spread beyond the body.
-    gradient : tuple of 3 (x, y, z, 3) float32, or of none
-        Of a medium that scatters ahead: 3 g' J / 4 pi along x, y and z, with the vector flux J of the same light, and
-        the mean cosine g' of what does not count as unscattered. Its product with the direction of travel is added to
-        the mean: light is scattered on where it goes already.
+    moments : tuple of 8 (x, y, z, 3) float32, or of none
+        Of a medium that scatters ahead: moments of orders l = 1 and 2 of the same light over 4 pi, times (2 l + 1) and
+        the moment of what does not count as unscattered of the phase function. Their products with the
+        `moment_functions` of the direction of travel are added to the mean: light is scattered on where it goes.
     mean_cosine : float
-        g of this medium; 0 without a gradient.
+        g of this medium; 0 without moments.
     straight : float
         Fraction of scattered light that counts as unscattered here, beyond what rays find of each light themselves; 0
-        without a gradient.
+        without moments.
     environment : EnvironmentAhead, optional
         What rays find of the environment at their end.
     cap : float
-        See `capped`: light that scatters by less turns, and the rest goes straight on.
+        Value in 1/sr at which the phase function is cut off, see `capped`: light turns below it, and goes ahead above.
     """
 
     mean_radiance: npt.NDArray[np.float32]
     low: Array
     step: float
     steps: int
-    gradient: tuple[Floats, ...] = ()
+    moments: tuple[Floats, ...] = ()
     mean_cosine: float = 0.0
     straight: float = 0.0
     environment: EnvironmentAhead | None = None
@@ -281,7 +301,7 @@ class VolumeField:
     def volumes(self) -> tuple[npt.NDArray[np.float32], ...]:
         """Arrays (x, y, z, 3) that pictures look up."""
         ahead = () if self.environment is None else (self.environment.radiance,)
-        return (self.mean_radiance, *self.gradient, *ahead)
+        return (self.mean_radiance, *self.moments, *ahead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -362,9 +382,11 @@ class DiffusingVolume:
         self._density = np.minimum(volume.density, most)
         self._peak = straight_fraction(medium.anisotropy, float((scattering * self._density.max()).max()) * step)
         turning = scattering * (1.0 - self._peak)
-        #: Mean cosine of what counts as scattered, and the moments over directions that are found.
-        self._cosine = (medium.anisotropy - self._peak) / (1.0 - self._peak)
-        self._orders = 4 if self._ahead > 0.0 else 1
+        order = ORDER if self._ahead > 0.0 else ORDER[:1]
+        #: Of what counts as scattered, (2 l + 1) times its Legendre moments.
+        kept = (medium.anisotropy**order - self._peak) / (1.0 - self._peak)
+        self._kept = (2.0 * order + 1.0) * np.maximum(kept, 0.0)
+        self._kept[0] = 1.0
         self._turning = self._density[..., None] * turning
         extinction = self._density[..., None] * (absorption + turning)
         # Sweeps are right in cells that light gets through; in others diffusion is, and rounds would not end.
@@ -403,16 +425,18 @@ class DiffusingVolume:
             moments[0] = np.maximum(moments[0] + (1.0 - min(medium.anisotropy, 0.0)) * ahead, 0.0)
         # Beyond the body each cell has what the nearest inside has, for what is interpolated at its surface.
         nearest = tuple(distance_transform_edt(~volume.inside, return_distances=False, return_indices=True))
-        mean, *gradient = moments[:, *nearest] / (4.0 * np.pi)
-        gradient = [3.0 * self._cosine * part for part in gradient]
+        mean, *higher = self._kept[:, None, None, None, None] * moments[:, *nearest] / (4.0 * np.pi)
         cells = volume.grid.cells
         step, straight = cells.step, self._peak if self._ahead > 0.0 else 0.0
         if photons is not None:
             # Rays find none of it at lights: all that is scattered the first time is here, too.
             step = photons.cells.step
-            mean = _finer(mean, photons.cells.finer) + (1.0 - medium.anisotropy) / (1.0 - straight) / (4.0 * np.pi) * photons.fluence
-            gradient = [_finer(part, photons.cells.finer) for part in gradient]
-        volumes = tuple(np.ascontiguousarray(part, np.float32) for part in (mean, *gradient))
+            mean = (
+                _finer(mean, photons.cells.finer)
+                + (1.0 - medium.anisotropy) / (1.0 - straight) / (4.0 * np.pi) * photons.fluence
+            )
+            higher = [_finer(part, photons.cells.finer) for part in higher]
+        volumes = tuple(np.ascontiguousarray(part, np.float32) for part in (mean, *higher))
         behind = environment_ahead(scene.environment, self._ahead, straight) if self._ahead > 0.0 else None
         cap = capped(medium.phase_function, 1.0 - straight) if self._ahead > 0.0 else 0.0
         return VolumeField(volumes[0], cells.low, step, steps, volumes[1:], self._ahead, straight, behind, cap)
@@ -427,14 +451,14 @@ class DiffusingVolume:
         absorption, scattering = np.asarray(self._medium.absorption), np.asarray(self._medium.scattering)
         extinctions = absorption + (1.0 - self._peak) * scattering, absorption + scattering
         unturned, ahead = _from_lights(self._volume, self._density, scene, extinctions, stops)
-        return unturned[: self._orders], ahead
+        return unturned[: len(self._kept)], ahead
 
     def _sky(self, scene: Scene) -> Array:
         """(m, x, y, z, 3): moments of the environment's light that nothing has scattered."""
         directions = even_directions(DIRECTIONS)
         solid_angles = nearest_parts(directions)[1]
         radiance = environment_parts(scene.environment, directions) / solid_angles[:, None]
-        nothing = np.zeros((self._orders, *self._swept.shape))
+        nothing = np.zeros((len(self._kept), *self._swept.shape))
         if not radiance.any():
             return nothing
         return swept_moments(self._swept, nothing, radiance, directions, solid_angles, self._volume.grid.cells.step)
@@ -446,8 +470,8 @@ class DiffusingVolume:
         """
         step = self._volume.grid.cells.step
         dark = np.zeros((ORDINATES, 3))
-        # The mean of what cells send is that of what gets to them; its gradient as much as the phase function keeps.
-        kept = np.array([1.0, *[3.0 * self._cosine] * (self._orders - 1)])[:, None, None, None, None]
+        # The mean of what cells send is that of what gets to them; of other moments they send a fraction.
+        kept = self._kept[:, None, None, None, None]
         first = kept * events
         first[0] += emission
         moments = np.zeros_like(first)
@@ -533,12 +557,12 @@ def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: flo
 def _from_lights(
     volume: VolumeGrid, density: Array, scene: Scene, extinctions: tuple[Array, Array], stops: RayCaster | None = None
 ) -> tuple[Array, Array]:
-    """Moments (4, x, y, z, 3) of lights without events but forward ones, and fluence (x, y, z, 3) after forward events.
+    """Moments (9, x, y, z, 3) of lights without events but forward ones, and fluence (x, y, z, 3) after forward events.
 
     `extinctions` (3,), (3,) are that of other events and that of all; `stops` are surfaces that none of it passes.
     """
     grid, body = volume.grid, volume.body
-    unturned, ahead = np.zeros((4, *density.shape, 3)), np.zeros((*density.shape, 3))
+    unturned, ahead = np.zeros((9, *density.shape, 3)), np.zeros((*density.shape, 3))
     cells, inside = grid.cells, grid.number >= 0
     points = cells.low + cells.step * cells.center[inside]
     for light in scene.lights:
@@ -568,8 +592,7 @@ def _from_lights(
             for sigma in extinctions
         )
         travel = (points - place) / np.maximum(np.linalg.norm(points - place, axis=1), _STILL)[:, None]
-        unturned[0, inside] += turned
-        unturned[1:, inside] += travel.T[..., None] * turned
+        unturned[:, inside] += moment_functions(travel)[..., None] * turned
         ahead[inside] += turned - all_turned
     return unturned, ahead
 

@@ -149,7 +149,7 @@ def phase_after_scattering(
     anisotropy : array_like
         g, 0 to 1.
     straight : array_like
-        Fraction of scattered light that counts as unscattered in what is found of orders 0 and 1 otherwise: these
+        Fraction of scattered light that counts as unscattered in what is found of orders 0 to 2 otherwise: these
         moments decay with 1 - straight here, not with 1 - g^l.
     depth : array_like
         Optical depth of scattering before, without absorption.
@@ -162,8 +162,7 @@ def phase_after_scattering(
     second = 1.5 * cosine * cosine - 0.5
     with np.errstate(under="ignore"):
         none = np.exp(-depth)
-        total = (1.0 + 3.0 * g * cosine) * (np.exp((kept - 1.0) * depth) - none)
-        total = total + 5.0 * g * g * second * (np.exp((before * before - 1.0) * depth) - none)
+        total = (1.0 + g * (3.0 * cosine + 5.0 * g * second)) * (np.exp((kept - 1.0) * depth) - none)
         probability, power = none, g
         for n in range(1, AHEAD_EVENTS + 1):
             probability, power = probability * depth / n, power * before

@@ -265,8 +265,9 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
         if scene.opaque:
             text += "; light that grounds reflect into the medium, up to 45 % of the light of a body on a bright ground"
         volumes = [body for body in bodies if treatment_of(body) is Treatment.VOLUME]
-        if scene.lights and any(body.medium.anisotropy >= STRONGLY_AHEAD for body in volumes if body.medium):
-            text += "; dense fog that scatters forward is up to 15 % too dark before and beside a light"
+        sharp = bool(scene.lights) or scene.environment.kind == "image"
+        if sharp and any(body.medium.anisotropy >= STRONGLY_AHEAD for body in volumes if body.medium):
+            text += "; rims of fog that scatters forward are up to 15 % too bright before a light or a bright sky"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     rendered = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
     if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in rendered]:
