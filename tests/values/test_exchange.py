@@ -91,6 +91,21 @@ def test_the_light_of_a_ball_on_a_ground() -> None:
     assert shadowed.values.max() > 0.3 > 0.03 > through.values.max()
 
 
+def test_bodies_on_a_ground_hide_each_other() -> None:
+    """What is in the shadow of a ball from all points of a ground neither lights these nor takes any of their light."""
+    outer, inner = Sphere(radius=0.5).tessellate(24), Sphere(radius=0.3).tessellate(24)
+    dark = tl.Medium(absorption=300.0, scattering=30.0)
+    cover = tl.Object(outer, dark)
+    for within in (dark, None):
+        scene = tl.Scene([cover, ground(0.5), tl.Object(inner, within, color=(1, 1, 1))], CAMERA, environment=WHITE)
+        alone = tl.Scene(scene.objects[:2], CAMERA, environment=WHITE)
+        found = [FieldCache().of(plan(one, scattering=Diffusion(8))).ground for one in (alone, scene)]
+        assert found[0] is not None
+        assert found[1] is not None
+        assert found[0].values.min() < -0.3
+        np.testing.assert_allclose(found[1].values, found[0].values, atol=0.01)
+
+
 @pytest.mark.parametrize(("degrees", "rotation"), [(1.0, 0.0), (0.4, 40.0)])
 def test_suns_of_pictures_keep_their_light_and_direction(degrees: float, rotation: float) -> None:
     """However small they are, and wherever they stand between the directions in which samples look."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from threading import Lock
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.diffusion.entering import bounding_ball, opaque_surfaces, radiance_without_suns
-from translucent.diffusion.exchange import GroundMap, GroundPoints, OpaqueSurfaces
+from translucent.diffusion.exchange import BodyHits, GroundMap, GroundPoints, OpaqueSurfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.diffusion.keys import (
     coefficients_of,
@@ -215,6 +215,7 @@ def ground_map(scene: Scene, lit: Mapping[int, LitBody], surfaces: Mapping[int, 
     """Light that bodies, by their numbers, send to the ground below them; None without one.
 
     Unless maps of the environment's shadows do it, the environment's light that the bodies keep from it is subtracted.
+    Bodies and opaque objects hide each other.
     """
     if not lit or (ground := ground_below(scene, sorted(lit))) is None:
         return None
@@ -222,12 +223,25 @@ def ground_map(scene: Scene, lit: Mapping[int, LitBody], surfaces: Mapping[int, 
     points = GroundPoints(ground, scene.objects.index(ground.ground), np.stack([low.min(axis=0), high.max(axis=0)]))
     total = np.zeros(points.points.shape)
     for i, body in lit.items():
+        others = [other.nearest for other in lit.values() if other is not body]
+        if body.casters.opaque is not None and len(scene.opaque) > 1:
+            others.append(lambda *rays, caster=body.casters.opaque.caster: caster.nearest(*rays)[::-1])
+
+        def nearest(
+            origins: Array, directions: Array, body: LitBody = body, others: Sequence[BodyHits] = others
+        ) -> tuple[Array, Integers]:
+            distance, sample = body.nearest(origins, directions)
+            for other in others:
+                hit = np.flatnonzero(np.isfinite(distance))
+                hidden = other(origins[hit], directions[hit])[0] < distance[hit]
+                distance[hit[hidden]] = np.inf
+            return distance, sample
 
         def light(sample: Integers, directions: Array, leaving: Array = surfaces[i].leaving) -> Array:
             sent = leaving[sample] / np.pi
             return sent if scene.environment_shadows else sent - radiance_without_suns(scene.environment, directions)
 
-        total += points.irradiance(bounding_ball(scene.objects[i]), body.nearest, light)
+        total += points.irradiance(bounding_ball(scene.objects[i]), nearest, light)
     return points.map(total)
 
 
