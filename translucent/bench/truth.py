@@ -187,15 +187,10 @@ class CaseTruth:
         used = self.compared & frame.coverage & frame.valid
         if self.halves is None or not used.any():
             return None
-        mean = float(self.frame.radiance[used].mean())
-        rendered = np.asarray(frame.radiance, np.float64)
-        whole = _blocks(used.astype(np.float64)[..., None])[..., 0] == 1.0
-        block = 0.0
-        if whole.any():
-            parts = (_blocks(picture)[whole] for picture in (rendered, *self.halves))
-            block = math.sqrt(max(noise_free_square(*parts)[0], 0.0)) / mean
-        red, green, blue = (rendered[used].mean(axis=0) / self.frame.radiance[used].mean(axis=0) - 1.0).tolist()
-        return LightErrors(self._rms_without_noise(frame) / mean, block, (red, green, blue), solve_seconds)
+        rendered, halves = np.asarray(frame.radiance, np.float64), np.stack(self.halves)
+        block = block_error(rendered, halves, used)
+        nrmse = self._rms_without_noise(frame) / float(halves[:, used].mean())
+        return LightErrors(nrmse, 0.0 if math.isnan(block) else block, bias(rendered, halves, used), solve_seconds)
 
     def color_difference(self, frame: Frame, quantity: Quantity) -> ColorDifference | None:
         """Visible color difference of a frame; None if there is no pixel to compare."""
@@ -221,6 +216,37 @@ def _blocks(picture: Array) -> Array:
     h, w = (side // BLOCK for side in picture.shape[:2])
     cut = picture[: h * BLOCK, : w * BLOCK]
     return np.asarray(cut.reshape(h, BLOCK, w, BLOCK, -1).mean(axis=(1, 3)))
+
+
+def block_error(rendered: Array, halves: Array, used: Mask) -> float:
+    """Root mean square error of means over blocks, freed of the truth's noise, as a fraction of the truth's mean.
+
+    Parameters
+    ----------
+    rendered : (h, w, 3)
+    halves : (2, h, w, 3)
+        Two truths with independent noise.
+    used : (h, w) bool
+        Only blocks that lie wholly in it count.
+
+    Returns
+    -------
+    float
+        NaN where there is no such block.
+    """
+    whole = _blocks(used.astype(np.float64)[..., None])[..., 0] == 1.0
+    if not whole.any():
+        return math.nan
+    parts = (_blocks(picture.astype(np.float64))[whole] for picture in (rendered, *halves))
+    mean = max(float(halves[:, used].astype(np.float64).mean()), 1e-12)
+    return math.sqrt(max(noise_free_square(*parts)[0], 0.0)) / mean
+
+
+def bias(rendered: Array, halves: Array, used: Mask) -> tuple[float, float, float]:
+    """Mean of each channel over some pixels, divided by the truth's, less 1."""
+    right = halves[:, used].astype(np.float64).mean(axis=(0, 1))
+    red, green, blue = (rendered[used].mean(axis=0) / np.maximum(right, 1e-12) - 1.0).tolist()
+    return red, green, blue
 
 
 def noise_free_square(rendered: Array, one: Array, other: Array) -> tuple[float, float]:

@@ -11,13 +11,10 @@ from scipy.ndimage import affine_transform, uniform_filter
 
 from translucent.arrays import Array, Mask
 from translucent.bench.judgement import JUST_NOTICEABLE, lab
-from translucent.bench.truth import noise_free_square
+from translucent.bench.truth import bias, block_error, noise_free_square
 from translucent.benchmark.truth import TruthPicture
 from translucent.errors import RenderError
 from translucent.extras import require_package
-
-#: Width and height of the blocks over whose means errors are taken, in pixels.
-BLOCK = 4
 
 #: nRMSE below which a picture is near enough, so that nothing is suspected.
 NEAR = 0.06
@@ -104,12 +101,10 @@ def score_picture(picture: Array, truth: TruthPicture, thickness: Array | None =
     used = truth.mask
     one, other = (half.astype(np.float64) for half in truth.halves)
     right = truth.radiance
-    channels = np.maximum(right[used].mean(axis=0), 1e-12)
-    red, green, blue = (picture[used].mean(axis=0) / channels - 1.0).tolist()
     return Score(
         nrmse=_nrmse(picture, truth),
-        block=_block_error(picture, truth),
-        bias=(red, green, blue),
+        block=block_error(picture, truth.halves, used),
+        bias=bias(picture, truth.halves, used),
         flip=flip(picture, right, used),
         visible=_visible(picture, right, used),
         own_flip=flip(right + 0.5 * (one - other), right, used),
@@ -123,21 +118,6 @@ def _nrmse(picture: Array, truth: TruthPicture) -> float:
     one, other = (half.astype(np.float64)[truth.mask] for half in truth.halves)
     square, _ = noise_free_square(picture[truth.mask], one, other)
     return math.sqrt(max(square, 0.0)) / max(0.5 * float((one + other).mean()), 1e-12)
-
-
-def _block_error(picture: Array, truth: TruthPicture) -> float:
-    """nRMSE of means over blocks that lie wholly in the mask; NaN where there is none."""
-    whole = _blocks(truth.mask.astype(np.float64)[..., None])[..., 0] == 1.0
-    if not whole.any():
-        return math.nan
-    parts = (_blocks(each.astype(np.float64))[whole] for each in (picture, *truth.halves))
-    mean = max(float(truth.radiance[truth.mask].mean()), 1e-12)
-    return math.sqrt(max(noise_free_square(*parts)[0], 0.0)) / mean
-
-
-def _blocks(picture: Array) -> Array:
-    h, w = (side // BLOCK for side in picture.shape[:2])
-    return np.asarray(picture[: h * BLOCK, : w * BLOCK].reshape(h, BLOCK, w, BLOCK, -1).mean(axis=(1, 3)))
 
 
 def flip(picture: Array, right: Array, used: Mask) -> float:
@@ -239,23 +219,27 @@ def suspicions(picture: Array, truth: TruthPicture) -> list[str]:
         return []
     if picture.max() <= 0.0:
         return ["black"]
-    before = _block_error(picture, truth)
-    found = [(_block_error(one.undo(picture), truth), one.said) for one in _SUSPECTS]
+
+    def off(one: Array) -> float:
+        return block_error(one, truth.halves, truth.mask)
+
+    before = off(picture)
+    found = [(off(one.undo(picture)), one.said) for one in _SUSPECTS]
     used, right = truth.mask, truth.radiance
     product, square = float((picture[used] * right[used]).sum()), float((picture[used] ** 2).sum())
     if product > 0 and abs(math.log2(factor := product / square)) > STOPS:
         other = "brighter" if factor > 1 else "darker"
         stops = abs(math.log2(factor))
         said = f"exposure may be off: at {stops:.2g} stops {other} the error halves"
-        found.append((_block_error(factor * picture, truth), said))
+        found.append((off(factor * picture), said))
     down, across = _best_shift(picture, right)
     if math.hypot(down, across) > SHIFTED:
         said = f"shifted by {across} pixels to the right and {down} down"
-        found.append((_block_error(_moved(picture, down, across), truth), said.replace(f"{across} ", f"{-across} ", 1)))
+        found.append((off(_moved(picture, down, across)), said.replace(f"{across} ", f"{-across} ", 1)))
     for zoom in ZOOMS:
         how = "smaller: more is seen" if zoom > 1 else "larger: a part is seen"
         said = f"cropped or another field of view: things are {1 / zoom:.2g} times as large, {how}"
-        found.append((_block_error(_zoomed(picture, zoom), truth), said))
+        found.append((off(_zoomed(picture, zoom)), said))
     after, said = min(found, key=lambda one: one[0])
     return [said] if after < SUSPICIOUS * before else []
 
